@@ -1,0 +1,6 @@
+"""Tells catkin which Python packages there are; everything else is in package.xml."""
+
+from catkin_pkg.python_setup import generate_distutils_setup
+from setuptools import find_packages, setup
+
+setup(**generate_distutils_setup(packages=find_packages("src"), package_dir={"": "src"}))

@@ -1,0 +1,85 @@
+"""joint_state_controller/JointStateController: reports joints, drives none (ros_control.md section 3.1)."""
+
+from collections.abc import Mapping
+
+from bullet_gazebo.control.controllers.base import Controller, Output, number_param
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import STATE, RobotHardware
+from bullet_gazebo.control.joint import JointHandle
+from bullet_gazebo.control.samples import JointStateSample
+
+NANOSECONDS = 1_000_000_000
+EXTRA_FIELDS = ("position", "velocity", "effort")
+
+
+class JointStateController(Controller):
+    """Publishes `joint_states` at `publish_rate` [Hz of simulated time], phase-locked to the first one."""
+
+    type_name = "joint_state_controller/JointStateController"
+    interface = STATE
+
+    def __init__(self, name: str, joints: list[JointHandle], rate: float, extra: list[tuple]) -> None:
+        super().__init__(name)
+        self._joints = joints
+        self._period = round(NANOSECONDS / rate) if rate > 0.0 else None
+        self._last = 0
+        self._names = tuple(j.name for j in joints) + tuple(e[0] for e in extra)
+        self._extra = tuple(tuple(e[k] for e in extra) for k in (1, 2, 3))
+        self._output = Output("joint_states", "JointState", shared=True)
+        self.outputs = [self._output]
+
+    @classmethod
+    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> "JointStateController":
+        rate = number_param(params, "publish_rate", name)
+        wanted = params.get("joints", list(hardware.joints))
+        if not isinstance(wanted, list):
+            raise ControlError(f"parameter {name}/joints must be a list of joint names: {wanted!r}")
+        unknown = [joint for joint in wanted if joint not in hardware.joints]
+        if unknown:
+            raise ControlError(f"parameter {name}/joints: the robot has no joint {unknown}")
+        extra = _extra_joints(params.get("extra_joints", []), wanted)
+        return cls(name, [hardware.joints[joint] for joint in wanted], rate, extra)
+
+    def starting(self, now: int) -> None:
+        if self._period is not None:
+            self._last = now - self._period  # the next tick publishes
+
+    def update(self, now: int, dt: float) -> None:
+        if self._period is not None and self._last + self._period < now:
+            self._last += self._period
+            self._report(now)
+
+    def joints_moved(self, now: int) -> None:
+        """Reports at once: who reads the topic must not act on what is no longer true."""
+        if self._period is not None:
+            self._last = now
+            self._report(now)
+
+    def _report(self, now: int) -> None:
+        if self._output.sink is not None:
+            self._output.sink(self.sample(now))
+
+    def sample(self, now: int) -> JointStateSample:
+        """Returns the joints' state, extra joints last."""
+        joints, extra = self._joints, self._extra
+        return JointStateSample(
+            now,
+            self._names,
+            tuple(j.position for j in joints) + extra[0],
+            tuple(j.velocity for j in joints) + extra[1],
+            tuple(j.effort for j in joints) + extra[2],
+        )
+
+
+def _extra_joints(entries: object, names: list[str]) -> list[tuple]:
+    """Constant joints (name, position, velocity, effort); as upstream, a bad or repeated one is left out."""
+    extra: list[tuple] = []
+    seen = set(names)
+    for entry in entries if isinstance(entries, list) else []:
+        values = [entry.get(key, 0.0) for key in EXTRA_FIELDS] if isinstance(entry, Mapping) else []
+        if not values or not all(isinstance(value, float) for value in values):
+            continue
+        if isinstance(entry.get("name"), str) and entry["name"] not in seen:
+            seen.add(entry["name"])
+            extra.append((entry["name"], *values))
+    return extra

@@ -1,0 +1,148 @@
+"""What ros_control reads from a robot description: transmissions, joint kinds and limits."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
+
+PREFIX = "hardware_interface/"
+INTERFACES = ("EffortJointInterface", "PositionJointInterface", "VelocityJointInterface")
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """A joint and the hardware interface that drives it."""
+
+    joint: str
+    interface: str
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """Joints by name, in document order, and what drives them; `warnings` are for the log."""
+
+    joints: dict[str, JointHandle]
+    transmissions: list[Transmission]
+    warnings: list[str]
+
+    def limited_by(self, params: object) -> "RobotDescription":
+        """Returns the description with limits overridden from the tree `<ns>/joint_limits`."""
+        tree = params if isinstance(params, Mapping) else {}
+        joints = {
+            name: JointHandle(name, joint.kind, _overridden(joint.limits, tree.get(name), joint.kind))
+            for name, joint in self.joints.items()
+        }
+        return replace(self, joints=joints)
+
+
+def read_description(text: str) -> RobotDescription:
+    """Reads URDF text (contract: gazebo_api.md section 6.3, ros_control.md sections 3.0 and 5).
+
+    Errors: ControlError if it isn't XML, or a transmission names an interface that doesn't exist.
+    """
+    try:
+        robot = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise ControlError(f"robot_description is not well-formed XML: {error}") from error
+    joints = {e.get("name", ""): _joint(e) for e in robot.findall("joint")}
+    warnings: list[str] = []
+    found = [_transmission(e, warnings) for e in robot.findall("transmission")]
+    return RobotDescription(joints, [t for t in found if t is not None], warnings)
+
+
+def _joint(element: Element) -> JointHandle:
+    kind = element.get("type", "")
+    limit = element.find("limit")
+    limits = JointLimits()
+    if limit is not None:
+        bounded = kind in ("revolute", "prismatic")
+        limits = JointLimits(
+            lower=_float(limit, "lower") if bounded else None,
+            upper=_float(limit, "upper") if bounded else None,
+            velocity=_float(limit, "velocity"),
+            effort=_float(limit, "effort"),
+            soft=_soft(element.find("safety_controller")),
+        )
+    return JointHandle(element.get("name", ""), kind, limits)
+
+
+def _soft(element: Element | None) -> SoftLimits | None:
+    if element is None:
+        return None
+    return SoftLimits(
+        lower=_float(element, "soft_lower_limit"),
+        upper=_float(element, "soft_upper_limit"),
+        k_position=_float(element, "k_position"),
+        k_velocity=_float(element, "k_velocity"),
+    )
+
+
+def _float(element: Element, key: str) -> float:
+    text = element.get(key, "0")
+    try:
+        value = float(text)
+    except ValueError as error:
+        raise ControlError(f"robot_description: <{element.tag} {key}='{text}'> is not a number") from error
+    if not math.isfinite(value):
+        raise ControlError(f"robot_description: <{element.tag} {key}='{text}'> is not finite")
+    return value
+
+
+def _transmission(element: Element, warnings: list[str]) -> Transmission | None:
+    """One transmission, or None and a warning where upstream's parser skips it."""
+    name = element.get("name", "")
+    kind = (element.findtext("type") or "").strip()
+    joints = [j for j in element.findall("joint") if j.get("name")]
+    interfaces = [_text(i) for j in joints for i in j.findall("hardwareInterface") if _text(i)]
+    fault = ""
+    if not name or not kind:
+        fault = "it needs a name and a <type>"
+    elif len(joints) != 1:
+        fault = f"it has {len(joints)} joints, not one"
+    elif not interfaces:
+        fault = "its joint has no <hardwareInterface>"
+    elif not any(a.get("name") for a in element.findall("actuator")):
+        fault = "it has no named <actuator>"
+    if fault:
+        warnings.append(f"Transmission '{name}' is skipped: {fault}.")
+        return None
+    joint = joints[0].get("name", "")
+    if len(interfaces) > 1:
+        warnings.append(f"Joint '{joint}' has several hardware interfaces; {interfaces[0]} is used.")
+    return Transmission(joint, _interface(interfaces[0], joint, warnings))
+
+
+def _interface(text: str, joint: str, warnings: list[str]) -> str:
+    interface = text.removeprefix(PREFIX)
+    if interface not in INTERFACES:
+        raise ControlError(f"Joint '{joint}': no hardware interface is called '{text}'.")
+    if text == interface:
+        warnings.append(f"Joint '{joint}': '{text}' is deprecated, write '{PREFIX}{text}'.")
+    return interface
+
+
+def _text(element: Element) -> str:
+    return (element.text or "").strip()
+
+
+def _overridden(limits: JointLimits, params: object, kind: str) -> JointLimits:
+    """`has_X_limits` switches X on (with its values) or off; what isn't named stays as in the URDF."""
+    if not isinstance(params, Mapping):
+        return limits
+    if kind in ("revolute", "prismatic"):
+        limits = _override(limits, params, "position", {"lower": "min_position", "upper": "max_position"})
+    limits = _override(limits, params, "velocity", {"velocity": "max_velocity"})
+    return _override(limits, params, "effort", {"effort": "max_effort"})
+
+
+def _override(limits: JointLimits, params: Mapping, what: str, fields: dict[str, str]) -> JointLimits:
+    switch = params.get(f"has_{what}_limits")
+    if switch is False:
+        return replace(limits, **dict.fromkeys(fields))
+    if switch and all(isinstance(params.get(key), (int, float)) for key in fields.values()):
+        return replace(limits, **{field: float(params[key]) for field, key in fields.items()})
+    return limits

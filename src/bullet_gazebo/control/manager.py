@@ -1,0 +1,167 @@
+"""The controller manager: loads, switches and updates controllers (ros_control.md section 1)."""
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from bullet_gazebo.control.controllers import BUILT_IN
+from bullet_gazebo.control.controllers.base import Controller
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import RobotHardware
+
+BEST_EFFORT = 1
+STRICT = 2
+RUNNING, STOPPED = "running", "stopped"
+
+
+class Claim(NamedTuple):
+    """The joints that a controller claims of a hardware interface."""
+
+    hardware_interface: str
+    resources: tuple[str, ...]
+
+
+class Listed(NamedTuple):
+    """An entry of list_controllers."""
+
+    name: str
+    state: str
+    type_name: str
+    claims: tuple[Claim, ...]
+
+
+class ControllerManager:
+    """Controllers of one robot, in load order. Not thread-safe: called between two ticks only.
+
+    A refused request raises ControlError with the reason and changes nothing.
+    """
+
+    def __init__(self, hardware: RobotHardware) -> None:
+        self.hardware = hardware
+        self.types: dict[str, type[Controller]] = dict(BUILT_IN)
+        self._controllers: dict[str, Controller] = {}
+        self._running: list[Controller] = []
+        self._now = 0
+
+    def update(self, now: int, dt: float) -> None:
+        """Updates the running controllers; `now` [ns], `dt` [s]."""
+        self._now = now
+        for controller in self._running:
+            controller.update(now, dt)
+
+    def get(self, name: str) -> Controller:
+        """Returns controller `name`; ControlError if it isn't loaded."""
+        if name not in self._controllers:
+            raise ControlError(f"No controller named '{name}' is loaded.")
+        return self._controllers[name]
+
+    def load(self, name: str, params: object) -> Controller:
+        """Makes controller `name` from the parameters `<ns>/<name>`."""
+        if name in self._controllers:
+            raise ControlError(f"A controller named '{name}' was already loaded inside the controller manager")
+        kind = params.get("type") if isinstance(params, Mapping) else None
+        if not isinstance(params, Mapping) or not isinstance(kind, str):
+            raise ControlError(
+                f"Could not load controller '{name}' because the type was not specified. "
+                "Did you load the controller configuration on the parameter server?"
+            )
+        if kind not in self.types:
+            raise ControlError(
+                f"Could not load controller '{name}' because controller type '{kind}' does not exist. "
+                "Use 'rosservice call controller_manager/list_controller_types' to get the available types"
+            )
+        try:
+            controller = self.types[kind].create(name, params, self.hardware)
+        except ControlError as error:
+            raise ControlError(f"Initializing controller '{name}' failed: {error}") from error
+        self._controllers[name] = controller
+        return controller
+
+    def unload(self, name: str) -> Controller:
+        """Forgets a controller that isn't running, and returns it."""
+        controller = self.get(name)
+        if controller.state == RUNNING:
+            raise ControlError(f"Could not unload controller '{name}' because it is still running")
+        return self._controllers.pop(name)
+
+    def switch(self, start: Iterable[str], stop: Iterable[str], strictness: int = BEST_EFFORT) -> None:
+        """Stops and starts controllers as one act (section 1.6), also while the world is paused.
+
+        A running controller that is in both lists, or in the start list under BEST_EFFORT, is restarted;
+        under STRICT both are refused.
+        """
+        strict = strictness == STRICT
+        stopping = self._known(stop, strict)
+        starting = self._known(start, strict)
+        if strict:
+            _check_strict(starting, stopping)
+        stopping = [c for c in stopping if c.state == RUNNING]
+        kept = [c for c in self._running if c not in stopping and c not in starting]
+        _check_conflicts(kept + starting)
+        for controller in stopping:
+            controller.stopping()
+            controller.state = STOPPED
+        for controller in starting:
+            controller.starting(self._now)
+            controller.state = RUNNING
+        self._running = [c for c in self._controllers.values() if c.state == RUNNING]
+
+    def listed(self) -> list[Listed]:
+        """Returns the loaded controllers in load order."""
+        return [
+            Listed(c.name, c.state, c.type_name, (Claim(f"hardware_interface::{c.interface}", c.claimed),))
+            for c in self._controllers.values()
+        ]
+
+    def unload_all(self) -> list[Controller]:
+        """Stops and forgets everything, and returns what was loaded."""
+        self.switch([], [c.name for c in self._running])
+        gone = list(self._controllers.values())
+        self._controllers.clear()
+        return gone
+
+    def joints_moved(self, now: int, relatch: bool) -> None:
+        """Tells controllers that joints moved by other means than time.
+
+        With `relatch` they begin anew: set-points at the new positions, no PID past, no old effort.
+        """
+        self._now = now
+        if relatch:
+            self.hardware.clear_commands()
+            for controller in self._running:
+                controller.starting(now)
+        for controller in self._running:
+            controller.joints_moved(now)
+
+    def _known(self, names: Iterable[str], strict: bool) -> list[Controller]:
+        found: dict[str, Controller] = {}
+        for name in names:
+            if name in self._controllers:
+                found[name] = self._controllers[name]
+            elif strict:
+                raise ControlError(f"Could not switch: no controller named '{name}' is loaded.")
+        return list(found.values())
+
+
+def _check_strict(starting: list[Controller], stopping: list[Controller]) -> None:
+    both = [c.name for c in starting if c in stopping]
+    idle = [c.name for c in stopping if c.state != RUNNING]
+    busy = [c.name for c in starting if c.state == RUNNING]
+    if both:
+        raise ControlError(f"Could not switch: {both} are in both the start and the stop list.")
+    if idle:
+        raise ControlError(f"Could not stop {idle}: not running.")
+    if busy:
+        raise ControlError(f"Could not start {busy}: already running.")
+
+
+def _check_conflicts(controllers: list[Controller]) -> None:
+    """A joint has one master, whatever the interface."""
+    owners: dict[str, str] = {}
+    for controller in controllers:
+        for joint in controller.claimed:
+            if joint in owners:
+                raise ControlError(
+                    f"Could not switch: controllers '{owners[joint]}' and '{controller.name}' "
+                    f"both claim joint '{joint}'"
+                )
+            owners[joint] = controller.name

@@ -1,0 +1,101 @@
+"""The PID of control_toolbox, to the letter of ros_control.md section 4."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from bullet_gazebo.control.errors import ControlError
+
+
+@dataclass(frozen=True)
+class Gains:
+    """p, i, d [command per error, per error s, s per error]; the integral TERM is clamped to i_min..i_max."""
+
+    p: float
+    i: float = 0.0
+    d: float = 0.0
+    i_max: float = 0.0
+    i_min: float = 0.0
+    antiwindup: bool = False
+
+    @classmethod
+    def from_params(cls, params: object, place: str) -> "Gains":
+        """Reads gains from a parameter tree; `place` is where they stand, for the error text.
+
+        Errors: ControlError if `p` is missing or a gain is no finite number.
+        """
+        if not isinstance(params, Mapping) or "p" not in params:
+            raise ControlError(f"No p gain specified for pid. Namespace: {place}")
+        clamp = abs(_number(params, "i_clamp", 0.0, place))
+        return cls(
+            p=_number(params, "p", 0.0, place),
+            i=_number(params, "i", 0.0, place),
+            d=_number(params, "d", 0.0, place),
+            i_max=max(0.0, _number(params, "i_clamp_max", clamp, place)),
+            i_min=min(0.0, _number(params, "i_clamp_min", -clamp, place)),
+            antiwindup=bool(params.get("antiwindup", False)),
+        )
+
+
+def _number(params: Mapping, key: str, default: float, place: str) -> float:
+    value = params.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ControlError(f"{place}/{key} is {value!r}: it must be a finite number")
+    return float(value)
+
+
+class Pid:
+    """Gains and the state that they act on. One instance a controlled joint."""
+
+    __slots__ = ("_gains", "d_error", "i_error", "last_error", "output", "p_error", "seeded")
+
+    def __init__(self, gains: Gains) -> None:
+        self._gains = gains
+        self.clear()
+        self.seeded = False
+
+    @property
+    def gains(self) -> Gains:
+        return self._gains
+
+    @gains.setter
+    def gains(self, gains: Gains) -> None:
+        self._gains = gains
+
+    def clear(self) -> None:
+        """Forgets the past. The last error counts as a known 0, so the next step has a derivative."""
+        self.p_error = self.i_error = self.d_error = self.last_error = self.output = 0.0
+        self.seeded = True
+
+    def compute(self, error: float, dt: float) -> float:
+        """Returns the command for `error`, `dt` [s] after the last call; 0 for dt = 0 or a bad error."""
+        if dt == 0.0 or not math.isfinite(error):
+            return 0.0
+        rate = self.d_error
+        if dt > 0.0:
+            if self.seeded:
+                rate = (error - self.last_error) / dt
+            self.last_error = error
+            self.seeded = True
+        return self._respond(error, rate, dt)
+
+    def compute_with_rate(self, error: float, rate: float, dt: float) -> float:
+        """As compute, with the error's derivative known instead of differenced."""
+        if dt == 0.0 or not (math.isfinite(error) and math.isfinite(rate)):
+            self.p_error, self.d_error = error, rate
+            return 0.0
+        return self._respond(error, rate, dt)
+
+    def _respond(self, error: float, rate: float, dt: float) -> float:
+        gains = self._gains
+        self.p_error = error
+        self.d_error = rate
+        self.i_error += dt * error
+        if gains.antiwindup and gains.i != 0.0:
+            bounds = (gains.i_min / gains.i, gains.i_max / gains.i)
+            self.i_error = max(min(bounds), min(max(bounds), self.i_error))
+        i_term = gains.i * self.i_error
+        if not gains.antiwindup:
+            i_term = max(gains.i_min, min(gains.i_max, i_term))
+        self.output = gains.p * error + i_term + gains.d * rate
+        return self.output

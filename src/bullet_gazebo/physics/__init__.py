@@ -1,0 +1,1 @@
+"""Model descriptions and the physics world: no ROS and no controllers in here."""

@@ -1,0 +1,105 @@
+"""What a model consists of, independent of the file format it came from and of the engine that simulates it."""
+
+from dataclasses import dataclass, field
+from xml.etree.ElementTree import Element
+
+from bullet_gazebo.physics.pose import Pose, Vector
+
+MOVABLE = ("revolute", "continuous", "prismatic")
+
+
+class DescriptionError(ValueError):
+    """A model file that can't be simulated: the text names the place in it and what is wrong."""
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Mass [kg], centre of mass and inertia tensor [kg m²] about it, in the axes of `com`."""
+
+    mass: float
+    com: Pose = Pose()
+    ixx: float = 0.0
+    ixy: float = 0.0
+    ixz: float = 0.0
+    iyy: float = 0.0
+    iyz: float = 0.0
+    izz: float = 0.0
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A collision or visual shape: box (x, y, z), cylinder (radius, length), sphere (radius), mesh."""
+
+    kind: str
+    size: tuple[float, ...] = ()
+    pose: Pose = Pose()
+    mesh: str = ""
+    rgba: tuple[float, float, float, float] | None = None
+    name: str = ""
+
+
+@dataclass
+class Link:
+    name: str
+    inertia: Inertia | None = None
+    collisions: list[Shape] = field(default_factory=list)
+    visuals: list[Shape] = field(default_factory=list)
+
+
+@dataclass
+class Joint:
+    """A joint; limits in [rad, m], [N m, N] and [rad/s, m/s]. `pose` places the child in the parent link."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    pose: Pose = Pose()
+    axis: Vector = (1.0, 0.0, 0.0)
+    lower: float = 0.0
+    upper: float = 0.0
+    effort: float = 0.0
+    velocity: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+
+    @property
+    def movable(self) -> bool:
+        return self.kind in MOVABLE
+
+    @property
+    def bounded(self) -> bool:
+        return self.kind in ("revolute", "prismatic")
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """A `<plugin>` element of the model: Gazebo picks the code by the library's file name."""
+
+    filename: str
+    name: str
+    element: Element
+
+
+@dataclass
+class ModelDescription:
+    """Links and joints in document order. `world_joints` fix the root link to the world, if there are any."""
+
+    name: str
+    links: dict[str, Link]
+    joints: dict[str, Joint]
+    root: str
+    root_pose: Pose = Pose()
+    world_joints: list[str] = field(default_factory=list)
+    plugins: list[Plugin] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    static: bool = False
+    self_collide: bool = False
+
+    @property
+    def fixed_base(self) -> bool:
+        return self.static or bool(self.world_joints)
+
+    @property
+    def movable_joints(self) -> list[Joint]:
+        return [joint for joint in self.joints.values() if joint.movable]

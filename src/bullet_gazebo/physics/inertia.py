@@ -1,0 +1,43 @@
+"""Rigid-body inertia: combining bodies, by the parallel-axis theorem."""
+
+import numpy as np
+
+from bullet_gazebo.physics.description import Inertia
+from bullet_gazebo.physics.pose import Pose, Quaternion, rotate
+
+
+def combine(a: Inertia | None, b: Inertia | None) -> Inertia | None:
+    """Returns the inertia of both bodies held together; both are given in the same frame."""
+    bodies = [body for body in (a, b) if body is not None and body.mass > 0.0]
+    if not bodies:
+        return a or b
+    if len(bodies) == 1:
+        return bodies[0]
+    mass = sum(body.mass for body in bodies)
+    com = sum(body.mass * np.array(body.com.position) for body in bodies) / mass
+    tensor = sum(_about(body, com) for body in bodies)
+    return Inertia(
+        mass, Pose((float(com[0]), float(com[1]), float(com[2]))),
+        ixx=float(tensor[0, 0]), ixy=float(tensor[0, 1]), ixz=float(tensor[0, 2]),
+        iyy=float(tensor[1, 1]), iyz=float(tensor[1, 2]), izz=float(tensor[2, 2]),
+    )  # fmt: skip
+
+
+def _about(body: Inertia, point: np.ndarray) -> np.ndarray:
+    """The tensor (3, 3) about `point`, in the axes of the link."""
+    rotation = _matrix(body.com.orientation)
+    own = np.array(
+        [
+            [body.ixx, body.ixy, body.ixz],
+            [body.ixy, body.iyy, body.iyz],
+            [body.ixz, body.iyz, body.izz],
+        ]
+    )
+    arm = np.array(body.com.position) - point
+    steiner = body.mass * (np.dot(arm, arm) * np.eye(3) - np.outer(arm, arm))
+    return rotation @ own @ rotation.T + steiner
+
+
+def _matrix(q: Quaternion) -> np.ndarray:
+    columns = [rotate(q, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+    return np.array(columns).T

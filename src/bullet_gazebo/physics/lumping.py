@@ -1,0 +1,90 @@
+"""Fixed-joint lumping, as sdformat does it when Gazebo loads a URDF (gazebo_api.md section 2.4).
+
+The child of a fixed joint melts into its parent: inertia, shapes and the joints below it move up, and
+its name is gone. A root link called `world` stands for the world itself. Links without mass are dropped.
+"""
+
+from dataclasses import replace
+
+from bullet_gazebo.physics.description import DescriptionError, Inertia, Link, ModelDescription, Shape
+from bullet_gazebo.physics.inertia import combine
+from bullet_gazebo.physics.pose import Pose
+
+WORLD = "world"
+
+
+def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
+    """Returns `model` with its fixed joints lumped and its massless links gone (changed in place)."""
+    _detach_from_world(model)
+    for name in [j.name for j in model.joints.values() if j.kind == "fixed"][::-1]:
+        _lump(model, name)
+    _drop_free_joints(model)
+    _drop_massless(model)
+    return model
+
+
+def _detach_from_world(model: ModelDescription) -> None:
+    """A single fixed joint from the link `world` makes the model's base immovable; `world` is dropped."""
+    if model.root != WORLD:
+        return
+    anchors = [joint for joint in model.joints.values() if joint.parent == WORLD]
+    model.world_joints = [joint.name for joint in anchors if joint.kind == "fixed"]
+    if len(anchors) == 1 and anchors[0].kind == "fixed":
+        del model.joints[anchors[0].name], model.links[WORLD]
+        model.root, model.root_pose = anchors[0].child, anchors[0].pose
+    elif not model.world_joints:
+        model.world_joints = [WORLD]
+
+
+def _lump(model: ModelDescription, name: str) -> None:
+    joint = model.joints.pop(name)
+    parent, child = model.links[joint.parent], model.links.pop(joint.child)
+    parent.inertia = combine(parent.inertia, _moved(child.inertia, joint.pose))
+    parent.collisions += [_lumped(shape, joint.pose, child.name) for shape in child.collisions]
+    parent.visuals += [_lumped(shape, joint.pose, child.name) for shape in child.visuals]
+    for other in model.joints.values():
+        if other.parent == child.name:
+            other.parent, other.pose = parent.name, joint.pose.compose(other.pose)
+
+
+def _moved(inertia: Inertia | None, pose: Pose) -> Inertia | None:
+    return None if inertia is None else replace(inertia, com=pose.compose(inertia.com))
+
+
+def _lumped(shape: Shape, pose: Pose, link: str) -> Shape:
+    name = shape.name or f"fixed_joint_lump__{link}"
+    return replace(shape, pose=pose.compose(shape.pose), name=name)
+
+
+def _drop_free_joints(model: ModelDescription) -> None:
+    """Gazebo makes no joint of a floating or planar one; a robot that hangs from the world by it is free."""
+    for joint in [j for j in model.joints.values() if not j.movable]:
+        if joint.parent != WORLD or len([j for j in model.joints.values() if j.parent == WORLD]) > 1:
+            raise DescriptionError(
+                f"joint '{joint.name}': a {joint.kind} joint is only simulated as the free base of a robot"
+            )
+        del model.joints[joint.name], model.links[WORLD]
+        model.root, model.root_pose, model.world_joints = joint.child, joint.pose, []
+
+
+def _drop_massless(model: ModelDescription) -> None:
+    for name in list(model.links):
+        link = model.links.get(name)
+        if link is None or name == WORLD or (link.inertia is not None and link.inertia.mass > 0.0):
+            continue
+        if name == model.root and not model.static:
+            raise DescriptionError(f"link '{name}': the root link has no mass, so Gazebo drops the model")
+        if name != model.root:
+            _drop_subtree(model, link)
+
+
+def _drop_subtree(model: ModelDescription, link: Link) -> None:
+    model.warnings.append(f"link '{link.name}' has no mass: it is dropped with all that hangs from it")
+    doomed = [link.name]
+    while doomed:
+        name = doomed.pop()
+        model.links.pop(name, None)
+        for joint in [j for j in model.joints.values() if name in (j.parent, j.child)]:
+            if joint.parent == name:
+                doomed.append(joint.child)
+            del model.joints[joint.name]

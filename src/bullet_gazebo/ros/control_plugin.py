@@ -1,0 +1,95 @@
+"""libgazebo_ros_control.so: ros_control for a model (contract: gazebo_api.md sections 6.1 to 6.5)."""
+
+import threading
+
+import rospy
+
+from bullet_gazebo.control.description import read_description
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.manager import ControllerManager
+from bullet_gazebo.robot import Robot
+from bullet_gazebo.ros.controller_services import ControllerServices
+from bullet_gazebo.ros.plugins import PluginContext
+
+FILENAME = "libgazebo_ros_control.so"
+POLL = 0.1  # [s]
+REMIND = 10.0  # [s]
+
+
+class ControlPlugin:
+    """Makes a controller manager for a model as soon as its robot description is on the server."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._context = context
+        self._sim = context.sim
+        self._namespace = rospy.names.ns_join(rospy.get_namespace(), context.namespace)
+        self._gone = threading.Event()
+        self._lock = threading.Lock()
+        self._robot: Robot | None = None
+        self._services: ControllerServices | None = None
+        if not self._try_start():
+            threading.Thread(target=self._wait_and_start, name="robot_description", daemon=True).start()
+
+    def shutdown(self) -> None:
+        self._gone.set()
+        with self._lock:
+            if self._services is not None:
+                self._services.shutdown()
+            if self._robot is not None:
+                with self._sim.lock:
+                    self._sim.remove_robot(self._robot)
+
+    def _wait_and_start(self) -> None:
+        """Gazebo blocks the whole world for this; here only this model waits."""
+        waited = 0.0
+        while not self._gone.wait(POLL) and not rospy.is_shutdown() and not self._try_start():
+            waited += POLL
+            if waited >= REMIND:
+                waited = 0.0
+                rospy.logwarn(
+                    "gazebo_ros_control of model '%s' still waits for the parameter '%s' (from %s up)",
+                    self._context.model.name, self._parameter(), self._namespace,
+                )  # fmt: skip
+
+    def _parameter(self) -> str:
+        return self._context.text("robotParam", "robot_description")
+
+    def _try_start(self) -> bool:
+        """Returns False while there is no robot description; a broken one is reported, once."""
+        text = find_param(self._namespace, self._parameter())
+        if not text:
+            return False
+        with self._lock:
+            if not self._gone.is_set():
+                try:
+                    self._start(str(text))
+                except ControlError as error:
+                    rospy.logfatal(
+                        "gazebo_ros_control of model '%s' can't start: %s", self._context.model.name, error
+                    )
+        return True
+
+    def _start(self, text: str) -> None:
+        limits = rospy.get_param(rospy.names.ns_join(self._namespace, "joint_limits"), {})
+        description = read_description(text).limited_by(limits)
+        for warning in description.warnings:
+            rospy.logwarn("gazebo_ros_control: %s", warning)
+        hardware = RobotHardware(description)
+        manager = ControllerManager(hardware)
+        with self._sim.lock:
+            self._robot = Robot(self._context.model, hardware, manager)
+            self._sim.add_robot(self._robot)
+        self._services = ControllerServices(self._sim, manager, self._namespace)
+        rospy.loginfo("Loaded gazebo_ros_control for model '%s'.", self._context.model.name)
+
+
+def find_param(namespace: str, name: str) -> object:
+    """Returns parameter `name`, looked for in `namespace` and upwards; None if there is none."""
+    if name.startswith("/"):
+        return rospy.get_param(name, None)
+    while True:
+        value = rospy.get_param(rospy.names.ns_join(namespace, name), None)
+        if value or namespace in ("", "/"):
+            return value
+        namespace = namespace.rstrip("/").rpartition("/")[0] or "/"

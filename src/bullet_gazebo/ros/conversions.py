@@ -1,0 +1,47 @@
+"""Between our records and ROS messages."""
+
+import genpy
+from control_msgs.msg import JointControllerState
+from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
+from geometry_msgs.msg import Pose as PoseMsg
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from bullet_gazebo.control.samples import JointControllerSample, JointStateSample
+from bullet_gazebo.physics import pose as poses
+from bullet_gazebo.physics.pose import Pose
+
+NANOSECONDS = 1_000_000_000
+
+
+def to_time(now: int) -> genpy.Time:
+    """Returns the ROS time of `now` [ns]."""
+    return genpy.Time(now // NANOSECONDS, now % NANOSECONDS)
+
+
+def to_pose_msg(pose: Pose) -> PoseMsg:
+    return PoseMsg(Point(*pose.position), Quaternion(*pose.orientation))
+
+
+def to_twist_msg(twist: tuple[poses.Vector, poses.Vector]) -> Twist:
+    return Twist(Vector3(*twist[0]), Vector3(*twist[1]))
+
+
+def from_pose_msg(msg: PoseMsg) -> Pose:
+    """Returns the pose with a unit quaternion; an all-zero one means no rotation."""
+    p, q = msg.position, msg.orientation
+    return Pose((p.x, p.y, p.z), poses.normalized((q.x, q.y, q.z, q.w)))
+
+
+def to_joint_state(sample: JointStateSample) -> JointState:
+    return JointState(
+        header=Header(stamp=to_time(sample.stamp)),
+        name=sample.names,
+        position=sample.positions,
+        velocity=sample.velocities,
+        effort=sample.efforts,
+    )
+
+
+def to_joint_controller_state(sample: JointControllerSample) -> JointControllerState:
+    return JointControllerState(Header(stamp=to_time(sample.stamp)), *sample[1:])

@@ -1,0 +1,78 @@
+"""Executable `unspawner` of package controller_manager: keeps controllers stopped while it runs.
+
+It stops the named controllers, again whenever somebody starts them, and starts those that it has
+stopped when it is shut down (ros_control.md section 2).
+"""
+
+import argparse
+import threading
+from collections.abc import Sequence
+
+import rospy
+
+from bullet_gazebo.ros.manager_client import BEST_EFFORT, CallFailed, ManagerClient
+
+PERIOD = 3.0  # [s], wall-clock: a simulated time that jumps back must not silence it
+PATIENCE = 30.0  # [s] for the services to come up
+ANSWER = 10.0  # [s] for one call
+FAREWELL = 3.0  # [s] for the call during shutdown; the simulator may have gone before us
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the unspawner until its node is shut down.
+
+    Returns:
+        The exit code: 0, or 1 if no controller manager was found.
+    """
+    parser = argparse.ArgumentParser(prog="unspawner", description="Keep controllers stopped")
+    parser.add_argument("controllers", nargs="+", help="their names")
+    controllers = parser.parse_args(rospy.myargv(argv)[1:]).controllers
+    rospy.init_node("unspawner", anonymous=True, argv=None if argv is None else list(argv))
+    manager = ManagerClient()
+    try:
+        missing = manager.wait(("switch_controller", "list_controllers"), PATIENCE)
+    except rospy.ROSInterruptException:
+        return 0
+    if missing:
+        rospy.logwarn("Unspawner couldn't find the controller manager: no service %s", missing)
+        return 1
+    _inhibit(manager, controllers)
+    return 0
+
+
+def _inhibit(manager: ManagerClient, controllers: Sequence[str]) -> None:
+    stopped: list[str] = []
+    leaving = threading.Event()
+
+    def leave() -> None:
+        leaving.set()
+        _release(manager, stopped)
+
+    rospy.on_shutdown(leave)
+    while not leaving.is_set():
+        for name in _stop_running(manager, controllers):
+            if name not in stopped:
+                stopped.append(name)
+        leaving.wait(PERIOD)
+
+
+def _stop_running(manager: ManagerClient, controllers: Sequence[str]) -> list[str]:
+    """Returns the names of those that ran and were stopped."""
+    try:
+        running = [name for name in manager.running(ANSWER) if name in controllers]
+        if running and manager.switch([], running, BEST_EFFORT, ANSWER):
+            rospy.loginfo("Stopped controllers: %s", ", ".join(running))
+            return running
+    except CallFailed as fault:
+        rospy.logwarn_throttle(30, f"Unspawner: {fault}")
+    return []
+
+
+def _release(manager: ManagerClient, stopped: Sequence[str]) -> None:
+    if not stopped:
+        return
+    try:
+        manager.switch(stopped, [], BEST_EFFORT, FAREWELL)
+        rospy.loginfo("Started controllers: %s", ", ".join(stopped))
+    except CallFailed as fault:
+        rospy.loginfo("Unspawner: left as they are: %s", fault)

@@ -1,0 +1,150 @@
+"""The clockwork: ties physics and control together, tick by tick (docs/architecture.md, "One tick")."""
+
+import threading
+from collections.abc import Callable, Mapping
+
+from bullet_gazebo.pacing import Pacer
+from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.world import World
+from bullet_gazebo.robot import Robot
+from bullet_gazebo.turns import TurnLock
+
+NANOSECONDS = 1_000_000_000
+IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()
+
+
+class StepRefused(RuntimeError):
+    """A step was asked of a world whose time runs by itself."""
+
+
+class Simulator:
+    """Time, the world and its robots, under one lock that everybody who touches them holds.
+
+    Modes: time runs by itself in run(), paced to `max_update_rate` ticks a second of wall time
+    (0: as fast as possible); or in lock-step, when only advance() moves it.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        lockstep: bool = False,
+        max_update_rate: float = 1000.0,
+        relatch: bool = True,
+    ) -> None:
+        """With `relatch`, controllers begin anew when a service moves joints or resets the world."""
+        self.world = world
+        self.lock = TurnLock()
+        self.lockstep = lockstep
+        self.max_update_rate = max_update_rate
+        self.relatch = relatch
+        self.now = 0  # [ns] of simulated time
+        self.robots: list[Robot] = []
+        self.listeners: list[Callable[[int], None]] = []  # called with `now` before each physics step
+        self._period = round(world.time_step * NANOSECONDS)
+        self._paused = False
+        self._flowing = threading.Event()  # set while time runs by itself
+        self._stopping = threading.Event()
+        self._update_flow()
+
+    @property
+    def sim_time(self) -> float:
+        """Simulated time [s]."""
+        return self.now / NANOSECONDS
+
+    @property
+    def paused(self) -> bool:
+        return self._paused
+
+    def pause(self) -> None:
+        """Stops time; no step is in progress once this returns."""
+        with self.lock:
+            self._paused = True
+            self._update_flow()
+
+    def unpause(self) -> None:
+        """Lets time run, unless it runs in lock-step."""
+        with self.lock:
+            self._paused = False
+            self._update_flow()
+
+    def run(self) -> None:
+        """Lets time pass until stop(); for a thread of its own."""
+        pacer = Pacer()
+        while not self._stopping.is_set():
+            if not self._flowing.is_set():
+                self._flowing.wait(IDLE_POLL)
+                pacer.restart()
+                continue
+            with self.lock:
+                if self._flowing.is_set():
+                    self._tick()
+            pacer.wait(1.0 / self.max_update_rate if self.max_update_rate > 0.0 else 0.0)
+
+    def stop(self) -> None:
+        """Makes run() return after the tick in progress."""
+        self._stopping.set()
+
+    def advance(self, ticks: int) -> None:
+        """Moves time by `ticks` physics steps; the caller holds the lock.
+
+        Errors: StepRefused if time runs by itself; ValueError for less than one tick.
+        """
+        if not self.lockstep:
+            raise StepRefused("the world runs in real time; start it with lockstep:=true to step it")
+        if ticks < 1:
+            raise ValueError(f"ticks is {ticks}: at least 1 is needed")
+        for _ in range(ticks):
+            self._tick()
+        for robot in self.robots:
+            robot.read()
+
+    def add_robot(self, robot: Robot) -> None:
+        """Puts a robot under control; the caller holds the lock."""
+        self.robots.append(robot)
+
+    def remove_robot(self, robot: Robot) -> None:
+        """Ends control of a robot; the caller holds the lock."""
+        self.robots.remove(robot)
+
+    def set_joint_positions(self, model: Model, positions: Mapping[str, float]) -> None:
+        """Puts joints of `model` at `positions` [rad, m], at rest; the caller holds the lock."""
+        model.set_joint_positions(positions)
+        for robot in self.robots:
+            if robot.model is model:
+                robot.joints_moved(self.now, self.relatch)
+
+    def reset_world(self) -> None:
+        """Returns models to their initial poses, at rest; time and joint positions stay."""
+        with self.lock:
+            self._reset(joints=False)
+
+    def reset_simulation(self) -> None:
+        """As reset_world, and time and joint positions return to zero."""
+        with self.lock:
+            self.now = 0
+            self._reset(joints=True)
+
+    def _reset(self, joints: bool) -> None:
+        self.world.reset(joints)
+        for robot in self.robots:
+            robot.joints_moved(self.now, self.relatch)
+
+    def _update_flow(self) -> None:
+        if self._paused or self.lockstep:
+            self._flowing.clear()
+        else:
+            self._flowing.set()
+
+    def _tick(self) -> None:
+        """One physics step, in Gazebo's order: the state before the step carries the time after it."""
+        self.now = now = self.now + self._period
+        dt = self.world.time_step
+        for robot in self.robots:
+            robot.read()
+            robot.manager.update(now, dt)
+        for listener in self.listeners:
+            listener(now)
+        for robot in self.robots:
+            robot.write()
+        self.world.step()

@@ -1,0 +1,40 @@
+"""A lock that serves its waiters in the order in which they came."""
+
+import threading
+from collections import deque
+from types import TracebackType
+
+
+class TurnLock:
+    """First come, first served.
+
+    threading.Lock lets a thread that releases and re-acquires it in a loop, as the simulation does, keep
+    all others out. Here every waiter gets its turn after at most one tick. Not re-entrant.
+    """
+
+    def __init__(self) -> None:
+        self._guard = threading.Lock()
+        self._waiting: deque[threading.Lock] = deque()
+        self._held = False
+
+    def __enter__(self) -> None:
+        with self._guard:
+            if not self._held:
+                self._held = True
+                return
+            turn = threading.Lock()
+            turn.acquire()
+            self._waiting.append(turn)
+        turn.acquire()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        with self._guard:
+            if self._waiting:
+                self._waiting.popleft().release()  # the lock stays held: it is handed over
+            else:
+                self._held = False

@@ -1,0 +1,1 @@
+"""Learners: they know networks and episodes, neither ROS nor an environment."""

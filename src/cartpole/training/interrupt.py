@@ -1,0 +1,41 @@
+"""Ctrl-C and SIGTERM: at once while things start, at the next step while training."""
+
+import signal
+from types import FrameType
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Interrupt:
+    """Takes over both signals from `install()` on, until the process ends.
+
+    Before `defer()` a signal raises KeyboardInterrupt, so any wait ends at once. After it, a
+    signal only makes `requested` true: the loop ends at its next step, and saving and
+    cleaning up run to their end however often Ctrl-C is pressed.
+    """
+
+    def __init__(self) -> None:
+        self.signal: int | None = None
+        self._deferred = False
+
+    def install(self) -> "Interrupt":
+        for number in _SIGNALS:
+            signal.signal(number, self._handle)
+        return self
+
+    def defer(self) -> None:
+        """From now on signals only set `requested`."""
+        self._deferred = True
+
+    def requested(self) -> bool:
+        return self.signal is not None
+
+    @property
+    def exit_code(self) -> int:
+        """The shell's convention: 128 + the signal's number, 130 for Ctrl-C; 0 without one."""
+        return 0 if self.signal is None else 128 + self.signal
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        self.signal = number
+        if not self._deferred:
+            raise KeyboardInterrupt

@@ -1,0 +1,62 @@
+"""The command pg_train.py: errors in one line, exit codes."""
+
+import contextlib
+import sys
+from pathlib import Path
+
+from cartpole.envs import ros_node
+from cartpole.errors import CartpoleError
+from cartpole.training import run_folder
+from cartpole.training.interrupt import Interrupt
+from cartpole.training.pg_settings import Settings, settings
+
+NODE = "pg_train"
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Trains as the arguments say; returns the process's exit code."""
+    argv = sys.argv[1:] if argv is None else argv
+    interrupt = Interrupt().install()
+    try:
+        flags = ros_node.plain_arguments(argv)
+        settings(flags, {})  # wrong flags and --help need no master
+        name = ros_node.full_name(argv, NODE)
+        return run(settings(flags, ros_node.private_parameters(name)), name, argv, interrupt)
+    except CartpoleError as error:
+        print(f"{NODE}: {error}", file=sys.stderr)
+        return interrupt.exit_code or 1
+    except KeyboardInterrupt:
+        print(f"{NODE}: interrupted before the training began", file=sys.stderr)
+        return interrupt.exit_code or 130
+
+
+def run(chosen: Settings, name: str, argv: list[str], interrupt: Interrupt) -> int:
+    """Brings up what is needed, trains, and ends what it brought up.
+
+    Args:
+        name: this node's full name.
+        argv: the process's arguments, with roslaunch's remappings.
+
+    Raises:
+        CartpoleError: if something fails that the user can mend; what was learned is saved.
+    """
+    # Slow to import, and --help needs none of it.
+    from cartpole.envs.ros_session import RosSession
+    from cartpole.training.pg_run import Training, say
+
+    folder = run_folder.create(chosen.run_dir, "cartpole", "pg", chosen.seed)
+    session = RosSession(name, argv, chosen.realtime, chosen.gui, chosen.seed)
+    try:
+        plant = session.start(say)
+        interrupt.defer()
+        Training(chosen, folder, plant, interrupt).run()
+    finally:
+        interrupt.defer()
+        session.close()
+        _remove_if_empty(folder)
+    return interrupt.exit_code
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        folder.rmdir()

@@ -1,0 +1,116 @@
+"""What one training run can be told: flags, and the same as rosparams."""
+
+import argparse
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+from cartpole.errors import CartpoleError
+
+COMMAND = "pg_train.py"
+DESCRIPTION = """\
+Trains the cart-pole by policy gradient over ROS, in lock-step with the simulator.
+
+Starts what isn't running (master, simulator, robot, controllers) and stops exactly that.
+Every flag is a private rosparam too (~episodes, ~seed, ~run_dir, ~save_every, ~realtime,
+~gui); the command line wins. Ctrl-C saves what was learned and exits with 130 (SIGTERM: 143).
+Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a user can choose for one training."""
+
+    episodes: int = 600
+    seed: int = 0
+    run_dir: str | None = None
+    save_every: int = 100
+    realtime: bool = False
+    gui: bool = False
+
+
+def parser() -> argparse.ArgumentParser:
+    """The flags, with their defaults."""
+    result = argparse.ArgumentParser(
+        COMMAND, description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add, default = result.add_argument, Settings()
+    add("--episodes", type=_at_least(1), default=default.episodes, metavar="N", help="default 600")
+    add(
+        "--seed",
+        type=_at_least(0),
+        default=default.seed,
+        metavar="N",
+        help="of weights, actions, evaluation and simulator (default 0)",
+    )
+    add(
+        "--run-dir",
+        metavar="DIR",
+        help="a new or empty folder for all results (default runs/cartpole__pg__SEED__TIME)",
+    )
+    add(
+        "--save-every",
+        type=_at_least(0),
+        default=default.save_every,
+        metavar="N",
+        help="episodes between saves of the networks; 0: at the end only (default 100)",
+    )
+    add(
+        "--realtime",
+        action="store_true",
+        help="let the world run by itself, as the existing script does",
+    )
+    window = result.add_mutually_exclusive_group()
+    window.add_argument("--gui", action="store_true", help="show the simulator's window")
+    window.add_argument(
+        "--headless", dest="gui", action="store_false", help="no window (the default)"
+    )
+    return result
+
+
+def _at_least(minimum: int) -> Any:
+    def number(text: str) -> int:
+        value = int(text)
+        if not minimum <= value < 2**31:
+            raise argparse.ArgumentTypeError(f"must be at least {minimum} and below 2^31: {text}")
+        return value
+
+    return number
+
+
+def as_flags(parameters: dict[str, Any]) -> list[str]:
+    """Private rosparams as flags, so that both go through the same checks.
+
+    Raises:
+        CartpoleError: if there is no such parameter, or a switch isn't true or false.
+    """
+    known = list(Settings.__dataclass_fields__)
+    flags: list[str] = []
+    for name, value in parameters.items():
+        if name not in known:
+            near = get_close_matches(name, known, 1) or known
+            raise CartpoleError(f"unknown parameter ~{name}; did you mean ~{', ~'.join(near)}?")
+        flags += _flag(name, value)
+    return flags
+
+
+def _flag(name: str, value: Any) -> list[str]:
+    flag = f"--{name.replace('_', '-')}"
+    if name in ("realtime", "gui"):
+        if not isinstance(value, bool):
+            raise CartpoleError(f"parameter ~{name} must be true or false, not {value!r}")
+        return [flag] if value else []
+    return [] if value == "" else [f"{flag}={value}"]
+
+
+def settings(flags: list[str], parameters: dict[str, Any]) -> Settings:
+    """Defaults, overridden by rosparams, overridden by flags.
+
+    Raises:
+        SystemExit: with code 2 and a usage line, if a flag is wrong; with 0 after --help.
+        CartpoleError: if a rosparam is unknown.
+    """
+    known = parser()
+    from_parameters = known.parse_args(as_flags(parameters))
+    return Settings(**vars(known.parse_args(flags, namespace=from_parameters)))

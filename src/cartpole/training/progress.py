@@ -1,0 +1,64 @@
+"""What the user sees while training: a bar on a terminal, else a line every 20 episodes."""
+
+import sys
+from typing import TextIO
+
+from tqdm import tqdm
+
+from cartpole.training.loop import EpisodeRecord
+
+LINE_EVERY = 20  # [episodes]
+
+
+class Bar:
+    """A tqdm bar with the last return, the last length and the steps per second."""
+
+    def __init__(self, episodes: int, stream: TextIO) -> None:
+        self._bar = tqdm(total=episodes, unit="episode", file=stream, dynamic_ncols=True)
+
+    def episode_done(self, record: EpisodeRecord) -> None:
+        self._bar.set_postfix_str(
+            f"return {record.total_reward:.0f}, length {record.length}, "
+            f"{record.steps_per_second:.0f} steps/s",
+            refresh=False,
+        )
+        self._bar.update()
+
+    def close(self) -> None:
+        self._bar.close()
+
+
+class Lines:
+    """Means over the last 20 episodes, one line for each 20."""
+
+    def __init__(self, episodes: int, stream: TextIO) -> None:
+        self._episodes = episodes
+        self._stream = stream
+        self._recent: list[EpisodeRecord] = []
+
+    def episode_done(self, record: EpisodeRecord) -> None:
+        self._recent.append(record)
+        if (record.index + 1) % LINE_EVERY == 0:
+            self._print()
+            self._recent.clear()
+
+    def _print(self) -> None:
+        count = len(self._recent)
+        length = sum(record.length for record in self._recent) / count
+        total = sum(record.total_reward for record in self._recent) / count
+        last = self._recent[-1]
+        print(
+            f"episode {last.index + 1:5d}/{self._episodes}  mean length {length:7.1f}  "
+            f"mean return {total:8.1f}  {last.steps_per_second:6.0f} steps/s",
+            file=self._stream,
+            flush=True,
+        )
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+def progress(episodes: int, stream: TextIO | None = None) -> Bar | Lines:
+    """The form that suits where the output goes (standard error unless told otherwise)."""
+    stream = stream or sys.stderr
+    return Bar(episodes, stream) if stream.isatty() else Lines(episodes, stream)

@@ -1,0 +1,298 @@
+"""Load, start, stop and unload controllers through a controller manager's services.
+
+`ns` is everywhere the namespace of the controller manager: its services are
+``<ns>/controller_manager/…``; None is the root. `strictness` is BEST_EFFORT (1: what can't be done
+is left out) or STRICT (2: all or nothing). Every function takes `service_timeout` as keyword: the
+bound for a service to come up and again for its answer [s]. A failure is logged, never raised.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from controller_manager_msgs.srv import (
+    ListControllers,
+    LoadController,
+    SwitchController,
+    UnloadController,
+)
+
+from ros_utils import _log, _services
+
+
+def load_controller_srv(
+    controller_name: str,
+    ns: str | None = None,
+    max_retries: int = 5,
+    *,
+    service_timeout: float = _services.TIMEOUT,
+) -> bool:
+    """Load a controller, with up to `max_retries` attempts.
+
+    Returns:
+        True once the manager has loaded it. False if it refuses (already loaded, no parameters,
+        unknown type or joint) or doesn't answer.
+    """
+    return _until_ok(
+        "load_controller",
+        LoadController,
+        (controller_name,),
+        controller_name,
+        ns,
+        max_retries,
+        service_timeout,
+    )
+
+
+def load_controller_list_srv(
+    controller_list: Sequence[str],
+    ns: str | None = None,
+    max_retries: int = 5,
+    *,
+    service_timeout: float = _services.TIMEOUT,
+) -> bool:
+    """Load several controllers; all are tried.
+
+    Returns:
+        True if every one was loaded.
+    """
+    return _all(
+        load_controller_srv(c, ns, max_retries, service_timeout=service_timeout)
+        for c in controller_list
+    )
+
+
+def unload_controller_srv(
+    controller_name: str,
+    ns: str | None = None,
+    max_retries: int = 5,
+    *,
+    service_timeout: float = _services.TIMEOUT,
+) -> bool:
+    """Unload a controller that doesn't run, with up to `max_retries` attempts.
+
+    Returns:
+        True once it is unloaded. False if it runs, is unknown, or the manager doesn't answer.
+    """
+    return _until_ok(
+        "unload_controller",
+        UnloadController,
+        (controller_name,),
+        controller_name,
+        ns,
+        max_retries,
+        service_timeout,
+    )
+
+
+def unload_controller_list_srv(
+    controller_list: Sequence[str],
+    ns: str | None = None,
+    max_retries: int = 5,
+    *,
+    service_timeout: float = _services.TIMEOUT,
+) -> bool:
+    """Unload several controllers; all are tried.
+
+    Returns:
+        True if every one was unloaded.
+    """
+    return _all(
+        unload_controller_srv(c, ns, max_retries, service_timeout=service_timeout)
+        for c in controller_list
+    )
+
+
+def switch_controllers_srv(
+    start_controllers: Sequence[str],
+    stop_controllers: Sequence[str],
+    ns: str | None = None,
+    strictness: int = 1,
+    start_asap: bool = False,
+    timeout: float = 3.0,
+    max_retries: int = 5,
+    *,
+    service_timeout: float = _services.TIMEOUT,
+) -> bool:
+    """Start and stop controllers in one step, with up to `max_retries` attempts.
+
+    Args:
+        start_controllers: names to start.
+        stop_controllers: names to stop.
+        ns: see the module.
+        strictness: see the module.
+        start_asap: start each as soon as its hardware is ready; makes no difference in simulation.
+        timeout: how long the manager itself may take for the switch [s]; 0 is for ever.
+        max_retries: attempts.
+        service_timeout: see the module.
+
+    Returns:
+        True if the manager has switched. With BEST_EFFORT this doesn't say that each one runs.
+    """
+    request = (list(start_controllers), list(stop_controllers), strictness, start_asap, timeout)
+    what = f"start {_names(start_controllers)}, stop {_names(stop_controllers)}"
+    patience = max(service_timeout, timeout + 2.0)  # the manager gives up after timeout + 1 s
+    return _until_ok(
+        "switch_controller", SwitchController, request, what, ns, max_retries, patience
+    )
+
+
+def start_controllers_srv(
+    start_controllers: Sequence[str],
+    ns: str | None = None,
+    strictness: int = 1,
+    start_asap: bool = False,
+    timeout: float = 3.0,
+    *,
+    service_timeout: float = _services.TIMEOUT,
+) -> bool:
+    """Start loaded controllers. See `switch_controllers_srv`."""
+    return switch_controllers_srv(
+        start_controllers, [], ns, strictness, start_asap, timeout, service_timeout=service_timeout
+    )
+
+
+def stop_controllers_srv(
+    stop_controllers: Sequence[str],
+    ns: str | None = None,
+    strictness: int = 1,
+    start_asap: bool = False,
+    timeout: float = 3.0,
+    *,
+    service_timeout: float = _services.TIMEOUT,
+) -> bool:
+    """Stop running controllers. See `switch_controllers_srv`."""
+    return switch_controllers_srv(
+        [], stop_controllers, ns, strictness, start_asap, timeout, service_timeout=service_timeout
+    )
+
+
+def reset_controllers_srv(
+    reset_controllers: Sequence[str],
+    max_retries: int = 10,
+    ns: str | None = None,
+    strictness: int = 1,
+    start_asap: bool = False,
+    timeout: float = 3.0,
+    *,
+    service_timeout: float = _services.TIMEOUT,
+) -> bool:
+    """Stop controllers, with up to `max_retries` attempts, and start them again: set-points and PID
+    state begin anew.
+
+    `max_retries` is the second argument here, not the last.
+
+    Returns:
+        True if both steps succeeded.
+    """
+    stopped = switch_controllers_srv(
+        [],
+        reset_controllers,
+        ns,
+        strictness,
+        start_asap,
+        timeout,
+        max_retries,
+        service_timeout=service_timeout,
+    )
+    return stopped and start_controllers_srv(
+        reset_controllers, ns, strictness, start_asap, timeout, service_timeout=service_timeout
+    )
+
+
+def spawn_controllers_srv(
+    spawn_controllers: Sequence[str],
+    ns: str | None = None,
+    strictness: int = 1,
+    start_asap: bool = False,
+    timeout: float = 3.0,
+    *,
+    service_timeout: float = _services.TIMEOUT,
+) -> bool:
+    """Load the controllers that aren't loaded yet, then start all that are.
+
+    Returns:
+        True if every one is loaded and the manager has started them. One that can't be loaded
+        doesn't keep the others from starting.
+    """
+    known = _states(ns, service_timeout)
+    if known is None:
+        return False
+    missing = [name for name in spawn_controllers if name not in known]
+    failed = [
+        name
+        for name in missing
+        if not load_controller_srv(name, ns, service_timeout=service_timeout)
+    ]
+    to_start = [
+        name for name in spawn_controllers if name not in failed and known.get(name) != "running"
+    ]
+    started = not to_start or start_controllers_srv(
+        to_start, ns, strictness, start_asap, timeout, service_timeout=service_timeout
+    )
+    return started and not failed
+
+
+def kill_controllers_srv(
+    kill_controllers: Sequence[str],
+    ns: str | None = None,
+    strictness: int = 1,
+    start_asap: bool = False,
+    timeout: float = 3.0,
+    *,
+    service_timeout: float = _services.TIMEOUT,
+) -> bool:
+    """Stop controllers and, if that succeeded, unload them.
+
+    Returns:
+        True if all were stopped and unloaded.
+    """
+    return stop_controllers_srv(
+        kill_controllers, ns, strictness, start_asap, timeout, service_timeout=service_timeout
+    ) and unload_controller_list_srv(kill_controllers, ns, service_timeout=service_timeout)
+
+
+def _names(controllers: Sequence[str]) -> str:
+    return ", ".join(controllers) or "none"
+
+
+def _all(results: Iterable[bool]) -> bool:
+    return all(list(results))  # a list first: each one is tried, whatever became of those before
+
+
+def _service(ns: str | None, service: str) -> str:
+    return f"{(ns or '').rstrip('/')}/controller_manager/{service}"
+
+
+def _states(ns: str | None, timeout: float) -> dict[str, str] | None:
+    """Name and state of the loaded controllers, or None if the manager doesn't tell."""
+    try:
+        answer = _services.call(_service(ns, "list_controllers"), ListControllers, timeout=timeout)
+    except _services.ServiceError as fault:
+        _log.error(str(fault))
+        return None
+    return {controller.name: controller.state for controller in answer.controller}
+
+
+def _until_ok(
+    service: str,
+    kind: Any,
+    request: tuple[Any, ...],
+    what: str,
+    ns: str | None,
+    max_retries: int,
+    timeout: float,
+) -> bool:
+    """Call a service until its answer is ok, at most `max_retries` times; a failed call ends it."""
+    try:
+        for _ in range(max_retries):
+            if _services.call(_service(ns, service), kind, *request, timeout=timeout).ok:
+                return True
+    except _services.ServiceError as fault:
+        _log.error(f"{service} ({what}): {fault}")
+        return False
+    _log.error(
+        f"{service} ({what}): refused {max_retries} times; the controller manager's log says why"
+    )
+    return False

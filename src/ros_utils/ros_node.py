@@ -1,0 +1,217 @@
+"""Start and end nodes and the master."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+
+import rosgraph
+import roslib.packages
+import rospkg
+import rospy
+
+from ros_utils import _log, _master, _packages, _processes, _waiting
+from ros_utils._waiting import Outcome
+from ros_utils.ros_launch import check_master_possible
+
+
+def ros_node_from_pkg(
+    pkg_name: str,
+    node_name: str,
+    launch_master: bool = False,
+    launch_master_term: bool = True,
+    launch_new_term: bool = True,
+    name: str | None = None,
+    ns: str = "/",
+    output: str = "log",
+    args: str | Sequence[str] | None = None,
+    *,
+    timeout: float = 30.0,
+    wait: bool = True,
+) -> bool:
+    """Start a node, as rosrun does, and wait until it is registered at the master.
+
+    Args:
+        pkg_name: ROS package.
+        node_name: its executable.
+        launch_master: start a master first if none runs.
+        launch_master_term: the master in an xterm of its own, if there is a display and xterm.
+        launch_new_term: the node in an xterm, if there is a display and xterm; otherwise see
+            `output`.
+        name: the node's name; None for the one it gives itself.
+        ns: namespace.
+        output: "log" for a log file, "screen" for this terminal.
+        args: arguments for the node: one string, split as a shell would, or a list.
+        timeout: bound of the wait for the registration [s].
+        wait: False for a program that is no ROS node, or to go on at once.
+
+    Returns:
+        True once the node is registered, or if it has done its work and ended with exit code 0.
+        False, with an error in the log, if the package or executable is missing, no master answers,
+        or the node ends with another exit code or doesn't register in time (it is ended then).
+    """
+    label = f"node {pkg_name}/{node_name}"
+    try:
+        command = [_executable(pkg_name, node_name), *_arguments(args), *_remappings(name, ns)]
+        if launch_master and not _master.is_up() and not _start_master(launch_master_term, timeout):
+            return False
+        _master.require()
+        before = set(_master.node_uris().values())
+        handle = _processes.start(
+            command, "node", label, window=launch_new_term, screen=output == "screen"
+        )
+    except (_packages.NotFound, _processes.CannotStart, _master.MasterDown, ValueError) as fault:
+        _log.error(f"{label}: {fault}")
+        return False
+    if not wait:
+        return True
+    full_name = rosgraph.names.ns_join(_global(ns), name) if name else None
+    outcome = _waiting.until(lambda: _is_registered(handle, full_name, before), handle, timeout)
+    return _report(handle, outcome, timeout)
+
+
+def ros_kill_node(node_name: str) -> bool:
+    """Ask a node to shut itself down, as rosnode kill does. The caller's own node is refused.
+
+    Returns:
+        True if no such node is registered afterwards.
+    """
+    full_name = rospy.resolve_name(node_name)
+    address = _master.node_uri(full_name)
+    if address is None:
+        _log.warn(f"ros_kill_node: no node {full_name} at {_master.uri()}")
+        return True
+    if _master.is_own(address):
+        _log.error(f"ros_kill_node: {full_name} is this process itself: use rospy.signal_shutdown")
+        return False
+    return _shut_down({full_name: address})
+
+
+def ros_kill_all_nodes() -> bool:
+    """Ask every node of this master to shut itself down, except the caller's own and rosout.
+
+    Returns:
+        True if none is left.
+    """
+    return _shut_down(_master.node_uris())
+
+
+def ros_kill_master() -> bool:
+    """Shut down all nodes of this master except the caller's own, and end the master if this
+    toolkit started it.
+
+    A master that somebody else started goes on, with a warning.
+
+    Returns:
+        True if no master runs afterwards.
+    """
+    if not _master.is_up():
+        return True
+    ros_kill_all_processes()
+    if not _master.is_up():
+        return True
+    _log.warn(f"the master at {_master.uri()} goes on: it wasn't started here")
+    return False
+
+
+def ros_kill_all_processes() -> bool:
+    """End all that this toolkit has started under this master, by whichever process, and shut down
+    the other nodes.
+
+    Nodes that somebody else started are only asked to shut down, as rosnode kill does; the caller's
+    own node and a master that somebody else started go on. Other masters and their nodes aren't
+    touched. Without a master it returns at once.
+
+    Returns:
+        True if nothing of it is left.
+    """
+    nodes = _master.node_uris()  # asked first: our master may go with the processes
+    gone = _processes.end(_processes.started())
+    return _shut_down(nodes) and gone
+
+
+def _shut_down(nodes: dict[str, str]) -> bool:
+    left = _master.shut_down_nodes(nodes)
+    if left:
+        _log.warn(
+            f"still registered at {_master.uri()}: {', '.join(left)}"
+            " (rosnode cleanup removes dead ones)"
+        )
+    return not left
+
+
+def _executable(package: str, name: str) -> str:
+    """The path of a package's executable, as rosrun finds it."""
+    _packages.folder(package)
+    try:
+        found = roslib.packages.find_node(package, name, rospack=rospkg.RosPack())
+    except rospkg.ResourceNotFound as fault:
+        raise _packages.NotFound(f"package '{fault}' not found") from fault
+    if not found:
+        raise _packages.NotFound(
+            f"package '{package}' has no executable '{name}': is its workspace built and sourced?"
+        )
+    return str(found[0])
+
+
+def _arguments(args: str | Sequence[str] | None) -> list[str]:
+    """The node's own arguments as a list.
+
+    Raises:
+        ValueError: a quote isn't closed.
+    """
+    try:
+        return shlex.split(args) if isinstance(args, str) else [str(arg) for arg in args or []]
+    except ValueError as fault:
+        raise ValueError(f"args {args!r}: {fault}") from fault
+
+
+def _global(ns: str | None) -> str:
+    """A namespace with exactly one slash in front and none behind."""
+    return "/" + "/".join(part for part in (ns or "/").split("/") if part)
+
+
+def _remappings(name: str | None, ns: str | None) -> list[str]:
+    if name is not None and not rosgraph.names.is_legal_base_name(name):
+        raise ValueError(
+            f"name {name!r}: a node's name has letters, digits and underscores, and no slash"
+        )
+    return [*([f"__name:={name}"] if name else []), f"__ns:={_global(ns)}"]
+
+
+def _start_master(window: bool, timeout: float) -> bool:
+    """Start a master at ROS_MASTER_URI."""
+    check_master_possible()
+    port = str(_master.host_and_port()[1])
+    handle = _processes.start(["roscore", "-p", port], "master", "roscore", window=window)
+    outcome = _waiting.until(
+        lambda: _master.is_up() and "/rosout" in _master.node_names(), handle, timeout
+    )
+    if outcome is Outcome.READY:
+        return True
+    _log.error(f"roscore: not up after {timeout:g} s: {handle.last_lines()}{handle.where()}")
+    _processes.end([handle.entry])
+    return False
+
+
+def _is_registered(handle: _processes.Handle, name: str | None, before: set[str]) -> bool:
+    """True if a node of this process is registered; a node of the same name from before doesn't
+    count."""
+    addresses = [_master.node_uri(name)] if name else list(_master.node_uris().values())
+    new = [address for address in addresses if address and address not in before]
+    return any(handle.owns(_master.node_pid(address)) for address in new)
+
+
+def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> bool:
+    label = handle.entry.label
+    if outcome is Outcome.LATE:
+        _log.error(
+            f"{label}: not registered at {_master.uri()} after {timeout:g} s; ended it:"
+            f" {handle.last_lines()}{handle.where()}. For a program that is no node: wait=False"
+        )
+        _processes.end([handle.entry])
+        return False
+    code = handle.exit_code() if outcome is Outcome.ENDED else 0
+    if code:
+        _log.error(f"{label}: ended with exit code {code}: {handle.last_lines()}{handle.where()}")
+    return not code

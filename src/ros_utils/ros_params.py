@@ -1,0 +1,78 @@
+"""Load YAML files into the parameter server."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import rosgraph
+import rosparam
+import rospy
+import yaml
+
+from ros_utils import _log, _master, _packages
+
+
+def ros_load_yaml_from_pkg(pkg_name: str, file_name: str, ns: str = "/") -> bool:
+    """Load ``<pkg_name>/config/<file_name>`` into the parameter server.
+
+    Args:
+        pkg_name: ROS package.
+        file_name: file in its config folder.
+        ns: namespace for the parameters.
+
+    Returns:
+        True if every parameter was set. False, with an error in the log, if the package or file is
+        missing, no master answers, or the file is no YAML mapping; nothing was set then.
+    """
+    try:
+        path = _packages.file(pkg_name, "config", file_name)
+    except _packages.NotFound as fault:
+        _log.error(f"ros_load_yaml_from_pkg: {fault}")
+        return False
+    return ros_load_yaml_from_path(path, ns)
+
+
+def ros_load_yaml_from_path(file_path: str, ns: str = "/") -> bool:
+    """Load a YAML file, given by its path, into the parameter server. See
+    `ros_load_yaml_from_pkg`."""
+    try:
+        documents = _read(_packages.existing(file_path))
+        _master.require()
+        for document in documents:
+            rosparam.upload_params(rospy.resolve_name(ns or "/"), document)
+    except (_packages.NotFound, _master.MasterDown) as fault:
+        _log.error(f"ros_load_yaml: {fault}")
+        return False
+    except (ValueError, OSError, rosparam.RosParamException, rosgraph.MasterException) as fault:
+        _log.error(f"{file_path}: {fault}")
+        return False
+    return True
+
+
+def _read(path: str) -> list[dict[str, Any]]:
+    """All documents of a YAML file, which may use ROS's ``deg(90)`` and ``rad(pi)``.
+
+    Raises:
+        ValueError: not YAML, or a document that is no mapping; the text gives the place.
+        OSError: the file can't be read.
+    """
+    with open(path, encoding="utf-8") as file:
+        text = file.read()
+    try:
+        documents = [document for document in yaml.safe_load_all(text) if document is not None]
+    except yaml.MarkedYAMLError as fault:
+        mark = fault.problem_mark
+        place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        raise ValueError(f"{place}{fault.problem or fault.context}") from fault
+    except yaml.YAMLError as fault:
+        raise ValueError(" ".join(str(fault).split())) from fault
+    if not documents:
+        raise ValueError("no parameters in it")
+    for document in documents:
+        if not isinstance(document, dict):
+            raise ValueError(f"expected 'name: value' lines, found {type(document).__name__}")
+        if document.pop(rosparam.NS, None) is not None:
+            _log.warn(
+                f"{path}: its {rosparam.NS} is ignored: the namespace is an argument of the call"
+            )
+    return documents

@@ -1,0 +1,117 @@
+"""Bring a robot into the simulation: description, state publisher, model and controllers in one
+call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import rosgraph
+import rospy
+
+from ros_utils import _log, _master, ros_controllers, ros_gazebo, ros_node, ros_params, ros_urdf
+
+
+def init_robot_state_pub(
+    namespace: str = "/", max_pub_freq: float | None = None, launch_new_term: bool = False
+) -> bool:
+    """Start a robot_state_publisher as node ``<namespace>/rob_st_pub``.
+
+    Args:
+        namespace: where `robot_description` and `joint_states` are.
+        max_pub_freq: bound of its publishing rate [Hz]; None for its own.
+        launch_new_term: in an xterm, if there is a display and xterm.
+
+    Returns:
+        True once it is registered at the master.
+    """
+    if max_pub_freq is not None:
+        name = rosgraph.names.ns_join(namespace or "/", "rob_st_pub/publish_frequency")
+        try:
+            _master.require()
+            rospy.set_param(name, float(max_pub_freq))
+        except (_master.MasterDown, rosgraph.MasterException, OSError, ValueError) as fault:
+            _log.error(f"parameter {name}: {fault}")
+            return False
+    package = "robot_state_publisher"
+    return ros_node.ros_node_from_pkg(
+        package, package, launch_new_term=launch_new_term, name="rob_st_pub", ns=namespace
+    )
+
+
+def spawn_model_in_gazebo(
+    pkg_name: str,
+    model_urdf_file: str,
+    controllers_file: str | None,
+    controllers_list: Sequence[str] = (),
+    model_urdf_folder: str = "/urdf",
+    ns: str = "/",
+    args_xacro: Sequence[str] | None = None,
+    max_pub_freq: float | None = None,
+    rob_st_term: bool = False,
+    gazebo_name: str = "robot1",
+    gaz_ref_frame: str = "world",
+    pos_x: float = 0.0,
+    pos_y: float = 0.0,
+    pos_z: float = 0.0,
+    ori_w: float = 0.0,
+    ori_x: float = 0.0,
+    ori_y: float = 0.0,
+    ori_z: float = 0.0,
+    *,
+    controllers_pkg: str | None = None,
+) -> bool:
+    """Load a robot's description, start its state publisher, spawn it, and load and start its
+    controllers.
+
+    Args:
+        pkg_name: ROS package of the robot.
+        model_urdf_file: URDF or xacro file in it.
+        controllers_file: YAML file of the controllers; None for a robot without.
+        controllers_list: controllers to load and start.
+        model_urdf_folder: the URDF's folder in the package.
+        ns: namespace of description, state publisher and controller manager.
+        args_xacro: xacro arguments, ``"name:=value"`` each.
+        max_pub_freq: bound of the state publisher's rate [Hz].
+        rob_st_term: the state publisher in an xterm.
+        gazebo_name: name of the new model.
+        gaz_ref_frame: model or link that the pose refers to.
+        pos_x, pos_y, pos_z: position [m].
+        ori_w, ori_x, ori_y, ori_z: orientation, a quaternion with w first here; all zeros is no
+            rotation.
+        controllers_pkg: package of `controllers_file`; None for `pkg_name`.
+
+    Returns:
+        True if every stage succeeded. The first failure ends it; earlier stages stay as they are.
+    """
+    if not ros_urdf.urdf_load_from_pkg(
+        pkg_name,
+        model_urdf_file,
+        "robot_description",
+        folder=model_urdf_folder,
+        ns=ns,
+        args_xacro=args_xacro,
+    ):
+        return False
+    if not init_robot_state_pub(ns, max_pub_freq, rob_st_term):
+        return False
+    spawned, text = ros_gazebo.gazebo_spawn_urdf_param(
+        "robot_description",
+        gazebo_name,
+        ns,
+        gaz_ref_frame,
+        pos_x,
+        pos_y,
+        pos_z,
+        ori_x,
+        ori_y,
+        ori_z,
+        ori_w,
+    )
+    if not spawned:
+        _log.error(f"spawn_model_in_gazebo: {gazebo_name}: {text}")
+        return False
+    if controllers_file is None:
+        return True
+    return ros_params.ros_load_yaml_from_pkg(
+        controllers_pkg or pkg_name, controllers_file, ns
+    ) and ros_controllers.spawn_controllers_srv(controllers_list, ns)

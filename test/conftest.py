@@ -1,0 +1,29 @@
+"""What all tests share: rostest files as test items, and the extras that a test asks for."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+from pathlib import Path
+
+import pytest
+from rostest_plugin import pytest_collect_file
+
+__all__ = ["pytest_collect_file"]
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The repository's root."""
+    return ROOT
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Install the extra packages once a selected test needs them; ws says so on stderr."""
+    wanted = [name for marker in item.iter_markers("extras") for name in marker.args]
+    if all(importlib.util.find_spec(name) for name in wanted):
+        return
+    subprocess.run([ROOT / "ws", "extras"], check=True)
+    importlib.invalidate_caches()

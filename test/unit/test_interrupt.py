@@ -1,0 +1,38 @@
+"""Ctrl-C: at once while starting, at the next step while training."""
+
+import os
+import signal
+
+import pytest
+
+from cartpole.training.interrupt import Interrupt
+
+
+@pytest.fixture
+def interrupt() -> Interrupt:
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield Interrupt().install()
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def test_while_starting_it_ends_any_wait(interrupt: Interrupt) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        os.kill(os.getpid(), signal.SIGINT)
+    assert interrupt.exit_code == 130
+
+
+def test_while_training_it_is_only_noted_however_often(interrupt: Interrupt) -> None:
+    interrupt.defer()
+    assert not interrupt.requested()
+    assert interrupt.exit_code == 0
+    for _ in range(3):
+        os.kill(os.getpid(), signal.SIGINT)
+    assert interrupt.requested()
+    assert interrupt.exit_code == 130
+
+
+def test_sigterm_has_its_own_code(interrupt: Interrupt) -> None:
+    interrupt.defer()
+    os.kill(os.getpid(), signal.SIGTERM)
+    assert interrupt.exit_code == 143

@@ -1,0 +1,189 @@
+# Sourced by ws: the steps that make the workspace ready.
+#
+# A step NAME has two functions: key_NAME prints what the step depends on, make_NAME makes it.
+
+say() { echo "ws: $*" >&2; }
+
+hash_of() { sha256sum | cut -d ' ' -f 1; }
+
+is_ready() {  # step
+    local stamp=$WS/stamp/$1
+    [[ -f $stamp && $(<"$stamp") == "$("key_$1" | hash_of)" ]]
+}
+
+make_ready() {  # step...
+    local step
+    for step in "$@"; do
+        is_ready "$step" && continue
+        hold_lock
+        is_ready "$step" || make_step "$step"  # somebody else may just have made it
+    done
+    drop_lock
+}
+
+make_step() {  # step
+    local log=$WS/log/$1.log status
+    mkdir -p -- "$WS/stamp" "$WS/log"
+    rm -f -- "$WS/stamp/$1"
+    say "${TITLE[$1]} (log: .ws/log/$1.log)"
+    # The lock stays with ws: a process that a step leaves behind must not keep it. The status is
+    # asked for afterwards, because `set -e` is off in a function that is tested with ||.
+    set +e
+    (set -e; "make_$1") >"$log" 2>&1 {LOCK}>&-
+    status=$?
+    set -e
+    if [[ $status -ne 0 ]]; then
+        say "failed (exit code $status): ${TITLE[$1]}. The last lines of $log:"
+        tail -n 15 -- "$log" | sed 's/^/    /' >&2
+        say "what to do: ${REMEDY[$1]}"
+        say "then call ws again: it goes on from here"
+        exit 1
+    fi
+    "key_$1" | hash_of >"$WS/stamp/$1"
+}
+
+LOCK=
+hold_lock() {
+    [[ -z $LOCK ]] || return 0
+    mkdir -p -- "$WS"
+    exec {LOCK}>"$WS/lock"
+    if ! flock --nonblock "$LOCK"; then
+        say "waiting for another ws that makes this workspace ready"
+        flock "$LOCK"
+    fi
+}
+
+drop_lock() {
+    [[ -z $LOCK ]] || exec {LOCK}>&-
+    LOCK=
+}
+
+declare -A TITLE=(
+    [debian]="installing Debian packages"
+    [venv]="installing Python packages into .ws/venv"
+    [test_tools]="installing the tools for test and check into .ws/venv"
+    [extras]="installing the extra Python packages (requirements/extras.txt) into .ws/venv"
+    [build]="building the catkin workspace"
+)
+NETWORK="check the network, the free disk space and that the file under requirements/ is right"
+declare -A REMEDY=(
+    [debian]="see the lines above; on other systems than Debian 12 build the package in a catkin workspace of your own"
+    [venv]=$NETWORK [test_tools]=$NETWORK [extras]=$NETWORK
+    [build]="mend what the compiler or CMake complains of; if that is nothing of yours, ./ws clean"
+)
+
+# --- Debian packages -----------------------------------------------------------------------
+
+debian_list() { sed 's/#.*//' -- "$ROOT/requirements/debian.txt" | xargs -n 1; }
+
+debian_missing() {
+    local installed
+    installed=$(dpkg-query --show --showformat '${db:Status-Status} ${Package}\n' 2>/dev/null |
+        sed -n 's/^installed //p' || true)
+    comm -23 <(debian_list | sort -u) <(sort -u <<<"$installed")
+}
+
+# The key is what is missing, which is nothing when ready: a package removed later is noticed.
+key_debian() { debian_missing; }
+
+make_debian() {
+    local missing as_root=()
+    mapfile -t missing < <(debian_missing)
+    [[ ${#missing[@]} -gt 0 ]] || return 0
+    if ! type -P apt-get >/dev/null; then
+        echo "This is no Debian: there is no apt-get. Needed: ${missing[*]}"
+        return 1
+    fi
+    if [[ $EUID -ne 0 ]]; then
+        if ! type -P sudo >/dev/null || { ! sudo -n true && ! { : </dev/tty; }; } 2>/dev/null; then
+            echo "Neither root nor able to use sudo. Ask an administrator to run:"
+            echo "    apt-get install --no-install-recommends ${missing[*]}"
+            return 1
+        fi
+        as_root=(sudo)
+    fi
+    apt() {
+        "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=600 "$@"
+    }
+    # The lists of a fresh machine are empty, those of an old one name files that are gone.
+    apt install --yes --no-install-recommends "${missing[@]}" && return 0
+    apt update
+    apt install --yes --no-install-recommends "${missing[@]}"
+}
+
+# --- Python packages -----------------------------------------------------------------------
+
+# The place counts: a virtual environment has its path written into its scripts.
+key_place() { readlink -f -- "$SYSTEM_PYTHON"; echo "$ROOT"; }
+key_venv() { key_place; cat -- "$ROOT/requirements/base.txt"; }
+key_test_tools() { key_venv; cat -- "$ROOT/requirements/test.txt"; }
+key_extras() { key_venv; cat -- "$ROOT/requirements/extras.txt"; }
+
+pip_install() {  # file...
+    local files=()
+    for file in "$@"; do files+=(--requirement "$ROOT/requirements/$file"); done
+    env -u PIP_USER -u PIP_TARGET -u PIP_PREFIX -u PYTHONPATH -u PYTHONHOME PYTHONNOUSERSITE=1 \
+        "$VENV/bin/python3" -m pip install --disable-pip-version-check --no-input "${files[@]}"
+}
+
+make_venv() {
+    local place=$VENV/cartpole-place
+    if [[ ! -f $place || $(<"$place") != "$(key_place)" ]]; then
+        env -u PYTHONPATH -u PYTHONHOME \
+            "$SYSTEM_PYTHON" -m venv --clear --system-site-packages "$VENV"
+        key_place >"$place"
+    fi
+    pip_install base.txt
+}
+
+# With base.txt, so that nothing here moves what is pinned there.
+make_test_tools() { pip_install base.txt test.txt; }
+make_extras() { pip_install base.txt extras.txt; }
+
+# --- catkin workspace ----------------------------------------------------------------------
+
+# What CMake reads, and the names of what it links to; sources are used where they are.
+key_build() {
+    key_place
+    cd -- "$ROOT"
+    find . -mindepth 1 -maxdepth 1 ! -name '.*' | sort
+    find scripts src -mindepth 1 -maxdepth 1 ! -name __pycache__ 2>/dev/null | sort || true
+    find CMakeLists.txt package.xml setup.py srv companions -type f ! -name '*.pyc' -print0 |
+        sort -z | xargs -0 sha256sum
+}
+
+# .ws/src holds links to the package and its companions. The package is a folder of links to what
+# lies in the repository's root, not a link to the root: rosrun looks for executables everywhere
+# below a package, and would find those in .ws as well.
+link_sources() {
+    local entry
+    rm -rf -- "$WS/src"
+    mkdir -p -- "$WS/src/cartpole"
+    for entry in "$ROOT"/*; do
+        [[ $entry == */companions ]] || ln -s -- "$entry" "$WS/src/cartpole/"
+    done
+    ln -s -- "$ROOT"/companions/* "$WS/src/"
+}
+
+make_build() {
+    local place=$WS/build/cartpole-place
+    if [[ ! -f $place || $(<"$place") != "$(key_place)" ]]; then
+        rm -rf -- "$WS/build" "$WS/devel"  # CMake's cache holds absolute paths
+        mkdir -p -- "$WS/build"
+        key_place >"$place"
+    fi
+    link_sources
+    leave_other_workspaces
+    # pytest runs the tests, so catkin need not look for its test tools.
+    /usr/bin/catkin_make --directory "$WS" --force-cmake \
+        -DPYTHON_EXECUTABLE="$VENV/bin/python3" -DCATKIN_ENABLE_TESTING=OFF \
+        -DCMAKE_BUILD_TYPE=Release
+    mend_long_shebangs
+}
+
+# The kernel takes no blanks in an interpreter's path, and no more than 127 characters.
+mend_long_shebangs() {
+    [[ $VENV == *[[:space:]]* || ${#VENV} -gt 100 ]] || return 0
+    find "$WS/devel/lib" -mindepth 2 -maxdepth 2 -type f -perm -u+x -exec \
+        sed -i '1s|^#!.*/venv/bin/python3$|#!/usr/bin/env python3|' -- {} +
+}

@@ -1,0 +1,115 @@
+#!/usr/bin/env bash
+# The one entry: makes the workspace ready, then runs a command in it. See ./ws --help.
+#
+# Each step keeps a stamp, the hash of what it was made from, in .ws/stamp; a step whose hash
+# has not changed is not run again, and a step that failed has no stamp, so the next call resumes.
+set -euo pipefail
+
+ROOT=$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")
+WS=$ROOT/.ws
+VENV=$WS/venv
+SYSTEM_PYTHON=/usr/bin/python3  # rospy is Debian's, so is the interpreter, whatever PATH says
+
+# A port of this checkout's own for the master, so that two checkouts don't meet.
+checksum=$(printf '%s' "$ROOT" | cksum)
+DEFAULT_MASTER=http://127.0.0.1:$((20000 + ${checksum%% *} % 10000))
+
+# shellcheck source=tools/ws_steps.sh
+source "$ROOT/tools/ws_steps.sh"
+# shellcheck source=tools/ws_environment.sh
+source "$ROOT/tools/ws_environment.sh"
+
+usage() {
+    cat <<END
+usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
+       ws test [ARG...]      run all tests; ARGs go to pytest, e.g. -k gazebo
+       ws check              lint (ruff), types (mypy), catkin packages (catkin_lint)
+       ws shell              an interactive shell in the workspace
+       ws extras [CMD...]    install requirements/extras.txt too, then run CMD, if any
+       ws clean              remove everything that ws made
+       ws --help             this text
+
+For example:
+       ./ws rosrun cartpole pg_train.py
+       ./ws roslaunch gazebo_ros empty_world.launch gui:=false
+
+Ready means: the packages of requirements/debian.txt are installed (apt-get, through sudo when
+not root), .ws/venv holds requirements/base.txt, and .ws/devel is the catkin workspace built
+from this package and companions/. What is ready is not made again. Logs are in .ws/log.
+Apart from Debian's packages everything lies in $WS.
+
+ROS talks over loopback only, to a master on this checkout's own port: $DEFAULT_MASTER
+Set ROS_MASTER_URI, ROS_IP or ROS_HOSTNAME to use another master or network.
+The caller's PYTHONPATH, CMAKE_PREFIX_PATH, ROS_PACKAGE_PATH, conda and virtual
+environments are left out.
+END
+}
+
+check() {
+    local status=0
+    cd -- "$ROOT"
+    "$VENV/bin/ruff" check . || status=1
+    "$VENV/bin/mypy" || status=1
+    /usr/bin/catkin_lint --quiet --offline --strict -W2 "$ROOT" "$ROOT"/companions/* || status=1
+    return $status
+}
+
+interactive_shell() {
+    # ~/.bashrc may put another Python first on PATH, so the workspace comes after it.
+    cat >"$WS/bashrc" <<END
+[[ -r ~/.bashrc ]] && source ~/.bashrc
+PATH=$(printf %q "$PATH")
+PYTHONPATH=$(printf %q "$PYTHONPATH")
+PS1="(cartpole) \${PS1-\$ }"
+END
+    exec bash --rcfile "$WS/bashrc" -i
+}
+
+clean() {
+    [[ -d $WS ]] || return 0
+    hold_lock
+    # The folder of the lock goes last, so that nobody builds in a half-removed one.
+    find "$WS" -mindepth 1 -maxdepth 1 ! -name lock -exec rm -rf -- {} +
+    rm -rf -- "$WS"
+}
+
+main() {
+    case ${1-} in
+        '' | -h | --help | help) usage; [[ -n ${1-} ]]; return ;;
+        clean) clean; return ;;
+        -*) fail_usage "unknown option $1" ;;
+    esac
+    local command=$1
+    case $command in
+        test | check) make_ready debian venv test_tools build ;;
+        extras) make_ready debian venv extras build ;;
+        *) make_ready debian venv build ;;
+    esac
+    enter_workspace
+    case $command in
+        test)
+            cd -- "$ROOT"
+            exec "$VENV/bin/python3" -m pytest "${@:2}"
+            ;;
+        check) check ;;
+        shell) interactive_shell ;;
+        extras) [[ $# -eq 1 ]] || exec -- "${@:2}" ;;
+        *) run "$@" ;;
+    esac
+}
+
+run() {
+    # exec, so that CMD gets the signals and its exit code is ours.
+    if ! type -P -- "$1" >/dev/null; then
+        echo "ws: no such command: $1" >&2
+        return 127
+    fi
+    exec -- "$@"
+}
+
+fail_usage() {
+    echo "ws: $1; see ws --help" >&2
+    exit 2
+}
+
+main "$@"
