@@ -5,14 +5,26 @@
 # has not changed is not run again, and a step that failed has no stamp, so the next call resumes.
 set -euo pipefail
 
-ROOT=$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")
+CHECKOUT=$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")
+CHECKSUM=$(printf '%s' "$CHECKOUT" | cksum)
+CHECKSUM=${CHECKSUM%% *}
+
+# The kernel takes no blanks in the path of a script's interpreter and no more than 127 bytes, and
+# rosrun splits paths at blanks. Such a checkout is used through a link with a plain name.
+ROOT=$CHECKOUT
+if [[ $CHECKOUT == *[[:space:]]* || ${#CHECKOUT} -gt 90 ]]; then
+    ROOT=/tmp/cartpole-$UID-$CHECKSUM
+    if [[ ! $ROOT -ef $CHECKOUT ]] && ! ln -s -- "$CHECKOUT" "$ROOT"; then
+        echo "ws: $ROOT is in the way of a link to $CHECKOUT; remove it" >&2
+        exit 1
+    fi
+fi
 WS=$ROOT/.ws
 VENV=$WS/venv
 SYSTEM_PYTHON=/usr/bin/python3  # rospy is Debian's, so is the interpreter, whatever PATH says
 
 # A port of this checkout's own for the master, so that two checkouts don't meet.
-checksum=$(printf '%s' "$ROOT" | cksum)
-DEFAULT_MASTER=http://127.0.0.1:$((20000 + ${checksum%% *} % 10000))
+DEFAULT_MASTER=http://127.0.0.1:$((20000 + CHECKSUM % 10000))
 
 # shellcheck source=tools/ws_steps.sh
 source "$ROOT/tools/ws_steps.sh"
@@ -36,7 +48,7 @@ For example:
 Ready means: the packages of requirements/debian.txt are installed (apt-get, through sudo when
 not root), .ws/venv holds requirements/base.txt, and .ws/devel is the catkin workspace built
 from this package and companions/. What is ready is not made again. Logs are in .ws/log.
-Apart from Debian's packages everything lies in $WS.
+Apart from Debian's packages everything lies in $CHECKOUT/.ws.
 
 ROS talks over loopback only, to a master on this checkout's own port: $DEFAULT_MASTER
 Set ROS_MASTER_URI, ROS_IP or ROS_HOSTNAME to use another master or network.
@@ -50,7 +62,7 @@ check() {
     cd -- "$ROOT"
     "$VENV/bin/ruff" check . || status=1
     "$VENV/bin/mypy" || status=1
-    /usr/bin/catkin_lint --quiet --offline --strict -W2 "$ROOT" "$ROOT"/companions/* || status=1
+    /usr/bin/catkin_lint --quiet --offline --ignore env_var --strict -W2 "$WS/src" || status=1
     return $status
 }
 
@@ -71,6 +83,7 @@ clean() {
     # The folder of the lock goes last, so that nobody builds in a half-removed one.
     find "$WS" -mindepth 1 -maxdepth 1 ! -name lock -exec rm -rf -- {} +
     rm -rf -- "$WS"
+    [[ $ROOT == "$CHECKOUT" ]] || rm -f -- "$ROOT"
 }
 
 main() {

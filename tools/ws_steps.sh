@@ -160,7 +160,7 @@ link_sources() {
     rm -rf -- "$WS/src"
     mkdir -p -- "$WS/src/cartpole"
     for entry in "$ROOT"/*; do
-        [[ $entry == */companions ]] || ln -s -- "$entry" "$WS/src/cartpole/"
+        [[ $entry == */companions || $entry == */ws ]] || ln -s -- "$entry" "$WS/src/cartpole/"
     done
     ln -s -- "$ROOT"/companions/* "$WS/src/"
 }
@@ -178,12 +178,4 @@ make_build() {
     /usr/bin/catkin_make --directory "$WS" --force-cmake \
         -DPYTHON_EXECUTABLE="$VENV/bin/python3" -DCATKIN_ENABLE_TESTING=OFF \
         -DCMAKE_BUILD_TYPE=Release
-    mend_long_shebangs
-}
-
-# The kernel takes no blanks in an interpreter's path, and no more than 127 characters.
-mend_long_shebangs() {
-    [[ $VENV == *[[:space:]]* || ${#VENV} -gt 100 ]] || return 0
-    find "$WS/devel/lib" -mindepth 2 -maxdepth 2 -type f -perm -u+x -exec \
-        sed -i '1s|^#!.*/venv/bin/python3$|#!/usr/bin/env python3|' -- {} +
 }

@@ -12,6 +12,7 @@ from ros_utils._registry import Entry
 
 # roslaunch gives each of its nodes 15 s after SIGINT and 2 s after SIGTERM before it ends itself.
 PATIENCE = {"node": 8.0, "launch": 20.0, "master": 20.0}  # [s] after SIGINT
+LEFTOVERS = 3.0  # [s] instead, for what outlives the program itself
 AFTER_TERM = 3.0  # [s]
 AFTER_KILL = 2.0  # [s]
 POLL = 0.05  # [s]
@@ -62,11 +63,15 @@ def _end_with(
     """Send one signal and wait; True if something still runs after `grace` [s]."""
     deadline = time.monotonic() + grace
     told: set[int] = set()
+    orphaned = False
     while True:
         reap()
         families = [(entry, _family(entry)) for entry in entries]
         if not any(family for _, family in families):
             return False
+        if not any(_root_runs(entry, family) for entry, family in families) and not orphaned:
+            orphaned = True
+            deadline = min(deadline, time.monotonic() + LEFTOVERS)
         if time.monotonic() > deadline or (hurry.is_set() and number is signal.SIGINT):
             return True
         for entry, family in families:
@@ -83,7 +88,10 @@ def _addressees(entry: Entry, family: dict[int, _procfs.Stat], number: signal.Si
     This is what Ctrl-C in a terminal does. roslaunch puts its nodes into groups of their own and
     ends them in order.
     """
-    root_runs = entry.pid in family and family[entry.pid].start == entry.start
-    if root_runs and number is not signal.SIGKILL:
-        return {pid for pid, data in family.items() if data.group == entry.pid}
+    if _root_runs(entry, family) and number is not signal.SIGKILL:
+        return {pid for pid, data in family.items() if entry.pid in (pid, data.group)}
     return set(family)
+
+
+def _root_runs(entry: Entry, family: dict[int, _procfs.Stat]) -> bool:
+    return entry.pid in family and family[entry.pid].start == entry.start

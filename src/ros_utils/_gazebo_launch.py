@@ -162,5 +162,5 @@ def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> bool
     else:
         what = f"service {READY} doesn't answer after {timeout:g} s; ended it"
     _processes.end([handle.entry])
-    _log.error(f"{LABEL}: {what}: {handle.last_lines()}{handle.where()}")
+    _log.error(f"{LABEL}: {what}: {handle.reason()}{handle.where()}")
     return False

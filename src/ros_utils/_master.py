@@ -34,6 +34,8 @@ class Refused(Exception):
 class MasterDown(Exception):
     """No ROS master can be used; the text says where it was looked for and what to do."""
 
+    port_is_free = False  # nobody listens there, so a master could be started
+
 
 class _Transport(xmlrpc.client.Transport):
     """XML-RPC over HTTP with a time limit on every socket operation."""
@@ -129,10 +131,12 @@ def require() -> None:
     try:
         call(uri(), "getPid")
     except (NoAnswer, Refused) as fault:
-        raise MasterDown(
+        down = MasterDown(
             f"no ROS master at {uri()} ({fault}): start roscore or launch_Gazebo,"
             " or mend ROS_MASTER_URI"
-        ) from fault
+        )
+        down.port_is_free = isinstance(fault.__cause__, ConnectionRefusedError)
+        raise down from fault
 
 
 def is_up() -> bool:
@@ -141,17 +145,6 @@ def is_up() -> bool:
         require()
     except MasterDown:
         return False
-    return True
-
-
-def port_is_taken() -> bool:
-    """True if something listens at the master's address, be it a master or not."""
-    try:
-        call(uri(), "getPid")
-    except NoAnswer as fault:
-        return not isinstance(fault.__cause__, ConnectionRefusedError)
-    except Refused:
-        pass
     return True
 
 

@@ -57,13 +57,19 @@ class Handle:
             self.entry.pid, self.entry.start, self.entry.token
         )
 
-    def last_lines(self, count: int = 5) -> str:
-        """The end of the log, in one line; empty if the output went to a terminal."""
+    def lines(self, part: str = "") -> list[str]:
+        """The log's lines that hold a text; none if the output went to a terminal."""
         if self.entry.log is None:
-            return ""
+            return []
         with open(self.entry.log, encoding="utf-8", errors="replace") as file:
-            lines = [re.sub(r"\x1b[\[\]][0-9;]*[A-Za-z]?", "", line).strip() for line in file]
-        return " | ".join([line for line in lines if line][-count:])
+            plain = [re.sub(r"\x1b[\[\]][0-9;]*[A-Za-z]?", "", line).strip() for line in file]
+        return [line for line in plain if line and part in line]
+
+    def reason(self) -> str:
+        """What the log gives as reason of a failure: its last error, or else its last lines."""
+        lines = self.lines()
+        errors = [line for line in lines if re.search(r"(Error|Exception|ERROR|error):", line)]
+        return " | ".join(errors[-1:] or lines[-3:]) or "it said nothing"
 
     def where(self) -> str:
         """Where to read on, to be put behind a message."""

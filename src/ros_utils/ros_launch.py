@@ -11,6 +11,7 @@ from ros_utils._waiting import Outcome
 
 SETTLE = 5.0  # [s] at most, for the nodes of a launch file to register after their processes run
 STABLE = 0.3  # [s] without a further process: roslaunch has started them all
+STABLE_EMPTY = 1.5  # [s] without any process: the launch file sets parameters only
 CORE = ("master", "rosout-1")  # roslaunch's names for what belongs to the master that it brought up
 
 
@@ -103,10 +104,10 @@ def check_master_possible() -> None:
     """
     try:
         _master.require()
-    except _master.MasterDown:
+    except _master.MasterDown as down:
         if not _master.is_local():
             raise
-        if _master.port_is_taken():
+        if not down.port_is_free:
             raise _master.MasterDown(
                 f"{_master.uri()}: the port is in use, and not by a ROS master:"
                 " set ROS_MASTER_URI to a free port"
@@ -137,7 +138,7 @@ def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> bool
         _let_settle(handle)
     code = handle.exit_code()
     if code:
-        _log.error(f"{label}: ended with exit code {code}: {handle.last_lines()}{handle.where()}")
+        _log.error(f"{label}: ended with exit code {code}: {handle.reason()}{handle.where()}")
     return not code
 
 
@@ -145,20 +146,24 @@ def _let_settle(handle: _processes.Handle) -> None:
     """Wait until the launch's processes have registered as nodes, but not for long: not every
     program is a node."""
     deadline = time.monotonic() + SETTLE
-    seen, since = None, time.monotonic()
+    seen: tuple[list[str], list[str]] = ([], [])
+    since = time.monotonic()
     while time.monotonic() < deadline and handle.exit_code() is None:
         processes = _ask_launch(handle) or ([], [])
         if processes != seen:
             seen, since = processes, time.monotonic()
-        if any(seen) and time.monotonic() - since > STABLE and _own_nodes(handle) >= len(seen[0]):
+        quiet = STABLE if any(seen) else STABLE_EMPTY
+        if time.monotonic() - since > quiet and _own_nodes(handle) >= len(seen[0]):
             break
         time.sleep(_master.POLL)
-    if seen and seen[1]:
-        _log.warn(
-            f"{handle.entry.label}: these have ended already: {', '.join(seen[1])}{handle.where()}"
-        )
-    elif seen == ([], []):
-        _log.warn(f"{handle.entry.label}: no node runs{handle.where()}")
+    if seen[1]:
+        _warn(handle, f"ended already: {', '.join(seen[1])}")
+    for line in handle.lines("cannot launch node"):  # roslaunch goes on with the other nodes
+        _warn(handle, line)
+
+
+def _warn(handle: _processes.Handle, text: str) -> None:
+    _log.warn(f"{handle.entry.label}: {text}{handle.where()}")
 
 
 def _own_nodes(handle: _processes.Handle) -> int:

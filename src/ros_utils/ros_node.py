@@ -189,7 +189,7 @@ def _start_master(window: bool, timeout: float) -> bool:
     )
     if outcome is Outcome.READY:
         return True
-    _log.error(f"roscore: not up after {timeout:g} s: {handle.last_lines()}{handle.where()}")
+    _log.error(f"roscore: not up after {timeout:g} s: {handle.reason()}{handle.where()}")
     _processes.end([handle.entry])
     return False
 
@@ -207,11 +207,11 @@ def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> bool
     if outcome is Outcome.LATE:
         _log.error(
             f"{label}: not registered at {_master.uri()} after {timeout:g} s; ended it:"
-            f" {handle.last_lines()}{handle.where()}. For a program that is no node: wait=False"
+            f" {handle.reason()}{handle.where()}. For a program that is no node: wait=False"
         )
         _processes.end([handle.entry])
         return False
     code = handle.exit_code() if outcome is Outcome.ENDED else 0
     if code:
-        _log.error(f"{label}: ended with exit code {code}: {handle.last_lines()}{handle.where()}")
+        _log.error(f"{label}: ended with exit code {code}: {handle.reason()}{handle.where()}")
     return not code

@@ -17,6 +17,7 @@ def run(command, workspace, **environment):
     """Run a command of a user who has installed PyPI's packages and sourced nothing."""
     result = subprocess.run(
         command,
+        check=False,
         cwd=workspace,
         env={"PATH": "/usr/bin:/bin", "HOME": str(workspace)} | environment,
         stdin=subprocess.DEVNULL,
@@ -46,7 +47,8 @@ def workspace(root, tmp_path_factory):
 @pytest.mark.parametrize("space", ["devel", "install"])
 def test_built_workspace(workspace, space):
     def inside(*command):
-        script = 'source "$0/setup.bash" && PYTHONPATH+=:$PYPI && exec "$@"'
+        # In a function of its own, because catkin's setup file looks at the caller's arguments.
+        script = 'enter() { source "$1"; }; enter "$0/setup.bash"; PYTHONPATH+=:$PYPI; exec "$@"'
         packages = os.pathsep.join(site.getsitepackages()[:1])
         return run(["bash", "-c", script, space, *command], workspace, PYPI=packages)
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 import torch
-from unit.learning_fakes import FakePlant
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from unit.learning_fakes import FakePlant
 
 from cartpole.errors import CartpoleError
 from cartpole.training import pg_run
@@ -90,7 +90,7 @@ def test_same_seed_same_files(tmp_path: Path) -> None:
 
 def test_a_simulator_that_dies_costs_only_its_episode(tmp_path: Path) -> None:
     plant = FakePlant(fail_after=300)
-    with pytest.raises(CartpoleError, match="has ended; stopped after .* of 1000 episodes") as raised:
+    with pytest.raises(CartpoleError, match=r"has ended; stopped after \d+ of") as raised:
         Training(Settings(episodes=1000, save_every=0), tmp_path, plant, Interrupt()).run()
     assert str(tmp_path) in str(raised.value)
     assert files(tmp_path) == ALWAYS

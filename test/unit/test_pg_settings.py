@@ -11,7 +11,7 @@ def test_defaults() -> None:
 
 
 def test_every_flag() -> None:
-    flags = "--episodes 5 --seed 3 --run-dir out --save-every 2 --realtime --gui".split()
+    flags = ["--episodes=5", "--seed=3", "--run-dir=out", "--save-every=2", "--realtime", "--gui"]
     assert settings(flags, {}) == Settings(5, 3, "out", 2, True, True)
 
 

@@ -5,8 +5,8 @@ import random
 import numpy as np
 import pytest
 import torch
-from unit.learning_fakes import FakePlant
 from torch import nn
+from unit.learning_fakes import FakePlant
 
 from cartpole.agents.policy_gradient import (
     Episode,
@@ -81,7 +81,7 @@ def test_updates_equal_the_documents(length: int) -> None:
         assert tuple(ours.learn(episode)) == pytest.approx(
             document_update(theirs, episode), rel=1e-4, abs=1e-4
         )
-    for mine, other in zip(weights(ours), weights(theirs)):
+    for mine, other in zip(weights(ours), weights(theirs), strict=True):
         torch.testing.assert_close(mine, other, rtol=1e-4, atol=1e-5)
 
 
@@ -136,8 +136,8 @@ def test_same_seed_gives_the_same_weights_whatever_else_is_random() -> None:
         return weights(agent)
 
     first, second, other = trained(3), trained(3), trained(4)
-    assert all(torch.equal(mine, its) for mine, its in zip(first, second))
-    assert not all(torch.equal(mine, its) for mine, its in zip(first, other))
+    assert all(torch.equal(mine, its) for mine, its in zip(first, second, strict=True))
+    assert not all(torch.equal(mine, its) for mine, its in zip(first, other, strict=True))
 
 
 def test_seeding_leaves_torchs_global_generator_alone() -> None:
@@ -158,7 +158,7 @@ def test_a_loss_that_is_no_number_leaves_the_weights_alone() -> None:
     episode.rewards[2] = float("nan")
     with pytest.raises(CartpoleError, match="loss is nan"):
         agent.learn(episode)
-    assert all(torch.equal(old, new) for old, new in zip(before, weights(agent)))
+    assert all(torch.equal(old, new) for old, new in zip(before, weights(agent), strict=True))
 
 
 def test_an_episode_broken_off_is_dropped() -> None:

@@ -119,7 +119,7 @@ def test_an_empty_run_folder_is_used(tmp_path: Path) -> None:
 
 def test_a_run_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(CartpoleError, match="can't write to the run folder .*Not a directory"):
+    with pytest.raises(CartpoleError, match=r"can't write to the run folder .*Not a directory"):
         run_folder.create(str(tmp_path / "file" / "run"), "cartpole", "pg", 0)
 
 

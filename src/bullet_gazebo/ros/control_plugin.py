@@ -78,10 +78,21 @@ class ControlPlugin:
         hardware = RobotHardware(description)
         manager = ControllerManager(hardware)
         with self._sim.lock:
-            self._robot = Robot(self._context.model, hardware, manager)
-            self._sim.add_robot(self._robot)
-        self._services = ControllerServices(self._sim, manager, self._namespace)
+            robot = Robot(self._context.model, hardware, manager)
+        self._services = self._offer(manager)
+        with self._sim.lock:
+            self._sim.add_robot(robot)
+        self._robot = robot
         rospy.loginfo("Loaded gazebo_ros_control for model '%s'.", self._context.model.name)
+
+    def _offer(self, manager: ControllerManager) -> ControllerServices:
+        try:
+            return ControllerServices(self._sim, manager, self._namespace)
+        except rospy.service.ServiceException as error:
+            raise ControlError(
+                f"there is a controller manager in the namespace '{self._namespace}' already; "
+                "give each robot a robot_namespace of its own"
+            ) from error
 
 
 def find_param(namespace: str, name: str) -> object:

@@ -3,6 +3,7 @@
 import argparse
 import os
 import threading
+import traceback
 
 import rospy
 
@@ -54,7 +55,8 @@ class GazeboNode:
         if args.paused:
             self.sim.pause()
         self._advertise(bool(rospy.get_param("~enable_ros_network", True)))
-        self._thread = threading.Thread(target=self.sim.run, name="simulation")
+        self._thread = threading.Thread(target=self._simulate, name="simulation")
+        self._fault = False
 
     def _advertise(self, network: bool) -> None:
         advertise_states(self.sim, float(rospy.get_param("~pub_clock_frequency", 0)), network)
@@ -70,13 +72,25 @@ class GazeboNode:
         if self.sim.lockstep:
             self._services.append(StepService(self.sim))
 
-    def run(self) -> None:
-        """Simulates until the node is shut down."""
+    def run(self) -> int:
+        """Simulates until the node is shut down; returns the exit code."""
+        rospy.on_shutdown(self._stop)  # called before the topics close, so no tick publishes to a closed one
         self._thread.start()
+        rospy.spin()
+        return 1 if self._fault else 0
+
+    def _simulate(self) -> None:
+        """A world whose time silently stands still is worse than one that ends: a fault ends the node."""
         try:
-            rospy.spin()
-        finally:
-            self.sim.stop()
+            self.sim.run()
+        except Exception:
+            self._fault = True
+            rospy.logfatal("The simulation failed:\n%s", traceback.format_exc())
+            rospy.signal_shutdown("the simulation failed")
+
+    def _stop(self) -> None:
+        self.sim.stop()
+        if threading.current_thread() is not self._thread:
             self._thread.join(STOP_TIMEOUT)
 
 
@@ -90,5 +104,4 @@ def main(argv: list[str] | None = None) -> int:
         rospy.logwarn("Physics engine '%s' is not known; PyBullet is used", args.physics)
     if args.ignored:
         rospy.logwarn("Arguments without effect here: %s", " ".join(args.ignored))
-    GazeboNode(args).run()
-    return 0
+    return GazeboNode(args).run()

@@ -11,6 +11,7 @@ from bullet_gazebo.ros.conversions import to_pose_msg, to_time, to_twist_msg
 from bullet_gazebo.simulator import Simulator
 
 QUEUE = 10
+STOP_TIMEOUT = 1.0  # [s]
 PERIOD = 0.001  # [s of wall time] between two messages of a thinned topic
 
 
@@ -58,7 +59,10 @@ class ClockTopic:
         self._last = -self._period
         self._newest = 0
         self._news = threading.Event()
-        threading.Thread(target=self._send_newest, name="clock", daemon=True).start()
+        self._ending = threading.Event()
+        self._sender = threading.Thread(target=self._send_newest, name="clock", daemon=True)
+        self._sender.start()
+        rospy.on_shutdown(self._stop)
 
     def __call__(self, now: int) -> None:
         if self._period and 0 <= now - self._last < self._period:  # negative after a reset: publish
@@ -75,19 +79,18 @@ class ClockTopic:
         return self._sim.lockstep or rate <= 0.0 or rate * PERIOD > 1.0
 
     def _send_newest(self) -> None:
-        pause = threading.Event()
-        while not rospy.is_shutdown():
-            if self._news.wait(timeout=0.5):
-                self._news.clear()
-                self._publish(self._newest)
-                pause.wait(PERIOD)
+        while not self._ending.wait(PERIOD):
+            self._news.wait()
+            self._news.clear()
+            self._publish(self._newest)
+
+    def _stop(self) -> None:
+        self._ending.set()
+        self._news.set()
+        self._sender.join(STOP_TIMEOUT)
 
     def _publish(self, now: int) -> None:
-        try:
-            self._publisher.publish(Clock(to_time(now)))
-        except rospy.ROSException:  # the topic was closed under us: the node is going down
-            if not rospy.is_shutdown():
-                raise
+        self._publisher.publish(Clock(to_time(now)))
 
 
 def advertise_states(sim: Simulator, clock_frequency: float, network: bool) -> None:

@@ -150,7 +150,7 @@ class PolicyGradientAgent:
 
     @staticmethod
     def _check(losses: Losses) -> None:
-        for name, loss in zip(losses._fields, losses):
+        for name, loss in losses._asdict().items():
             if not math.isfinite(loss):
                 raise CartpoleError(f"the {name} loss is {loss}; the networks were left unchanged")
 

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 
 from cartpole.envs.plant import Plant
-from cartpole.task import ANGLE_LIMIT, POSITION_LIMIT, BalanceTask
+from cartpole.task import POSITION_LIMIT, BalanceTask
 
 _ANY = float(np.finfo(np.float32).max)
 _HIGH = np.array([2 * POSITION_LIMIT, _ANY, np.pi, _ANY], dtype=np.float32)
@@ -72,9 +72,7 @@ class CartPoleEnv(gymnasium.Env[np.ndarray, np.int64]):
         self._steps = 0
         return self.task.observation(state), {}
 
-    def step(
-        self, action: np.int64 | int
-    ) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+    def step(self, action: np.int64 | int) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Carries out one action.
 
         Raises:

@@ -43,10 +43,11 @@ def master_is_up() -> bool:
         reason = "connection refused"
     except TimeoutError:
         reason = f"no answer within {MASTER_TIMEOUT:g} s"
-    except Exception as error:  # a foreign server can break XML-RPC in many ways
+    except Exception as error:  # noqa: BLE001 - a foreign server can break XML-RPC in many ways
         reason = f"something else answers there ({type(error).__name__}: {error})"
     raise CartpoleError(
-        f"no ROS master at {uri}: {reason}; start roscore there, or set ROS_MASTER_URI to a free port"
+        f"no ROS master at {uri}: {reason}; start roscore there, or set ROS_MASTER_URI to a "
+        "free port of this machine"
     )
 
 

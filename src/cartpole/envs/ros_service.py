@@ -46,7 +46,7 @@ def run_limited(function: Callable[[], Any], timeout: float) -> Any:
     def work() -> None:
         try:
             outcome.append((function(), None))
-        except BaseException as error:  # handed to the caller below
+        except BaseException as error:  # noqa: BLE001 - handed to the caller below
             outcome.append((None, error))
 
     thread = threading.Thread(target=work, daemon=True)

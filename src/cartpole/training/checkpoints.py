@@ -3,6 +3,7 @@
 import os
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -68,7 +69,5 @@ class NetworkSaver:
         """Writes policy_network{suffix}.pth and value_network{suffix}.pth."""
         networks = {"policy_network": self._agent.policy, "value_network": self._agent.value}
         for name, network in networks.items():
-            weights = network.state_dict()
-            write_atomically(
-                self._folder / f"{name}{suffix}.pth", lambda stream: torch.save(weights, stream)
-            )
+            path = self._folder / f"{name}{suffix}.pth"
+            write_atomically(path, partial(torch.save, network.state_dict()))

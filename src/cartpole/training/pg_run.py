@@ -71,7 +71,8 @@ class Training:
         except CartpoleError as error:
             failure = error
         except OSError as error:
-            failure = CartpoleError(f"can't write {error.filename or self._folder}: {error.strerror}")
+            place = error.filename or self._folder
+            failure = CartpoleError(f"can't write {place}: {error.strerror}")
         self._finish(evaluation, failure)
 
     def _train(self) -> None:

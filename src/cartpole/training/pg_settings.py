@@ -32,7 +32,9 @@ class Settings:
 def parser() -> argparse.ArgumentParser:
     """The flags, with their defaults."""
     result = argparse.ArgumentParser(
-        COMMAND, description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter,
+        COMMAND,
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add, default = result.add_argument, Settings()

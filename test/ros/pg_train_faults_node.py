@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+"""pg_train.py when things go wrong: a clear line within seconds, what was learned is saved."""
+
+import json
+import signal
+import socket
+import time
+import unittest
+
+import rostest
+from pg_train_runs import NETWORKS, Place, Process
+
+ENDLESS = "--episodes=100000"
+
+
+class PgTrainFaults(unittest.TestCase):
+    def place(self, master: str | None = None) -> Place:
+        place = Place(master)
+        self.addCleanup(place.close)
+        return place
+
+    def training(self, place: Place, *flags: str) -> Process:
+        training = place.train(ENDLESS, *flags)
+        training.wait_for("episode    20/")
+        return training
+
+    def assert_saved(self, place: Place) -> dict:
+        self.assertLessEqual(NETWORKS | {"learning_curve.png", "summary.json"}, place.files())
+        summary = json.loads((place.run / "summary.json").read_text())
+        self.assertGreaterEqual(summary["episodes"], 20)
+        return summary
+
+    def assert_failed(self, place: Place, training: Process, seconds: float) -> None:
+        started = time.monotonic()
+        self.assertEqual(training.end(60), 1, training.output)
+        self.assertLess(time.monotonic() - started, seconds)
+        self.assertNotIn("Traceback", training.output)
+        complaints = [line for line in training.output.splitlines() if "pg_train:" in line]
+        self.assertEqual(len(complaints), 1, training.output)
+        self.assertIn("what was learned is saved", complaints[0])
+        self.assertIsNotNone(self.assert_saved(place)["failure"])
+        self.assertEqual(place.left_after(5), {})
+
+    def test_ctrl_c_saves(self):
+        place = self.place()
+        training = self.training(place)
+        training.interrupt()
+        self.assertEqual(training.end(30), 130, training.output)
+        self.assertNotIn("Traceback", training.output)
+        self.assertTrue(self.assert_saved(place)["interrupted"])
+        self.assertEqual(place.left_after(5), {})
+
+    def test_impatient_ctrl_c_saves(self):
+        place = self.place()
+        training = self.training(place)
+        for _ in range(5):
+            training.interrupt()
+            time.sleep(0.1)
+        self.assertEqual(training.end(30), 130, training.output)
+        self.assertNotIn("Traceback", training.output)
+        self.assert_saved(place)
+        self.assertEqual(place.left_after(5), {})
+
+    def test_ctrl_c_while_starting(self):
+        place = self.place()
+        training = place.train(ENDLESS)
+        training.wait_for("starting the simulator")
+        time.sleep(0.3)
+        training.interrupt()
+        self.assertEqual(training.end(30), 130, training.output)
+        self.assertNotIn("Traceback", training.output)
+        self.assertEqual(place.left_after(5), {})
+        self.assertFalse(place.run.exists())
+
+    def test_a_simulator_that_dies(self):
+        place = self.place()
+        training = self.training(place)
+        place.send_to_simulator(signal.SIGKILL)
+        self.assert_failed(place, training, 20)
+
+    def test_a_simulator_that_hangs(self):
+        place = self.place()
+        training = self.training(place)
+        place.send_to_simulator(signal.SIGSTOP)
+        self.assert_failed(place, training, 40)
+        self.assertIn("no answer within 5 s", training.output)
+
+    def test_a_simulator_that_dies_in_real_time(self):
+        place = self.place()
+        training = self.training(place, "--realtime")
+        place.send_to_simulator(signal.SIGKILL)
+        self.assert_failed(place, training, 20)
+
+    def test_a_master_that_does_not_answer(self):
+        with socket.create_server(("127.0.0.1", 0)) as deaf:
+            self.assert_refused(f"http://127.0.0.1:{deaf.getsockname()[1]}", "no answer within")
+
+    def test_a_master_on_another_machine_is_not_started_here(self):
+        # 192.0.2.0/24 is reserved for documentation: nobody answers there.
+        self.assert_refused("http://192.0.2.1:11311", "no ROS master at http://192.0.2.1:11311")
+
+    def test_no_address_of_a_master(self):
+        self.assert_refused("nonsense", "nonsense")
+
+    def assert_refused(self, master: str, reason: str) -> None:
+        place = self.place(master)
+        started = time.monotonic()
+        training = place.train()
+        self.assertEqual(training.end(30), 1, training.output)
+        self.assertLess(time.monotonic() - started, 15)
+        self.assertIn(reason, training.output)
+        self.assertNotIn("Traceback", training.output)
+        self.assertFalse(place.run.exists())
+
+    def test_a_second_training_at_the_same_master_is_refused(self):
+        place = self.place()
+        first = self.training(place)
+        second = place.start("rosrun", "cartpole", "pg_train.py", "--episodes=1")
+        self.assertEqual(second.end(30), 1, second.output)
+        self.assertIn("runs at", second.output)
+        first.interrupt()
+        self.assertEqual(first.end(30), 130, first.output)
+        self.assert_saved(place)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "pg_train_faults", PgTrainFaults)

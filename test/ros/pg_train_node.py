@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+"""pg_train.py from nothing: it trains, leaves its files, and leaves nothing running."""
+
+import json
+import unittest
+
+import rostest
+import torch
+from pg_train_runs import NETWORKS, Place
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+TAGS = {
+    "Reward",
+    "Value Loss",
+    "Policy Loss",
+    "charts/episodic_return",
+    "charts/episodic_length",
+    "charts/SPS",
+}
+
+
+class PgTrain(unittest.TestCase):
+    def place(self) -> Place:
+        place = Place()
+        self.addCleanup(place.close)
+        return place
+
+    def trained(self, place: Place, *flags: str) -> str:
+        training = place.train(*flags)
+        self.assertEqual(training.end(90), 0, training.output)
+        self.assertNotIn("Traceback", training.output)
+        return training.output
+
+    def weights(self, place: Place) -> torch.Tensor:
+        return torch.load(place.run / "policy_network.pth", weights_only=True)["fc.weight"]
+
+    def test_from_nothing(self):
+        place = self.place()
+        output = self.trained(place, "--episodes=5", "--seed=1", "--save-every=4")
+        self.assertEqual(place.left_after(5), {})
+        self.assertIn("trained 5 episodes", output)
+        self.assertIn(str(place.run), output)
+        self.assertLessEqual(
+            NETWORKS | {"learning_curve.png", "summary.json", "policy_network_episode_4.pth"},
+            place.files(),
+        )
+        log = EventAccumulator(str(place.run))
+        log.Reload()
+        self.assertEqual(set(log.Tags()["scalars"]), TAGS)
+        self.assertEqual([point.step for point in log.Scalars("Reward")], [0, 1, 2, 3, 4])
+
+    def test_same_seed_same_weights(self):
+        first, second = self.place(), self.place()
+        for place in (first, second):
+            self.trained(place, "--episodes=8", "--seed=3")
+        self.assertTrue(torch.equal(self.weights(first), self.weights(second)))
+
+    def test_realtime(self):
+        place = self.place()
+        self.trained(place, "--episodes=3", "--realtime")
+        lengths = json.loads((place.run / "summary.json").read_text())["lengths"]
+        self.assertGreater(min(lengths), 1)
+        self.assertEqual(place.left_after(5), {})
+
+    def test_a_simulator_already_there_is_used_and_left_as_it_was(self):
+        place = self.place()
+        world = place.start("roslaunch", "gazebo_ros", "empty_world.launch", "lockstep:=true",
+                            "paused:=true", "gui:=false")  # fmt: skip
+        world.wait_for("process[gazebo-2]: started")
+        self.wait_for_service(place, "/gazebo/step_world")
+        before = set(place.processes())
+        self.trained(place, "--episodes=2")
+        self.assertEqual(set(place.processes()), before)
+        self.assertEqual(self.models(place), [])
+        world.interrupt()
+        world.end()
+        self.assertEqual(place.left_after(5), {})
+
+    def test_a_robot_already_there_is_used_and_stays(self):
+        place = self.place()
+        world = place.start("roslaunch", "cartpole", "simulation.launch")
+        world.wait_for("starting joint_state_controller")
+        world.wait_for("process has finished cleanly")
+        output = self.trained(place, "--episodes=2")
+        self.assertNotIn("starting", output)
+        self.assertNotIn("spawning", output)
+        self.assertEqual(self.models(place), ["cartpole"])
+
+    def test_a_world_that_is_not_in_lockstep_is_refused_with_the_remedy(self):
+        place = self.place()
+        world = place.start("roslaunch", "gazebo_ros", "empty_world.launch", "gui:=false")
+        world.wait_for("process[gazebo-2]: started")
+        self.wait_for_service(place, "/gazebo/get_world_properties")
+        training = place.train("--episodes=2")
+        self.assertEqual(training.end(30), 1)
+        self.assertIn("lockstep:=true", training.output)
+        self.assertIn("--realtime", training.output)
+        self.assertFalse(place.run.exists())
+
+    def test_parameters_of_the_launch_file(self):
+        place = self.place()
+        training = place.start(
+            "roslaunch", "cartpole", "pg_train.launch", "episodes:=3", "seed:=2",
+            f"run_dir:={place.run}",
+        )  # fmt: skip
+        training.end(90)
+        self.assertEqual(place.left_after(5), {}, training.output)
+        settings = json.loads((place.run / "summary.json").read_text())["settings"]
+        self.assertEqual((settings["episodes"], settings["seed"]), (3, 2))
+
+    def wait_for_service(self, place: Place, name: str) -> None:
+        script = f"import rospy; rospy.wait_for_service('{name}', 30)"
+        self.assertEqual(place.start("python3", "-c", script).end(40), 0)
+
+    def models(self, place: Place) -> list[str]:
+        asked = place.start("rosservice", "call", "/gazebo/get_world_properties")
+        self.assertEqual(asked.end(20), 0, asked.output)
+        return ["cartpole"] if "cartpole" in asked.output else []
+
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "pg_train", PgTrain)

@@ -1,0 +1,116 @@
+"""Runs of pg_train.py for tests: each on a master of its own, with every process accounted for."""
+
+import contextlib
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import threading
+import time
+import uuid
+from pathlib import Path
+
+MARK = "CARTPOLE_TEST_RUN"
+NETWORKS = {"policy_network.pth", "value_network.pth"}
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Place:
+    """A master's address, a scratch folder, and all processes that were started for it."""
+
+    def __init__(self, master: str | None = None) -> None:
+        self.folder = Path(tempfile.mkdtemp(prefix="pg_train_"))
+        self.run = self.folder / "run"
+        self._mark = uuid.uuid4().hex
+        master = master or f"http://127.0.0.1:{free_port()}"
+        self.environment = os.environ | {"ROS_MASTER_URI": master, MARK: self._mark}
+
+    def start(self, *command: str) -> "Process":
+        return Process(command, self.environment, self.folder)
+
+    def train(self, *flags: str) -> "Process":
+        return self.start("rosrun", "cartpole", "pg_train.py", f"--run-dir={self.run}", *flags)
+
+    def processes(self) -> dict[int, str]:
+        """Process id and command line of all that lives of this place."""
+        wanted = f"{MARK}={self._mark}".encode()
+        found = {}
+        for entry in Path("/proc").iterdir():
+            with contextlib.suppress(OSError, ValueError):
+                pid = int(entry.name)
+                command = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+                if command and wanted in (entry / "environ").read_bytes().split(b"\0"):
+                    found[pid] = command
+        return found
+
+    def left_after(self, seconds: float) -> dict[int, str]:
+        """What still lives after waiting that long for it to end."""
+        deadline = time.monotonic() + seconds
+        while self.processes() and time.monotonic() < deadline:
+            time.sleep(0.1)
+        return self.processes()
+
+    def send_to_simulator(self, number: signal.Signals) -> None:
+        pids = [pid for pid, command in self.processes().items() if "/gzserver " in command]
+        assert len(pids) == 1, self.processes()
+        os.kill(pids[0], number)
+
+    def files(self) -> set[str]:
+        return {path.name for path in self.run.iterdir()}
+
+    def close(self) -> None:
+        for pid in self.processes():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+class Process:
+    """A running command; collects what it says."""
+
+    def __init__(self, command: tuple[str, ...], environment: dict, folder: Path) -> None:
+        self._process = subprocess.Popen(
+            command,
+            env=environment,
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        self._lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        for line in self._process.stdout:
+            self._lines.append(line)
+
+    @property
+    def output(self) -> str:
+        return "".join(self._lines)
+
+    def wait_for(self, text: str, seconds: float = 60) -> None:
+        deadline = time.monotonic() + seconds
+        while text not in self.output:
+            assert self._process.poll() is None, f"ended before {text!r}:\n{self.output}"
+            assert time.monotonic() < deadline, f"no {text!r} in {seconds} s:\n{self.output}"
+            time.sleep(0.05)
+
+    def interrupt(self) -> None:
+        """As the terminal's Ctrl-C: to the whole process group."""
+        os.killpg(self._process.pid, signal.SIGINT)
+
+    def end(self, seconds: float = 60) -> int:
+        """Waits for the exit code."""
+        code = self._process.wait(seconds)
+        self._reader.join(2)
+        return code

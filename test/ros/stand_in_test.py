@@ -1,0 +1,333 @@
+#!/usr/bin/env python3
+"""Gazebo's services and topics as a client sees them (gazebo_api.md), over real ROS."""
+
+import threading
+import unittest
+
+import rospy
+import rostest
+from controller_manager_msgs.srv import (
+    ListControllers,
+    LoadController,
+    SwitchController,
+    UnloadController,
+)
+from gazebo_msgs.msg import LinkStates, ModelStates
+from gazebo_msgs.srv import (
+    DeleteModel,
+    GetJointProperties,
+    GetModelState,
+    GetWorldProperties,
+    SetModelConfiguration,
+    SpawnModel,
+    SpawnModelRequest,
+)
+from geometry_msgs.msg import Point, Pose
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+from std_srvs.srv import Empty
+
+BOUND = 20.0  # [s of wall time]
+STRICT = 2
+CONTROLLERS = ["joint_state_controller", "stand_cart_position_controller"]
+MANAGER = ("list_controllers", "list_controller_types", "load_controller", "unload_controller",
+           "switch_controller", "reload_controller_libraries")  # fmt: skip
+
+
+def call(name, kind, *args, **kwargs):
+    rospy.wait_for_service(name, BOUND)
+    return rospy.ServiceProxy(name, kind)(*args, **kwargs)
+
+
+class Listener:
+    """Keeps what comes on a topic, and waits for more of it."""
+
+    def __init__(self, topic, kind):
+        self.messages = []
+        self._news = threading.Condition()
+        self._subscriber = rospy.Subscriber(topic, kind, self._receive)
+
+    def _receive(self, message):
+        with self._news:
+            self.messages.append(message)
+            self._news.notify_all()
+
+    def wait_for(self, condition, bound=BOUND):
+        with self._news:
+            return self._news.wait_for(lambda: condition(self.messages), bound)
+
+    def wait_connected(self):
+        return wait_until(lambda: self._subscriber.get_num_connections() > 0)
+
+    def close(self):
+        self._subscriber.unregister()
+
+
+def wait_until(condition, bound=BOUND):
+    done, pause = False, threading.Event()
+    for _ in range(int(bound / 0.01)):
+        done = condition()
+        if done:
+            break
+        pause.wait(0.01)
+    return done
+
+
+def spawn(name="cartpole", xml=None, **kwargs):
+    xml = rospy.get_param("/robot_description") if xml is None else xml
+    request = SpawnModelRequest(model_name=name, model_xml=xml, robot_namespace="/", **kwargs)
+    return call("/gazebo/spawn_urdf_model", SpawnModel, request)
+
+
+def place(cart, pole):
+    return call("/gazebo/set_model_configuration", SetModelConfiguration, "cartpole",
+                "robot_description", ["stand_cart", "cart_pole"], [cart, pole])  # fmt: skip
+
+
+def joint(name):
+    return call("/gazebo/get_joint_properties", GetJointProperties, name)
+
+
+class StandInTest(unittest.TestCase):
+    def setUp(self):
+        call("/gazebo/pause_physics", Empty)
+        self.assertTrue(spawn().success)
+        self.listeners = []
+
+    def tearDown(self):
+        for listener in self.listeners:
+            listener.close()
+        call("/gazebo/pause_physics", Empty)
+        for name in ("cartpole", "second"):
+            call("/gazebo/delete_model", DeleteModel, name)
+
+    def listen(self, topic, kind, connected=True):
+        listener = Listener(topic, kind)
+        self.listeners.append(listener)
+        if connected:
+            self.assertTrue(listener.wait_connected(), f"nobody publishes {topic}")
+        return listener
+
+    def start_controllers(self):
+        for name in CONTROLLERS:
+            self.assertTrue(call("/controller_manager/load_controller", LoadController, name).ok)
+        answer = call("/controller_manager/switch_controller", SwitchController,
+                      CONTROLLERS, [], STRICT, False, 0.0)  # fmt: skip
+        self.assertTrue(answer.ok)
+
+    # the world
+
+    def test_world_properties(self):
+        world = call("/gazebo/get_world_properties", GetWorldProperties)
+        self.assertEqual(world.model_names, ["ground_plane", "cartpole"])
+        self.assertTrue(world.success and world.rendering_enabled)
+        self.assertEqual(world.status_message, "GetWorldProperties: got properties")
+
+    def test_model_state_counts_calls_and_knows_frames(self):
+        first = call("/gazebo/get_model_state", GetModelState, "cartpole", "")
+        second = call("/gazebo/get_model_state", GetModelState, "cartpole", "cartpole::pole")
+        self.assertEqual(second.header.seq, first.header.seq + 1)
+        self.assertEqual(second.header.frame_id, "cartpole::pole")
+        self.assertAlmostEqual(second.pose.position.z, -0.18, places=6)
+        self.assertEqual(second.status_message, "GetModelState: got properties")
+        gone = call("/gazebo/get_model_state", GetModelState, "nobody", "")
+        self.assertEqual((gone.success, gone.status_message), (False, "GetModelState: model does not exist"))
+        lost = call("/gazebo/get_model_state", GetModelState, "cartpole", "nowhere")
+        self.assertFalse(lost.success)
+        self.assertIn("relative_entity_name not found", lost.status_message)
+
+    def test_joint_properties(self):
+        place(0.1, 0.2)
+        found = joint("cartpole::cart_pole")
+        self.assertEqual((found.type, list(found.damping)), (0, []))
+        self.assertEqual((list(found.position), list(found.rate)), ([0.2], [0.0]))
+        self.assertEqual(found.status_message, "GetJointProperties: got properties")
+        self.assertEqual(joint("elbow").status_message, "GetJointProperties: joint not found")
+
+    def test_model_configuration(self):
+        self.assertEqual(place(0.7, 0.1).status_message, "SetModelConfiguration: success")
+        self.assertEqual(list(joint("stand_cart").position), [0.5])  # clamped
+        service = "/gazebo/set_model_configuration"
+        answer = call(service, SetModelConfiguration, "nobody", "", [], [])
+        self.assertEqual(answer.status_message, "SetModelConfiguration: model does not exist")
+        answer = call(service, SetModelConfiguration, "cartpole", "", ["cart_pole"], [])
+        self.assertEqual(
+            answer.status_message,
+            "SetModelConfiguration: joint name and position list have different lengths",
+        )
+        answer = call(service, SetModelConfiguration, "cartpole", "", ["elbow"], [1.0])
+        self.assertTrue(answer.success)
+        answer = call(service, SetModelConfiguration, "cartpole", "", ["cart_pole"], [float("nan")])
+        self.assertFalse(answer.success)
+        self.assertEqual(list(joint("cart_pole").position), [0.1])
+
+    # spawning
+
+    def test_a_name_is_taken_once(self):
+        answer = spawn()
+        self.assertFalse(answer.success)
+        self.assertEqual(answer.status_message, "SpawnModel: Failure - entity already exists.")
+
+    def test_spawn_refuses_what_it_cannot_read(self):
+        for xml, text in (
+            ("<sdf/>", "entity format is invalid"),
+            ("no xml", "entity format is invalid"),
+            ('<robot><link name="a"/><mesh filename="package://no_such_pkg/m.stl"/></robot>',
+             "urdf reference package name does not exist: no_such_pkg"),
+        ):  # fmt: skip
+            with self.assertRaisesRegex(rospy.ServiceException, text):
+                spawn("other", xml)
+        for xml, text in (
+            ("<robot", "not well-formed"),
+            ('<robot><joint name="j" type="revolute"/></robot>', "joint 'j'"),
+            ("<robot/>", "no <link>"),
+            ('<robot><link name="a"/></robot>', "no mass"),
+        ):
+            with self.subTest(xml):
+                answer = spawn("other", xml)
+                self.assertFalse(answer.success)
+                self.assertIn(text, answer.status_message)
+        world = call("/gazebo/get_world_properties", GetWorldProperties)
+        self.assertEqual(world.model_names, ["ground_plane", "cartpole"])
+
+    def test_a_second_robot_in_the_same_namespace_stands_without_control(self):
+        self.start_controllers()
+        self.assertTrue(spawn("second").success)
+        world = call("/gazebo/get_world_properties", GetWorldProperties)
+        self.assertEqual(world.model_names, ["ground_plane", "cartpole", "second"])
+        self.assertTrue(call("/gazebo/delete_model", DeleteModel, "second").success)
+        listed = call("/controller_manager/list_controllers", ListControllers).controller
+        self.assertEqual([c.state for c in listed], ["running", "running"])
+
+    def test_spawn_frames(self):
+        pose = Pose(position=Point(0.0, 1.0, 0.0))
+        answer = spawn("second", initial_pose=pose, reference_frame="cartpole::cart")
+        self.assertTrue(answer.success, answer.status_message)
+        state = call("/gazebo/get_model_state", GetModelState, "second", "world")
+        self.assertAlmostEqual(state.pose.position.y, 1.0, places=6)
+        self.assertAlmostEqual(state.pose.position.z, 0.15, places=6)
+        call("/gazebo/delete_model", DeleteModel, "second")
+        answer = spawn("second", initial_pose=pose, reference_frame="nowhere")
+        self.assertFalse(answer.success)
+        self.assertIn("reference_frame not found", answer.status_message)
+
+    def test_delete_takes_the_controller_manager_along(self):
+        rospy.wait_for_service("/controller_manager/list_controllers", BOUND)
+        answer = call("/gazebo/delete_model", DeleteModel, "cartpole")
+        self.assertEqual(answer.status_message, "DeleteModel: successfully deleted model")
+        with self.assertRaises(rospy.ROSException):
+            rospy.wait_for_service("/controller_manager/list_controllers", 0.2)
+        answer = call("/gazebo/delete_model", DeleteModel, "cartpole")
+        self.assertEqual(answer.status_message, "DeleteModel: model does not exist")
+
+    # time
+
+    def test_nothing_is_published_while_paused_and_clock_moves_on_unpause(self):
+        clock = self.listen("/clock", Clock)
+        models = self.listen("/gazebo/model_states", ModelStates)
+        before = call("/gazebo/get_world_properties", GetWorldProperties).sim_time
+        self.assertFalse(clock.wait_for(len, bound=0.3))
+        self.assertEqual(models.messages, [])
+        call("/gazebo/unpause_physics", Empty)
+        self.assertTrue(clock.wait_for(lambda m: len(m) >= 50))
+        self.assertTrue(models.wait_for(lambda m: len(m) >= 50))
+        call("/gazebo/pause_physics", Empty)
+        self.assertEqual(models.messages[-1].name, ["ground_plane", "cartpole"])
+        self.assertAlmostEqual(clock.messages[0].clock.to_sec(), before + 0.001, places=6)
+        stamps = [m.clock.to_nsec() for m in clock.messages]
+        gaps = [b - a for a, b in zip(stamps, stamps[1:])]
+        # One message a tick; a busy host may lose some to the queue's bound, as with Gazebo.
+        self.assertEqual(min(gaps), 1_000_000)
+        self.assertGreater(gaps.count(1_000_000), len(gaps) / 2)
+
+    def test_link_states(self):
+        links = self.listen("/gazebo/link_states", LinkStates)
+        call("/gazebo/unpause_physics", Empty)
+        self.assertTrue(links.wait_for(len))
+        self.assertEqual(
+            links.messages[0].name,
+            ["ground_plane::link", "cartpole::stand", "cartpole::cart", "cartpole::pole"],
+        )
+
+    def test_reset_simulation_returns_time_and_joints_to_zero_and_states_keep_coming(self):
+        self.start_controllers()
+        states = self.listen("/joint_states", JointState)
+        place(0.0, 0.1)
+        call("/gazebo/unpause_physics", Empty)
+        self.assertTrue(states.wait_for(lambda m: m[-1].position[0] > 0.2))
+        call("/gazebo/reset_simulation", Empty)
+        states.messages.clear()
+        self.assertTrue(states.wait_for(lambda m: len(m) >= 24))
+        self.assertLess(states.messages[-1].header.stamp.to_sec(), 1.0)
+        self.assertEqual(states.messages[-1].position, (0.0, 0.0))
+
+    def test_reset_world_keeps_time_and_joint_positions(self):
+        place(0.2, 0.1)
+        call("/gazebo/unpause_physics", Empty)
+        self.assertTrue(wait_until(lambda: abs(joint("cart_pole").position[0]) > 0.11))
+        call("/gazebo/pause_physics", Empty)
+        before = joint("cart_pole").position[0]
+        time = call("/gazebo/get_world_properties", GetWorldProperties).sim_time
+        call("/gazebo/reset_world", Empty)
+        after = joint("cart_pole")
+        self.assertEqual((after.position[0], after.rate[0]), (before, 0.0))
+        self.assertEqual(call("/gazebo/get_world_properties", GetWorldProperties).sim_time, time)
+
+    # control
+
+    def test_the_manager_offers_its_six_services(self):
+        for name in MANAGER:
+            rospy.wait_for_service(f"/controller_manager/{name}", BOUND)
+
+    def test_controllers_start_while_paused_and_hold_then_follow(self):
+        self.start_controllers()
+        listed = call("/controller_manager/list_controllers", ListControllers).controller
+        self.assertEqual([(c.name, c.state) for c in listed], [(c, "running") for c in CONTROLLERS])
+        states = self.listen("/joint_states", JointState)
+        call("/gazebo/unpause_physics", Empty)
+        self.assertTrue(states.wait_for(len))
+        self.assertEqual(states.messages[0].name, ["cart_pole", "stand_cart"])
+        self.assertEqual(len(states.messages[0].effort), 2)
+        command = rospy.Publisher("/stand_cart_position_controller/command", Float64, queue_size=1)
+        self.assertTrue(wait_until(command.get_num_connections))
+        command.publish(0.1)
+        self.assertTrue(states.wait_for(lambda m: m[-1].position[1] > 0.09))
+        self.assertFalse(call("/controller_manager/unload_controller", UnloadController, CONTROLLERS[0]).ok)
+        self.assertFalse(call("/controller_manager/load_controller", LoadController, "nobody").ok)
+        self.assertFalse(call("/controller_manager/load_controller", LoadController, "").ok)
+
+    def test_a_service_that_moves_joints_reports_them_at_once_while_paused(self):
+        self.start_controllers()
+        states = self.listen("/joint_states", JointState)
+        place(0.1, 0.05)
+        self.assertTrue(states.wait_for(lambda m: m and m[-1].position == (0.05, 0.1), bound=2.0))
+        self.assertEqual(states.messages[-1].velocity, (0.0, 0.0))
+
+    def test_an_episode_starts_without_a_kick(self):
+        self.start_controllers()
+        command = rospy.Publisher("/stand_cart_position_controller/command", Float64, queue_size=1)
+        self.assertTrue(wait_until(command.get_num_connections))
+        call("/gazebo/unpause_physics", Empty)
+        command.publish(0.3)
+        self.assertTrue(wait_until(lambda: joint("stand_cart").position[0] > 0.2))
+        place(0.0, 0.0)
+        self.assertFalse(wait_until(lambda: abs(joint("stand_cart").position[0]) > 1e-6, bound=0.3))
+
+    def test_a_nan_command_lets_go_and_the_world_stays_whole(self):
+        self.start_controllers()
+        states = self.listen("/joint_states", JointState)
+        command = rospy.Publisher("/stand_cart_position_controller/command", Float64, queue_size=1)
+        self.assertTrue(wait_until(command.get_num_connections))
+        call("/gazebo/unpause_physics", Empty)
+        command.publish(float("nan"))
+        command.publish(float("nan"))
+        self.assertTrue(states.wait_for(lambda m: len(m) > 20))
+        self.assertTrue(all(p == p for m in states.messages for p in m.position + m.velocity + m.effort))
+        command.publish(0.1)
+        self.assertTrue(states.wait_for(lambda m: m[-1].position[1] > 0.05))
+
+
+if __name__ == "__main__":
+    rospy.init_node("stand_in_test")
+    rostest.rosrun("cartpole", "stand_in", StandInTest)

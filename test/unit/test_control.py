@@ -1,0 +1,205 @@
+"""Angles, limits, robot descriptions and the two controllers, as ros_control.md has them."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from robots import cartpole_urdf
+
+from bullet_gazebo.control.angles import normalized, shortest_distance, shortest_distance_within
+from bullet_gazebo.control.controllers import BUILT_IN
+from bullet_gazebo.control.description import read_description
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
+from bullet_gazebo.control.limits import effort_enforcer
+
+MS = 1_000_000  # [ns]
+STATE = "joint_state_controller/JointStateController"
+POSITION = "effort_controllers/JointPositionController"
+
+
+@pytest.fixture
+def hardware():
+    return RobotHardware(read_description(cartpole_urdf()))
+
+
+def collect(controller, index=0):
+    samples = []
+    controller.outputs[index].sink = samples.append
+    return samples
+
+
+def position_controller(hardware, joint="stand_cart", **pid):
+    params = {"joint": joint, "pid": {"p": 100.0, "i": 0.01, "d": 10.0} | pid}
+    controller = BUILT_IN[POSITION].create("c", params, hardware)
+    controller.starting(0)
+    return controller
+
+
+@given(st.floats(-100, 100))
+def test_normalized_is_the_same_angle_within_half_a_turn(angle):
+    assert -math.pi < normalized(angle) <= math.pi
+    assert math.cos(normalized(angle) - angle) == pytest.approx(1.0)
+
+
+def test_distances_between_angles():
+    assert shortest_distance(0.0, 20 * math.pi) == pytest.approx(0.0, abs=1e-9)
+    assert shortest_distance(0.0, math.pi) == math.pi
+    assert shortest_distance(0.0, -math.pi) == math.pi
+    assert shortest_distance(3.0, -3.0) == pytest.approx(2 * math.pi - 6.0)
+    # The short way round leaves the limits, so the long one is taken.
+    assert shortest_distance_within(3.0, -3.0, -3.1, 3.1) == pytest.approx(-6.0)
+    assert shortest_distance_within(0.0, 1.0, -0.5, 0.5) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity", "command", "wanted"),
+    [
+        (0.0, 0.0, 100.0, 30.0), (0.0, 0.0, -100.0, -30.0), (0.0, 0.0, 5.0, 5.0),
+        (0.6, 0.0, 5.0, 0.0), (0.6, 0.0, -5.0, -5.0), (-0.6, 0.0, -5.0, 0.0), (-0.6, 0.0, 5.0, 5.0),
+        (0.0, 8.0, 5.0, 0.0), (0.0, 8.0, -5.0, -5.0), (0.0, -8.0, -5.0, 0.0), (0.0, -8.0, 5.0, 5.0),
+    ],
+)  # fmt: skip
+def test_effort_saturation_only_blocks_pushing_further(position, velocity, command, wanted):
+    joint = JointHandle("j", "prismatic", JointLimits(-0.5, 0.5, 7.0, 30.0))
+    joint.position, joint.velocity, joint.command = position, velocity, command
+    effort_enforcer(joint.limits)(joint)
+    assert joint.command == wanted
+
+
+def test_soft_limits_brake_before_the_end():
+    limits = JointLimits(-1.0, 1.0, 2.0, 30.0, SoftLimits(-0.9, 0.9, 10.0, 20.0))
+    joint = JointHandle("j", "revolute", limits)
+    # At 0.85 rad at most 10 * 0.05 = 0.5 rad/s are allowed; at 1 rad/s that is braked with 20 * 0.5 N m.
+    joint.position, joint.velocity, joint.command = 0.85, 1.0, 30.0
+    effort_enforcer(limits)(joint)
+    assert joint.command == pytest.approx(-10.0)
+
+
+def test_without_limits_nothing_is_enforced():
+    assert effort_enforcer(JointLimits()) is None
+
+
+def test_the_description_gives_joints_limits_and_transmissions():
+    description = read_description(cartpole_urdf())
+    assert description.joints["stand_cart"].limits == JointLimits(-0.5, 0.5, 7.0, 30.0)
+    assert description.joints["cart_pole"].limits == JointLimits(None, None, 7.0, 30.0)
+    assert [t.joint for t in description.transmissions] == ["stand_cart", "cart_pole"]
+
+
+def test_parameters_override_limits_field_by_field():
+    params = {"stand_cart": {"has_effort_limits": True, "max_effort": 3, "has_position_limits": False}}
+    limits = read_description(cartpole_urdf()).limited_by(params).joints["stand_cart"].limits
+    assert limits == JointLimits(None, None, 7.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "warning"),
+    [
+        ('<actuator name="m1"/>', "", "no named <actuator>"),
+        ("transmission_interface/SimpleTransmission", " ", "needs a name and a <type>"),
+        ("hardware_interface/Effort", "Effort", "is deprecated"),
+    ],
+)
+def test_odd_transmissions_are_skipped_with_a_warning(old, new, warning):
+    assert any(warning in text for text in read_description(cartpole_urdf().replace(old, new)).warnings)
+
+
+def test_an_unknown_interface_is_fatal():
+    with pytest.raises(ControlError, match="NoJointInterface"):
+        read_description(cartpole_urdf().replace("EffortJointInterface", "NoJointInterface"))
+
+
+def test_joint_states_come_in_alphabetical_order_at_120_hz_on_the_tick_grid(hardware):
+    controller = BUILT_IN[STATE].create("jsc", {"publish_rate": 120}, hardware)
+    samples = collect(controller)
+    controller.starting(0)
+    for tick in range(1, 10_001):
+        controller.update(tick * MS, 0.001)
+    assert samples[0].names == ("cart_pole", "stand_cart")
+    stamps = [sample.stamp // MS for sample in samples]
+    assert stamps[0] == 1
+    assert {b - a for a, b in zip(stamps, stamps[1:])} == {8, 9}
+    assert len(samples) == 1201  # one at the start, then 120 a second
+
+
+def test_joint_states_keep_coming_after_time_went_back(hardware):
+    controller = BUILT_IN[STATE].create("jsc", {"publish_rate": 100}, hardware)
+    samples = collect(controller)
+    controller.starting(100_000 * MS)
+    controller.joints_moved(0)
+    for tick in range(1, 101):
+        controller.update(tick * MS, 0.001)
+    assert len(samples) == 10
+
+
+def test_extra_joints_stand_last_and_bad_ones_are_left_out(hardware):
+    extra = [
+        {"name": "wheel", "position": 1.0, "velocity": 2.0},
+        {"name": "int", "position": 1},
+        {"name": "stand_cart", "position": 1.0},
+    ]
+    params = {"publish_rate": 50, "joints": ["stand_cart"], "extra_joints": extra}
+    sample = BUILT_IN[STATE].create("jsc", params, hardware).sample(0)
+    assert sample.names == ("stand_cart", "wheel")
+    assert sample.positions == (0.0, 1.0)
+    assert sample.velocities == (0.0, 2.0)
+
+
+@pytest.mark.parametrize("params", [{}, {"publish_rate": "120"}, {"publish_rate": 1, "joints": ["x"]}])
+def test_bad_joint_state_parameters_are_refused(hardware, params):
+    with pytest.raises(ControlError):
+        BUILT_IN[STATE].create("jsc", params, hardware)
+
+
+def test_a_position_controller_starts_by_holding_what_it_finds(hardware):
+    joint = hardware.joints["stand_cart"]
+    joint.position = 0.2
+    controller = position_controller(hardware)
+    controller.update(MS, 0.001)
+    assert (controller.set_point, joint.command) == (0.2, 0.0)
+
+
+def test_a_set_point_beyond_the_rail_is_clamped_but_not_the_angle_of_a_continuous_joint(hardware):
+    cart, pole = position_controller(hardware), position_controller(hardware, "cart_pole")
+    samples = collect(cart), collect(pole)
+    for controller in (cart, pole):
+        controller.command(2.0)
+        controller.update(MS, 0.001)
+    assert [s[0].set_point for s in samples] == [0.5, 2.0]
+
+
+def test_a_pole_takes_the_short_way_round(hardware):
+    controller = position_controller(hardware, "cart_pole", d=0.0)
+    controller.command(20 * math.pi + 0.1)
+    controller.update(MS, 0.001)
+    assert controller.joint.command == pytest.approx(10.0)
+
+
+def test_state_is_reported_on_every_tenth_update(hardware):
+    controller = position_controller(hardware)
+    samples = collect(controller)
+    controller.command(0.05)
+    for tick in range(1, 31):
+        controller.update(tick * MS, 0.001)
+    assert [s.stamp // MS for s in samples] == [1, 11, 21]
+    first = samples[0]
+    assert (first.error, first.command) == (pytest.approx(0.05), pytest.approx(505.0))
+    assert (first.p, first.i, first.d, first.i_clamp, first.antiwindup) == (100.0, 0.01, 10.0, 0.0, False)
+
+
+@pytest.mark.parametrize(
+    "params",
+    [
+        {"pid": {"p": 1.0}},
+        {"joint": "elbow", "pid": {"p": 1.0}},
+        {"joint": "stand_cart"},
+        {"joint": "stand_cart", "pid": {"i": 1.0}},
+        {"joint": 7, "pid": {"p": 1.0}},
+    ],
+)
+def test_bad_position_controller_parameters_are_refused(hardware, params):
+    with pytest.raises(ControlError):
+        BUILT_IN[POSITION].create("c", params, hardware)

@@ -1,0 +1,138 @@
+"""The controller manager's table of cases (ros_control.md sections 1.3 to 1.7)."""
+
+import pytest
+from robots import cartpole_urdf
+
+from bullet_gazebo.control.description import read_description
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.manager import BEST_EFFORT, STRICT, ControllerManager
+
+PARAMS = {
+    "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 120},
+    "cart": {
+        "type": "effort_controllers/JointPositionController", "joint": "stand_cart", "pid": {"p": 1.0},
+    },
+    "cart2": {
+        "type": "effort_controllers/JointPositionController", "joint": "stand_cart", "pid": {"p": 2.0},
+    },
+    "pole": {
+        "type": "effort_controllers/JointPositionController", "joint": "cart_pole", "pid": {"p": 3.0},
+    },
+}  # fmt: skip
+
+
+@pytest.fixture
+def manager():
+    manager = ControllerManager(RobotHardware(read_description(cartpole_urdf())))
+    for name, params in PARAMS.items():
+        manager.load(name, params)
+    return manager
+
+
+def states(manager):
+    return {entry.name: entry.state for entry in manager.listed()}
+
+
+def test_loaded_controllers_are_listed_in_load_order_with_their_claims(manager):
+    listed = manager.listed()
+    assert [entry.name for entry in listed] == list(PARAMS)
+    assert {entry.state for entry in listed} == {"initialized"}
+    assert listed[0].claims == (("hardware_interface::JointStateInterface", ()),)
+    assert listed[1].claims == (("hardware_interface::EffortJointInterface", ("stand_cart",)),)
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "text"),
+    [
+        ("cart", PARAMS["cart"], "already loaded"),
+        ("new", None, "type was not specified"),
+        ("new", {"joint": "stand_cart"}, "type was not specified"),
+        ("new", {"type": "no/Such"}, "does not exist"),
+        ("new", PARAMS["cart"] | {"joint": "elbow"}, "Initializing controller 'new' failed"),
+    ],
+)
+def test_what_cannot_be_loaded_is_refused_and_leaves_no_trace(manager, name, params, text):
+    before = manager.listed()
+    with pytest.raises(ControlError, match=text):
+        manager.load(name, params)
+    assert manager.listed() == before
+
+
+def test_start_and_stop(manager):
+    manager.switch(["states", "cart"], [], STRICT)
+    assert states(manager) == {
+        "states": "running", "cart": "running", "cart2": "initialized", "pole": "initialized",
+    }  # fmt: skip
+    manager.switch(["cart2"], ["cart"], STRICT)
+    assert states(manager)["cart"] == "stopped"
+    assert states(manager)["cart2"] == "running"
+
+
+@pytest.mark.parametrize(
+    ("start", "stop"),
+    [(["nobody"], []), ([], ["nobody"]), ([], ["pole"]), (["cart"], []), (["cart"], ["cart"]), (["cart2"], [])],
+)
+def test_strict_refuses_and_changes_nothing(manager, start, stop):
+    manager.switch(["cart"], [], STRICT)
+    before = states(manager)
+    with pytest.raises(ControlError):
+        manager.switch(start, stop, STRICT)
+    assert states(manager) == before
+
+
+def test_best_effort_does_what_it_can(manager):
+    manager.switch(["cart", "nobody"], ["pole"], BEST_EFFORT)
+    assert states(manager)["cart"] == "running"
+    manager.switch([], [], BEST_EFFORT)
+
+
+def test_best_effort_starts_a_running_controller_anew(manager):
+    manager.switch(["cart"], [], STRICT)
+    cart = manager.get("cart")
+    cart.command(0.3)
+    for stop in ([], ["cart"]):
+        cart.command(0.3)
+        manager.switch(["cart"], stop, BEST_EFFORT)
+        assert cart.set_point == 0.0
+        assert states(manager)["cart"] == "running"
+
+
+@pytest.mark.parametrize("strictness", [BEST_EFFORT, STRICT])
+def test_a_joint_has_one_master(manager, strictness):
+    manager.switch(["cart"], [], STRICT)
+    with pytest.raises(ControlError, match="both claim joint 'stand_cart'"):
+        manager.switch(["pole", "cart2"], [], strictness)
+    assert states(manager)["pole"] == "initialized"
+
+
+def test_unload(manager):
+    manager.switch(["cart"], [], STRICT)
+    for name in ("cart", "nobody"):
+        with pytest.raises(ControlError):
+            manager.unload(name)
+    manager.switch([], ["cart"], STRICT)
+    manager.unload("cart")
+    manager.load("cart", PARAMS["cart"])
+    assert [entry.name for entry in manager.listed()] == ["states", "cart2", "pole", "cart"]
+
+
+def test_a_stopped_controller_leaves_its_last_command(manager):
+    manager.switch(["cart"], [], STRICT)
+    manager.get("cart").command(0.5)
+    manager.update(1, 0.001)
+    manager.switch([], ["cart"], STRICT)
+    manager.update(2, 0.001)
+    assert manager.hardware.joints["stand_cart"].command == 0.5
+
+
+def test_moved_joints_relatch_running_controllers(manager):
+    manager.switch(["cart"], [], STRICT)
+    joint, cart = manager.hardware.joints["stand_cart"], manager.get("cart")
+    cart.command(0.5)
+    manager.update(1, 0.001)
+    joint.position = -0.1
+    manager.joints_moved(2, relatch=False)
+    assert (cart.set_point, joint.command) == (0.5, 0.5)
+    manager.joints_moved(2, relatch=True)
+    assert (cart.set_point, joint.command) == (-0.1, 0.0)
