@@ -14,7 +14,9 @@ CHECKSUM=${CHECKSUM%% *}
 ROOT=$CHECKOUT
 if [[ $CHECKOUT == *[[:space:]]* || ${#CHECKOUT} -gt 90 ]]; then
     ROOT=/tmp/cartpole-$UID-$CHECKSUM
-    if [[ ! $ROOT -ef $CHECKOUT ]] && ! ln -s -- "$CHECKOUT" "$ROOT"; then
+    [[ -e $ROOT || -L $ROOT ]] || ln -s -- "$CHECKOUT" "$ROOT"
+    # Whoever owns the link could lead it elsewhere later.
+    if [[ ! $ROOT -ef $CHECKOUT || $(stat --format %u -- "$ROOT") -ne $UID ]]; then
         echo "ws: $ROOT is in the way of a link to $CHECKOUT; remove it" >&2
         exit 1
     fi

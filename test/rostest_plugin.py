@@ -80,9 +80,7 @@ def run(path: Path, folder: Path) -> None:
         try:
             code = process.wait(limit)
         except subprocess.TimeoutExpired:
-            raise RostestFailure(
-                f"{path.name}: no end after {limit:.0f} s\n{tail(log)}"
-            ) from None
+            raise RostestFailure(f"{path.name}: no end after {limit:.0f} s\n{tail(log)}") from None
         finally:
             end(process)
     problems = read_results(results)

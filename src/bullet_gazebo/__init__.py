@@ -1,1 +1,1 @@
-"""A stand-in for Gazebo classic, backed by PyBullet, that speaks Gazebo's and ros_control's ROS interfaces."""
+"""A stand-in for Gazebo classic: PyBullet behind Gazebo's and ros_control's ROS interfaces."""

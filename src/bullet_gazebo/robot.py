@@ -19,7 +19,9 @@ class Robot:
         indices = {name: index for index, name in enumerate(model.joint_names)}
         missing = sorted(set(hardware.joints) - set(indices))
         if missing:
-            raise ControlError(f"model '{model.name}' has no joint {missing}, which a transmission names")
+            raise ControlError(
+                f"model '{model.name}' has no joint {missing}, which a transmission names"
+            )
         self._joints = [(joint, indices[name]) for name, joint in hardware.joints.items()]
         self._efforts = [0.0] * len(indices)
         self.read()

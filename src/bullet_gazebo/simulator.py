@@ -40,7 +40,9 @@ class Simulator:
         self.relatch = relatch
         self.now = 0  # [ns] of simulated time
         self.robots: list[Robot] = []
-        self.listeners: list[Callable[[int], None]] = []  # called with `now` before each physics step
+        self.listeners: list[
+            Callable[[int], None]
+        ] = []  # called with `now` before each physics step
         self._period = round(world.time_step * NANOSECONDS)
         self._paused = False
         self._flowing = threading.Event()  # set while time runs by itself
@@ -91,7 +93,9 @@ class Simulator:
         Errors: StepRefused if time runs by itself; ValueError for less than one tick.
         """
         if not self.lockstep:
-            raise StepRefused("the world runs in real time; start it with lockstep:=true to step it")
+            raise StepRefused(
+                "the world runs in real time; start it with lockstep:=true to step it"
+            )
         if ticks < 1:
             raise ValueError(f"ticks is {ticks}: at least 1 is needed")
         for _ in range(ticks):

@@ -6,11 +6,12 @@ import unittest
 
 import rospy
 import rostest
-from cartpole.srv import StepWorld
 from controller_manager_msgs.srv import LoadController, SwitchController
 from gazebo_msgs.srv import GetWorldProperties, SpawnModel, SpawnModelRequest
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
+
+from cartpole.srv import StepWorld
 
 BOUND = 20.0  # [s of wall time]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"

@@ -3,6 +3,7 @@
 
 import threading
 import unittest
+from itertools import pairwise
 
 import rospy
 import rostest
@@ -132,7 +133,9 @@ class StandInTest(unittest.TestCase):
         self.assertAlmostEqual(second.pose.position.z, -0.18, places=6)
         self.assertEqual(second.status_message, "GetModelState: got properties")
         gone = call("/gazebo/get_model_state", GetModelState, "nobody", "")
-        self.assertEqual((gone.success, gone.status_message), (False, "GetModelState: model does not exist"))
+        self.assertEqual(
+            (gone.success, gone.status_message), (False, "GetModelState: model does not exist")
+        )
         lost = call("/gazebo/get_model_state", GetModelState, "cartpole", "nowhere")
         self.assertFalse(lost.success)
         self.assertIn("relative_entity_name not found", lost.status_message)
@@ -236,7 +239,7 @@ class StandInTest(unittest.TestCase):
         self.assertEqual(models.messages[-1].name, ["ground_plane", "cartpole"])
         self.assertAlmostEqual(clock.messages[0].clock.to_sec(), before + 0.001, places=6)
         stamps = [m.clock.to_nsec() for m in clock.messages]
-        gaps = [b - a for a, b in zip(stamps, stamps[1:])]
+        gaps = [b - a for a, b in pairwise(stamps)]
         # One message a tick; a busy host may lose some to the queue's bound, as with Gazebo.
         self.assertEqual(min(gaps), 1_000_000)
         self.assertGreater(gaps.count(1_000_000), len(gaps) / 2)
@@ -293,7 +296,9 @@ class StandInTest(unittest.TestCase):
         self.assertTrue(wait_until(command.get_num_connections))
         command.publish(0.1)
         self.assertTrue(states.wait_for(lambda m: m[-1].position[1] > 0.09))
-        self.assertFalse(call("/controller_manager/unload_controller", UnloadController, CONTROLLERS[0]).ok)
+        self.assertFalse(
+            call("/controller_manager/unload_controller", UnloadController, CONTROLLERS[0]).ok
+        )
         self.assertFalse(call("/controller_manager/load_controller", LoadController, "nobody").ok)
         self.assertFalse(call("/controller_manager/load_controller", LoadController, "").ok)
 
@@ -323,7 +328,9 @@ class StandInTest(unittest.TestCase):
         command.publish(float("nan"))
         command.publish(float("nan"))
         self.assertTrue(states.wait_for(lambda m: len(m) > 20))
-        self.assertTrue(all(p == p for m in states.messages for p in m.position + m.velocity + m.effort))
+        self.assertTrue(
+            all(p == p for m in states.messages for p in m.position + m.velocity + m.effort)
+        )
         command.publish(0.1)
         self.assertTrue(states.wait_for(lambda m: m[-1].position[1] > 0.05))
 

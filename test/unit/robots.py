@@ -56,9 +56,11 @@ def cartpole_urdf() -> str:
     <child link="pole"/><axis xyz="0 -1 0"/>
     <limit lower="-0.785398" upper="0.785398" effort="30" velocity="7"/></joint>
   <transmission name="t1"><type>transmission_interface/SimpleTransmission</type>
-    <joint name="stand_cart"><hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface></joint>
-    <actuator name="m1"/></transmission>
+    <joint name="stand_cart">
+      <hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface>
+    </joint><actuator name="m1"/></transmission>
   <transmission name="t2"><type>transmission_interface/SimpleTransmission</type>
-    <joint name="cart_pole"><hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface></joint>
-    <actuator name="m2"/></transmission>
+    <joint name="cart_pole">
+      <hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface>
+    </joint><actuator name="m2"/></transmission>
 </robot>"""

@@ -44,7 +44,9 @@ def inside(path, room):
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SRC)))
 def test_nothing_imports_against_the_arrows(path):
-    forbidden = {package for room, packages in FORBIDDEN if inside(path, room) for package in packages}
+    forbidden = {
+        package for room, packages in FORBIDDEN if inside(path, room) for package in packages
+    }
     if not any(inside(path, room) for room in ROS_ROOMS):
         forbidden |= set(ROS)
     against = {name for name in imports(path) for package in forbidden if below(name, package)}

@@ -1,6 +1,7 @@
 """Angles, limits, robot descriptions and the two controllers, as ros_control.md has them."""
 
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -90,7 +91,9 @@ def test_the_description_gives_joints_limits_and_transmissions():
 
 
 def test_parameters_override_limits_field_by_field():
-    params = {"stand_cart": {"has_effort_limits": True, "max_effort": 3, "has_position_limits": False}}
+    params = {
+        "stand_cart": {"has_effort_limits": True, "max_effort": 3, "has_position_limits": False}
+    }
     limits = read_description(cartpole_urdf()).limited_by(params).joints["stand_cart"].limits
     assert limits == JointLimits(None, None, 7.0, 3.0)
 
@@ -104,7 +107,9 @@ def test_parameters_override_limits_field_by_field():
     ],
 )
 def test_odd_transmissions_are_skipped_with_a_warning(old, new, warning):
-    assert any(warning in text for text in read_description(cartpole_urdf().replace(old, new)).warnings)
+    assert any(
+        warning in text for text in read_description(cartpole_urdf().replace(old, new)).warnings
+    )
 
 
 def test_an_unknown_interface_is_fatal():
@@ -121,7 +126,7 @@ def test_joint_states_come_in_alphabetical_order_at_120_hz_on_the_tick_grid(hard
     assert samples[0].names == ("cart_pole", "stand_cart")
     stamps = [sample.stamp // MS for sample in samples]
     assert stamps[0] == 1
-    assert {b - a for a, b in zip(stamps, stamps[1:])} == {8, 9}
+    assert {b - a for a, b in pairwise(stamps)} == {8, 9}
     assert len(samples) == 1201  # one at the start, then 120 a second
 
 
@@ -148,7 +153,9 @@ def test_extra_joints_stand_last_and_bad_ones_are_left_out(hardware):
     assert sample.velocities == (0.0, 2.0)
 
 
-@pytest.mark.parametrize("params", [{}, {"publish_rate": "120"}, {"publish_rate": 1, "joints": ["x"]}])
+@pytest.mark.parametrize(
+    "params", [{}, {"publish_rate": "120"}, {"publish_rate": 1, "joints": ["x"]}]
+)
 def test_bad_joint_state_parameters_are_refused(hardware, params):
     with pytest.raises(ControlError):
         BUILT_IN[STATE].create("jsc", params, hardware)
@@ -187,7 +194,13 @@ def test_state_is_reported_on_every_tenth_update(hardware):
     assert [s.stamp // MS for s in samples] == [1, 11, 21]
     first = samples[0]
     assert (first.error, first.command) == (pytest.approx(0.05), pytest.approx(505.0))
-    assert (first.p, first.i, first.d, first.i_clamp, first.antiwindup) == (100.0, 0.01, 10.0, 0.0, False)
+    assert (first.p, first.i, first.d, first.i_clamp, first.antiwindup) == (
+        100.0,
+        0.01,
+        10.0,
+        0.0,
+        False,
+    )
 
 
 @pytest.mark.parametrize(

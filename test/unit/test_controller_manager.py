@@ -71,7 +71,14 @@ def test_start_and_stop(manager):
 
 @pytest.mark.parametrize(
     ("start", "stop"),
-    [(["nobody"], []), ([], ["nobody"]), ([], ["pole"]), (["cart"], []), (["cart"], ["cart"]), (["cart2"], [])],
+    [
+        (["nobody"], []),
+        ([], ["nobody"]),
+        ([], ["pole"]),
+        (["cart"], []),
+        (["cart"], ["cart"]),
+        (["cart2"], []),
+    ],
 )
 def test_strict_refuses_and_changes_nothing(manager, start, stop):
     manager.switch(["cart"], [], STRICT)

@@ -83,7 +83,9 @@ def test_a_free_swing_keeps_its_energy():
     """Semi-implicit Euler: the energy swings with the step, but doesn't drift."""
     world, model = make_world(0.0005)
     robot = CartPole()
-    model.set_joint_positions({"cart_pole": math.pi - 0.5})  # hanging, so nothing hits the rail's ends
+    model.set_joint_positions(
+        {"cart_pole": math.pi - 0.5}
+    )  # hanging, so nothing hits the rail's ends
     world.delete("ground_plane")  # the pole is longer than the stand is high
 
     def energy():

@@ -84,7 +84,9 @@ def test_p_and_d_alone_are_what_they_say(errors, p, d):
     pid = Pid(Gains(p, 0.0, d))
     pid.clear()
     for error in errors:
-        assert pid.compute(error, 0.5) == pytest.approx(p * error + d * (error - last) / 0.5, abs=1e-9)
+        assert pid.compute(error, 0.5) == pytest.approx(
+            p * error + d * (error - last) / 0.5, abs=1e-9
+        )
         last = error
 
 

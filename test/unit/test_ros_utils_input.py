@@ -83,12 +83,12 @@ CONTRACT = {
 SIGNATURES = [
     (module, " ".join(signature.split()))
     for module, text in CONTRACT.items()
-    for signature in re.findall(r"\w+\([^)]*(?:\(\)[^)]*)?\)", text)
+    for signature in re.split(r"\n {8}(?=\w)", text)[1:]
 ]
 
 
 @pytest.mark.parametrize(
-    ("module", "signature"), SIGNATURES, ids=lambda value: str(value).split("(")[0]
+    ("module", "signature"), SIGNATURES, ids=[text.split("(")[0] for _, text in SIGNATURES]
 )
 def test_signature(module, signature):
     name = signature.split("(")[0]

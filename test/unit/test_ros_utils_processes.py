@@ -1,4 +1,4 @@
-"""Programs that ros_utils starts: remembered across processes, ended completely, and nobody else's."""
+"""Programs that ros_utils starts: remembered by all processes, ended completely, nobody else's."""
 
 import dataclasses
 import json

@@ -88,7 +88,9 @@ def test_lock_step_is_bit_for_bit_repeatable_across_resets(sim):
         for step in range(100):
             robot.manager.get("cart").command(0.02 * (step % 7))
             advance(sim, 8)
-            track.append([(j.position, j.velocity, j.effort) for j in robot.hardware.joints.values()])
+            track.append(
+                [(j.position, j.velocity, j.effort) for j in robot.hardware.joints.values()]
+            )
         runs.append(track)
     assert runs[0] == runs[1] == runs[2]
 

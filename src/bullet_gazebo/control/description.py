@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -33,7 +34,9 @@ class RobotDescription:
         """Returns the description with limits overridden from the tree `<ns>/joint_limits`."""
         tree = params if isinstance(params, Mapping) else {}
         joints = {
-            name: JointHandle(name, joint.kind, _overridden(joint.limits, tree.get(name), joint.kind))
+            name: JointHandle(
+                name, joint.kind, _overridden(joint.limits, tree.get(name), joint.kind)
+            )
             for name, joint in self.joints.items()
         }
         return replace(self, joints=joints)
@@ -86,7 +89,9 @@ def _float(element: Element, key: str) -> float:
     try:
         value = float(text)
     except ValueError as error:
-        raise ControlError(f"robot_description: <{element.tag} {key}='{text}'> is not a number") from error
+        raise ControlError(
+            f"robot_description: <{element.tag} {key}='{text}'> is not a number"
+        ) from error
     if not math.isfinite(value):
         raise ControlError(f"robot_description: <{element.tag} {key}='{text}'> is not finite")
     return value
@@ -112,7 +117,9 @@ def _transmission(element: Element, warnings: list[str]) -> Transmission | None:
         return None
     joint = joints[0].get("name", "")
     if len(interfaces) > 1:
-        warnings.append(f"Joint '{joint}' has several hardware interfaces; {interfaces[0]} is used.")
+        warnings.append(
+            f"Joint '{joint}' has several hardware interfaces; {interfaces[0]} is used."
+        )
     return Transmission(joint, _interface(interfaces[0], joint, warnings))
 
 
@@ -134,15 +141,20 @@ def _overridden(limits: JointLimits, params: object, kind: str) -> JointLimits:
     if not isinstance(params, Mapping):
         return limits
     if kind in ("revolute", "prismatic"):
-        limits = _override(limits, params, "position", {"lower": "min_position", "upper": "max_position"})
+        limits = _override(
+            limits, params, "position", {"lower": "min_position", "upper": "max_position"}
+        )
     limits = _override(limits, params, "velocity", {"velocity": "max_velocity"})
     return _override(limits, params, "effort", {"effort": "max_effort"})
 
 
-def _override(limits: JointLimits, params: Mapping, what: str, fields: dict[str, str]) -> JointLimits:
+def _override(
+    limits: JointLimits, params: Mapping, what: str, fields: dict[str, str]
+) -> JointLimits:
     switch = params.get(f"has_{what}_limits")
     if switch is False:
         return replace(limits, **dict.fromkeys(fields))
     if switch and all(isinstance(params.get(key), (int, float)) for key in fields.values()):
-        return replace(limits, **{field: float(params[key]) for field, key in fields.items()})
+        values: dict[str, Any] = {field: float(params[key]) for field, key in fields.items()}
+        return replace(limits, **values)
     return limits

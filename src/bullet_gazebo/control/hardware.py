@@ -42,7 +42,9 @@ class RobotHardware:
             raise ControlError(f"the robot has no hardware_interface::{interface}")
         if name not in joints:
             known = ", ".join(sorted(joints)) or "none"
-            raise ControlError(f"joint '{name}' is not in hardware_interface::{interface} (it has: {known})")
+            raise ControlError(
+                f"joint '{name}' is not in hardware_interface::{interface} (it has: {known})"
+            )
         return joints[name]
 
     def enforce_limits(self) -> None:

@@ -57,7 +57,9 @@ class ControllerManager:
     def load(self, name: str, params: object) -> Controller:
         """Makes controller `name` from the parameters `<ns>/<name>`."""
         if name in self._controllers:
-            raise ControlError(f"A controller named '{name}' was already loaded inside the controller manager")
+            raise ControlError(
+                f"A controller named '{name}' was already loaded inside the controller manager"
+            )
         kind = params.get("type") if isinstance(params, Mapping) else None
         if not isinstance(params, Mapping) or not isinstance(kind, str):
             raise ControlError(
@@ -83,7 +85,9 @@ class ControllerManager:
             raise ControlError(f"Could not unload controller '{name}' because it is still running")
         return self._controllers.pop(name)
 
-    def switch(self, start: Iterable[str], stop: Iterable[str], strictness: int = BEST_EFFORT) -> None:
+    def switch(
+        self, start: Iterable[str], stop: Iterable[str], strictness: int = BEST_EFFORT
+    ) -> None:
         """Stops and starts controllers as one act (section 1.6), also while the world is paused.
 
         A running controller that is in both lists, or in the start list under BEST_EFFORT, is restarted;
@@ -108,7 +112,12 @@ class ControllerManager:
     def listed(self) -> list[Listed]:
         """Returns the loaded controllers in load order."""
         return [
-            Listed(c.name, c.state, c.type_name, (Claim(f"hardware_interface::{c.interface}", c.claimed),))
+            Listed(
+                c.name,
+                c.state,
+                c.type_name,
+                (Claim(f"hardware_interface::{c.interface}", c.claimed),),
+            )
             for c in self._controllers.values()
         ]
 

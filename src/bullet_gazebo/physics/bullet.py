@@ -22,7 +22,9 @@ class BulletEngine(Engine):
     def __init__(self) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         # The order of contact pairs decides the solver's result: keep it the same in every run.
-        pybullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(
+            deterministicOverlappingPairs=1, physicsClientId=self._client
+        )
         self._step = partial(pybullet.stepSimulation, self._client)
 
     def load(self, description: ModelDescription, pose: Pose) -> "BulletBody":
@@ -30,7 +32,9 @@ class BulletEngine(Engine):
             return self._load_plane(description, pose)
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_MAINTAIN_LINK_ORDER
         if description.self_collide:
-            flags |= pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
+            flags |= (
+                pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
+            )
         with tempfile.TemporaryDirectory(prefix="bullet_gazebo_") as folder:
             path = Path(folder, "model.urdf")
             path.write_text(write_urdf(description), encoding="utf-8")
@@ -40,7 +44,9 @@ class BulletEngine(Engine):
                     flags=flags, physicsClientId=self._client,
                 )  # fmt: skip
             except pybullet.error as error:
-                raise DescriptionError(f"the physics engine can't load the model: {error}") from error
+                raise DescriptionError(
+                    f"the physics engine can't load the model: {error}"
+                ) from error
         return BulletBody(self._client, body, description, pose)
 
     def _load_plane(self, description: ModelDescription, pose: Pose) -> "BulletBody":
@@ -141,7 +147,11 @@ class BulletBody(Body):
         if index == BASE:
             return self._base_state()
         state = pybullet.getLinkState(
-            self.id, index, computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=self._client
+            self.id,
+            index,
+            computeLinkVelocity=1,
+            computeForwardKinematics=1,
+            physicsClientId=self._client,
         )
         pose = Pose(state[4], state[5])
         arm = subtract(pose.position, state[0])
@@ -156,5 +166,3 @@ class BulletBody(Body):
 
 def _is_plane(description: ModelDescription) -> bool:
     return any(s.kind == "plane" for link in description.links.values() for s in link.collisions)
-
-

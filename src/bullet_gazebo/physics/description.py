@@ -1,4 +1,4 @@
-"""What a model consists of, independent of the file format it came from and of the engine that simulates it."""
+"""What a model consists of, whatever file it came from and whatever engine simulates it."""
 
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element

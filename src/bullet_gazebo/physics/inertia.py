@@ -14,8 +14,8 @@ def combine(a: Inertia | None, b: Inertia | None) -> Inertia | None:
     if len(bodies) == 1:
         return bodies[0]
     mass = sum(body.mass for body in bodies)
-    com = sum(body.mass * np.array(body.com.position) for body in bodies) / mass
-    tensor = sum(_about(body, com) for body in bodies)
+    com = np.sum([body.mass * np.array(body.com.position) for body in bodies], axis=0) / mass
+    tensor = np.sum([_about(body, com) for body in bodies], axis=0)
     return Inertia(
         mass, Pose((float(com[0]), float(com[1]), float(com[2]))),
         ixx=float(tensor[0, 0]), ixy=float(tensor[0, 1]), ixz=float(tensor[0, 2]),

@@ -6,7 +6,13 @@ its name is gone. A root link called `world` stands for the world itself. Links 
 
 from dataclasses import replace
 
-from bullet_gazebo.physics.description import DescriptionError, Inertia, Link, ModelDescription, Shape
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    Inertia,
+    Link,
+    ModelDescription,
+    Shape,
+)
 from bullet_gazebo.physics.inertia import combine
 from bullet_gazebo.physics.pose import Pose
 
@@ -59,7 +65,10 @@ def _lumped(shape: Shape, pose: Pose, link: str) -> Shape:
 def _drop_free_joints(model: ModelDescription) -> None:
     """Gazebo makes no joint of a floating or planar one; a robot that hangs from the world by it is free."""
     for joint in [j for j in model.joints.values() if not j.movable]:
-        if joint.parent != WORLD or len([j for j in model.joints.values() if j.parent == WORLD]) > 1:
+        if (
+            joint.parent != WORLD
+            or len([j for j in model.joints.values() if j.parent == WORLD]) > 1
+        ):
             raise DescriptionError(
                 f"joint '{joint.name}': a {joint.kind} joint is only simulated as the free base of a robot"
             )
@@ -73,13 +82,17 @@ def _drop_massless(model: ModelDescription) -> None:
         if link is None or name == WORLD or (link.inertia is not None and link.inertia.mass > 0.0):
             continue
         if name == model.root and not model.static:
-            raise DescriptionError(f"link '{name}': the root link has no mass, so Gazebo drops the model")
+            raise DescriptionError(
+                f"link '{name}': the root link has no mass, so Gazebo drops the model"
+            )
         if name != model.root:
             _drop_subtree(model, link)
 
 
 def _drop_subtree(model: ModelDescription, link: Link) -> None:
-    model.warnings.append(f"link '{link.name}' has no mass: it is dropped with all that hangs from it")
+    model.warnings.append(
+        f"link '{link.name}' has no mass: it is dropped with all that hangs from it"
+    )
     doomed = [link.name]
     while doomed:
         name = doomed.pop()

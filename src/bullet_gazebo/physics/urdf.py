@@ -1,6 +1,8 @@
 """Reads URDF text (wiki.ros.org/urdf/XML) into a ModelDescription."""
 
 import math
+from collections.abc import Iterable
+from typing import TypeVar
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -18,6 +20,8 @@ from bullet_gazebo.physics.pose import Pose, from_rpy
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 WORLD = "world"
+
+Named = TypeVar("Named", Link, Joint)
 
 
 def parse_urdf(text: str, source: str = "URDF") -> ModelDescription:
@@ -52,8 +56,8 @@ def _model(robot: Element) -> ModelDescription:
     )
 
 
-def _unique(items, what: str) -> dict:
-    found: dict = {}
+def _unique(items: Iterable[Named], what: str) -> dict[str, Named]:
+    found: dict[str, Named] = {}
     for item in items:
         if item.name in found:
             raise DescriptionError(f"{what} '{item.name}' is there twice")
@@ -113,7 +117,9 @@ def _inertia(inertial: Element, place: str) -> Inertia:
         raise DescriptionError(f"{place}: <mass> is missing")
     if tensor is None:
         raise DescriptionError(f"{place}: <inertia> is missing")
-    values = {key: _number(tensor, key, place) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")}
+    values = {
+        key: _number(tensor, key, place) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    }
     value = _number(mass, "value", place, required=True)
     if value < 0.0 or min(values["ixx"], values["iyy"], values["izz"]) < 0.0:
         raise DescriptionError(f"{place}: mass and moments of inertia can't be negative")
@@ -208,8 +214,12 @@ def _plugins(robot: Element) -> list[Plugin]:
 
 
 def _flag(robot: Element, tag: str) -> bool:
-    values = [e.text for block in robot.findall("gazebo") if block.get("reference") is None
-              for e in block.findall(tag)]
+    values = [
+        e.text
+        for block in robot.findall("gazebo")
+        if block.get("reference") is None
+        for e in block.findall(tag)
+    ]
     return any((value or "").strip().lower() in ("true", "1") for value in values)
 
 

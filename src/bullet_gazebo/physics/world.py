@@ -27,7 +27,9 @@ class Entity(NamedTuple):
 class World:
     """All models and the engine under them. Not thread-safe: its owner serialises access."""
 
-    def __init__(self, engine: Engine, gravity: Vector = GRAVITY, time_step: float = TIME_STEP) -> None:
+    def __init__(
+        self, engine: Engine, gravity: Vector = GRAVITY, time_step: float = TIME_STEP
+    ) -> None:
         self.engine = engine
         self.models: dict[str, Model] = {}
         self._entities: dict[str, Entity] = {}

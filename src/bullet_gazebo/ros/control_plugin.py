@@ -29,7 +29,9 @@ class ControlPlugin:
         self._robot: Robot | None = None
         self._services: ControllerServices | None = None
         if not self._try_start():
-            threading.Thread(target=self._wait_and_start, name="robot_description", daemon=True).start()
+            threading.Thread(
+                target=self._wait_and_start, name="robot_description", daemon=True
+            ).start()
 
     def shutdown(self) -> None:
         self._gone.set()
@@ -66,7 +68,9 @@ class ControlPlugin:
                     self._start(str(text))
                 except ControlError as error:
                     rospy.logfatal(
-                        "gazebo_ros_control of model '%s' can't start: %s", self._context.model.name, error
+                        "gazebo_ros_control of model '%s' can't start: %s",
+                        self._context.model.name,
+                        error,
                     )
         return True
 

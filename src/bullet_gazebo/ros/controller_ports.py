@@ -25,7 +25,8 @@ class ControllerPorts:
         own = rospy.names.ns_join(namespace, controller.name)
         self._outputs = controller.outputs
         self._publishers = [
-            self._publish(output, namespace if output.shared else own) for output in controller.outputs
+            self._publish(output, namespace if output.shared else own)
+            for output in controller.outputs
         ]
         self._subscribers = [self._subscribe(port, own) for port in controller.inputs]
 
@@ -47,7 +48,9 @@ class ControllerPorts:
 
         def receive(message: Float64) -> None:
             if not math.isfinite(message.data):
-                rospy.logerr_throttle(1.0, f"{topic}: the command {message.data} is not finite: no effort")
+                rospy.logerr_throttle(
+                    1.0, f"{topic}: the command {message.data} is not finite: no effort"
+                )
             port.receive(message.data)
 
         return rospy.Subscriber(topic, Float64, receive, queue_size=1, tcp_nodelay=True)

@@ -74,7 +74,9 @@ class ControllerServices:
 
     def _load(self, request: LoadControllerRequest) -> bool:
         # An empty name would fetch the whole namespace, and resolve to it.
-        params = request.name and rospy.get_param(rospy.names.ns_join(self._namespace, request.name), None)
+        params = request.name and rospy.get_param(
+            rospy.names.ns_join(self._namespace, request.name), None
+        )
         try:
             with self._sim.lock:
                 controller = self._manager.load(request.name, params)
@@ -108,7 +110,9 @@ class ControllerServices:
         with self._sim.lock:
             loaded = [entry.name for entry in self._manager.listed()]
         if loaded and not request.force_kill:
-            return _refused(ControlError(f"Controllers {loaded} are loaded and force_kill is not set."))
+            return _refused(
+                ControlError(f"Controllers {loaded} are loaded and force_kill is not set.")
+            )
         self._close_all()
         return True
 
@@ -127,5 +131,7 @@ def _refused(error: ControlError) -> bool:
 
 
 def _state(entry: Listed) -> ControllerState:
-    claims = [HardwareInterfaceResources(c.hardware_interface, list(c.resources)) for c in entry.claims]
+    claims = [
+        HardwareInterfaceResources(c.hardware_interface, list(c.resources)) for c in entry.claims
+    ]
     return ControllerState(entry.name, entry.state, entry.type_name, claims)

@@ -28,10 +28,14 @@ STOP_TIMEOUT = 5.0  # [s]
 
 def parse_args(argv: list[str]) -> argparse.Namespace:
     """Reads gzserver's command line (contract: gazebo_api.md section 4.2). What is inert is accepted."""
-    parser = argparse.ArgumentParser(prog="gzserver", description="A PyBullet stand-in for Gazebo's server.")
+    parser = argparse.ArgumentParser(
+        prog="gzserver", description="A PyBullet stand-in for Gazebo's server."
+    )
     parser.add_argument("world", nargs="?", default=EMPTY_WORLD, help="world file")
     parser.add_argument("-u", dest="paused", action="store_true", help="start paused")
-    parser.add_argument("-e", "--physics", default="ode", help="accepted; physics is always PyBullet")
+    parser.add_argument(
+        "-e", "--physics", default="ode", help="accepted; physics is always PyBullet"
+    )
     parser.add_argument("--lockstep", action="store_true", help="time moves only by ~step_world")
     parser.add_argument("--seed", type=int, help="accepted; the physics uses no random numbers")
     parser.add_argument("-r", dest="record", action="store_true", help="accepted, without effect")
@@ -74,7 +78,9 @@ class GazeboNode:
 
     def run(self) -> int:
         """Simulates until the node is shut down; returns the exit code."""
-        rospy.on_shutdown(self._stop)  # called before the topics close, so no tick publishes to a closed one
+        rospy.on_shutdown(
+            self._stop
+        )  # called before the topics close, so no tick publishes to a closed one
         self._thread.start()
         rospy.spin()
         return 1 if self._fault else 0
@@ -83,7 +89,7 @@ class GazeboNode:
         """A world whose time silently stands still is worse than one that ends: a fault ends the node."""
         try:
             self.sim.run()
-        except Exception:
+        except Exception:  # noqa: BLE001 - the end of a thread
             self._fault = True
             rospy.logfatal("The simulation failed:\n%s", traceback.format_exc())
             rospy.signal_shutdown("the simulation failed")

@@ -55,7 +55,9 @@ class ModelServices:
                 return response
             self._calls[request.model_name] += 1
             response.header = Header(
-                self._calls[request.model_name], to_time(self._sim.now), request.relative_entity_name
+                self._calls[request.model_name],
+                to_time(self._sim.now),
+                request.relative_entity_name,
             )
             frame = self._sim.world.frame(request.relative_entity_name)
             if frame is None:

@@ -22,7 +22,9 @@ class Audience(rospy.SubscribeListener):
         super().__init__()
         self.size = 0
 
-    def peer_subscribe(self, topic_name: str, topic_publish: Callable, peer_publish: Callable) -> None:
+    def peer_subscribe(
+        self, topic_name: str, topic_publish: Callable, peer_publish: Callable
+    ) -> None:
         self.size += 1
 
     def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:

@@ -3,7 +3,6 @@
 import math
 
 import rospy
-from cartpole.srv import StepWorld, StepWorldRequest, StepWorldResponse
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
@@ -12,6 +11,7 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.manager import RUNNING
 from bullet_gazebo.ros.conversions import to_time
 from bullet_gazebo.simulator import Simulator
+from cartpole.srv import StepWorld, StepWorldRequest, StepWorldResponse
 
 MAX_TICKS = 1_000_000  # a request beyond this is a mistake, and would hold the world for minutes
 
@@ -35,7 +35,9 @@ class StepService:
 
     def _command(self, request: StepWorldRequest) -> None:
         if not 1 <= request.ticks <= MAX_TICKS:
-            raise ControlError(f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call")
+            raise ControlError(
+                f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call"
+            )
         if len(request.controllers) != len(request.commands):
             raise ControlError(
                 f"{len(request.controllers)} controllers but {len(request.commands)} commands"
@@ -45,7 +47,9 @@ class StepService:
             if not math.isfinite(value):
                 raise ControlError(f"the command {value} for '{controller.name}' is not finite")
             if controller.state != RUNNING:
-                raise ControlError(f"controller '{controller.name}' is {controller.state}, not running")
+                raise ControlError(
+                    f"controller '{controller.name}' is {controller.state}, not running"
+                )
         for controller, value in zip(controllers, request.commands, strict=True):
             controller.command(value)
 

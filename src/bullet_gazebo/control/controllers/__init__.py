@@ -5,5 +5,6 @@ from bullet_gazebo.control.controllers.joint_position import JointPositionContro
 from bullet_gazebo.control.controllers.joint_state import JointStateController
 
 BUILT_IN: dict[str, type[Controller]] = {
-    controller.type_name: controller for controller in (JointStateController, JointPositionController)
+    controller.type_name: controller
+    for controller in (JointStateController, JointPositionController)
 }

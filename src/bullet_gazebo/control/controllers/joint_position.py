@@ -31,7 +31,9 @@ class JointPositionController(Controller):
         self.outputs = [self._state]
 
     @classmethod
-    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> "JointPositionController":
+    def create(
+        cls, name: str, params: Mapping, hardware: RobotHardware
+    ) -> "JointPositionController":
         joint = hardware.joint(cls.interface, text_param(params, "joint", name))
         if joint.name not in hardware.urdf_joints:
             raise ControlError(f"{name}: joint '{joint.name}' is not in the robot description")

@@ -18,7 +18,9 @@ class JointStateController(Controller):
     type_name = "joint_state_controller/JointStateController"
     interface = STATE
 
-    def __init__(self, name: str, joints: list[JointHandle], rate: float, extra: list[tuple]) -> None:
+    def __init__(
+        self, name: str, joints: list[JointHandle], rate: float, extra: list[tuple]
+    ) -> None:
         super().__init__(name)
         self._joints = joints
         self._period = round(NANOSECONDS / rate) if rate > 0.0 else None
