@@ -118,13 +118,16 @@ def _ask_launch(handle: _processes.Handle) -> tuple[list[str], list[str]] | None
     """Processes of the launch, running and dead, without master and rosout; None as long as
     roslaunch doesn't tell."""
     try:
-        addresses = _master.call(_master.uri(), "getParam", "/roslaunch/uris").values()
-        for address in addresses:  # one for each roslaunch under this master
+        addresses = _master.call(_master.uri(), "getParam", "/roslaunch/uris")
+    except (_master.NoAnswer, _master.Refused):
+        return None
+    for address in addresses.values():  # one for each roslaunch under this master, also ended ones
+        try:
             if handle.owns(_master.call_plain(address, "get_pid")):
                 running, dead = _master.call_plain(address, "list_processes")
                 return [name for name, _ in running if name not in CORE], [name for name, _ in dead]
-    except (_master.NoAnswer, _master.Refused, AttributeError):
-        pass
+        except (_master.NoAnswer, _master.Refused):
+            continue
     return None
 
 
