@@ -41,7 +41,8 @@ def train(seed: int, episodes: int, folder: Path) -> dict:
     if code:
         sys.exit(f"seed {seed} ended with exit code {code}; see {log.name}")
     row = result(seed, json.loads((run / "summary.json").read_text()))
-    print(f"seed {seed} done: {row}", file=sys.stderr, flush=True)
+    length = row["mean_length_last_60"]
+    print(f"seed {seed}: {length} in {row['seconds']} s", file=sys.stderr, flush=True)
     return row
 
 

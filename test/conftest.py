@@ -11,6 +11,9 @@ from rostest_plugin import pytest_collect_file
 
 __all__ = ["pytest_collect_file"]
 
+# Nodes of rostest files: only roslaunch can run them.
+collect_ignore_glob = ["ros/*.py"]
+
 ROOT = Path(__file__).resolve().parent.parent
 
 

@@ -6,6 +6,7 @@ minutes.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import http.client
 import time
@@ -236,8 +237,39 @@ def shut_down_nodes(nodes: dict[str, str], timeout: float = 5.0) -> list[str]:
     for address in asked.values():
         ask_to_shut_down(address)
     deadline = time.monotonic() + timeout
-    while True:
-        left = [name for name, address in asked.items() if node_uri(name) == address]
-        if not left or time.monotonic() > deadline:
-            return left
-        time.sleep(POLL)
+    while asked and time.monotonic() < deadline:
+        for name, address in list(asked.items()):
+            if _is_dead(address):
+                _unregister(name, address)
+        # lookupNode isn't asked: it also knows nodes of which nothing but a parameter watch is left
+        asked = {name: asked[name] for name in node_names() if name in asked}
+        if asked:
+            time.sleep(POLL)
+    return list(asked)
+
+
+def _is_dead(address: str) -> bool:
+    """True if nobody listens at a node's XML-RPC address any more."""
+    try:
+        call(address, "getPid", timeout=1.0)
+    except NoAnswer as fault:
+        return isinstance(fault.__cause__, ConnectionRefusedError)
+    except Refused:
+        pass
+    return False
+
+
+def _unregister(name: str, address: str) -> None:
+    """Have the master forget a dead node, as rosnode cleanup does.
+
+    A rospy node that is asked to shut down often exits before it has taken its leave of the master.
+    """
+    with contextlib.suppress(NoAnswer, Refused):
+        publishers, subscribers, services = call(uri(), "getSystemState")
+        kinds = (("unregisterPublisher", publishers), ("unregisterSubscriber", subscribers))
+        for method, topics in kinds:
+            for topic in (topic for topic, nodes in topics if name in nodes):
+                call_plain(uri(), method, name, topic, address)
+        for service in (service for service, nodes in services if name in nodes):
+            location = call(uri(), "lookupService", service)
+            call_plain(uri(), "unregisterService", name, service, location)

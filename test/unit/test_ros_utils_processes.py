@@ -103,7 +103,7 @@ def test_a_recycled_process_id_is_not_touched():
         handle = _processes.start(SLEEP, "node", "sleeper")
         _processes.end([handle.entry])
         _registry.add(
-            dataclasses.replace(handle.entry, pid=stranger.pid, start=handle.entry.start - 1)
+            dataclasses.replace(handle.entry, pid=stranger.pid, start=1)
         )
         assert ros_node.ros_kill_all_processes()
         assert stranger.poll() is None
@@ -155,6 +155,7 @@ def test_nothing_is_left_when_the_starter_ends(number):
     """By itself, by sys.exit in a handler of Ctrl-C, or killed outright."""
     starter = python(STARTER, *(["stay"] if number else []))
     pid = int(starter.stdout.readline())
+    wait_until(lambda: Path(f"/proc/{pid}/comm").read_text() == "sleep\n")
     if number:
         starter.send_signal(number)
     starter.wait(BOUND)

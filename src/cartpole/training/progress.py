@@ -1,5 +1,6 @@
 """What the user sees while training: a bar on a terminal, else a line every 20 episodes."""
 
+import os
 import sys
 from typing import TextIO
 
@@ -8,13 +9,29 @@ from tqdm import tqdm
 from cartpole.training.loop import EpisodeRecord
 
 LINE_EVERY = 20  # [episodes]
+WIDTH = 100  # [columns] of the bar on a terminal that doesn't tell its size
+
+
+def _has_size(stream: TextIO) -> bool:
+    """Whether the terminal tells its size: tqdm would draw a bar of no width on one that doesn't."""
+    try:
+        return os.get_terminal_size(stream.fileno()).columns > 0
+    except (OSError, ValueError):
+        return False
 
 
 class Bar:
     """A tqdm bar with the last return, the last length and the steps per second."""
 
     def __init__(self, episodes: int, stream: TextIO) -> None:
-        self._bar = tqdm(total=episodes, unit="episode", file=stream, dynamic_ncols=True)
+        sized = _has_size(stream)
+        self._bar = tqdm(
+            total=episodes,
+            unit="episode",
+            file=stream,
+            dynamic_ncols=sized,
+            ncols=None if sized else WIDTH,
+        )
 
     def episode_done(self, record: EpisodeRecord) -> None:
         self._bar.set_postfix_str(
