@@ -4,6 +4,7 @@ import threading
 from collections.abc import Callable
 
 import rospy
+import rospy.impl.simtime
 from gazebo_msgs.msg import LinkStates, ModelStates
 from rosgraph_msgs.msg import Clock
 
@@ -65,6 +66,7 @@ class ClockTopic:
         self._sender = threading.Thread(target=self._send_newest, name="clock", daemon=True)
         self._sender.start()
         rospy.on_shutdown(self._stop)
+        _stop_listening_to_clock()
 
     def __call__(self, now: int) -> None:
         if self._period and 0 <= now - self._last < self._period:  # negative after a reset: publish
@@ -92,7 +94,21 @@ class ClockTopic:
         self._sender.join(STOP_TIMEOUT)
 
     def _publish(self, now: int) -> None:
-        self._publisher.publish(Clock(to_time(now)))
+        time = to_time(now)
+        rospy.rostime._set_rostime(time)
+        self._publisher.publish(Clock(time))
+
+
+def _stop_listening_to_clock() -> None:
+    """Ends rospy's own subscription to the topic that this node itself publishes.
+
+    With /use_sim_time every node hears /clock. For the node that makes the time that is a message a
+    millisecond over a socket to itself, a good part of its CPU time; the publisher tells rospy directly.
+    rospy offers no way to say so, hence its private names.
+    """
+    subscription = getattr(rospy.impl.simtime, "_clock_sub", None)
+    if subscription is not None:
+        subscription.unregister()
 
 
 def advertise_states(sim: Simulator, clock_frequency: float, network: bool) -> None:

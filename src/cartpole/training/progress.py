@@ -31,6 +31,7 @@ class Bar:
             file=stream,
             dynamic_ncols=sized,
             ncols=None if sized else WIDTH,
+            nrows=None if sized else 2,
         )
 
     def episode_done(self, record: EpisodeRecord) -> None:
