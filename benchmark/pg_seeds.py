@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """How reliably pg_train.py learns: several seeds, each on a master and a simulator of its own.
 
-    ./ws python3 benchmark/pg_seeds.py [--seeds 0 1 2 3 4] [--episodes 600] [--parallel 1] [--out DIR]
+    ./ws python3 benchmark/pg_seeds.py [--seeds 0 1 2 3 4] [--episodes 600] [--parallel 1]
+        [--out DIR] [any other flag of pg_train.py]
 
 Prints a table with every seed and writes pg_seeds.json; the runs themselves lie in DIR/runs.
 """
@@ -23,13 +24,13 @@ LAST = 60  # [episodes]
 SOLVED = 2400  # [steps] of 3000
 
 
-def train(seed: int, episodes: int, folder: Path) -> dict:
+def train(seed: int, episodes: int, folder: Path, extra: list[str]) -> dict:
     """Runs one training; returns its row of the table."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         master = f"http://127.0.0.1:{probe.getsockname()[1]}"
     run = folder / f"seed_{seed}"
     command = ["rosrun", "cartpole", "pg_train.py"]
-    flags = [f"--seed={seed}", f"--episodes={episodes}", f"--run-dir={run}"]
+    flags = [f"--seed={seed}", f"--episodes={episodes}", f"--run-dir={run}", *extra]
     with (folder / f"seed_{seed}.log").open("w") as log:
         code = subprocess.call(
             [*command, *flags],
@@ -83,16 +84,17 @@ def main() -> int:
     parser.add_argument("--episodes", type=int, default=600)
     parser.add_argument("--parallel", type=int, default=1, help="trainings at a time")
     parser.add_argument("--out", type=Path, default=Path("pg_seeds"))
-    chosen = parser.parse_args()
+    chosen, extra = parser.parse_known_args()  # the rest is for pg_train.py
     runs = (chosen.out / "runs").resolve()
     runs.mkdir(parents=True)
     with ThreadPoolExecutor(chosen.parallel) as pool:
-        jobs = [pool.submit(train, seed, chosen.episodes, runs) for seed in chosen.seeds]
+        jobs = [pool.submit(train, seed, chosen.episodes, runs, extra) for seed in chosen.seeds]
         rows = [job.result() for job in jobs]
     content = {
         "command": "benchmark/pg_seeds.py",
         "episodes": chosen.episodes,
         "parallel": chosen.parallel,
+        "flags": extra,
         "date": datetime.date.today().isoformat(),
         "machine": f"{platform.platform()}, {os.cpu_count()} cores",
         "seeds": rows,

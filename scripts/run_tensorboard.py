@@ -4,8 +4,6 @@
 import os
 import sys
 
-import rospy
-
 if __name__ == "__main__":
-    command = [sys.executable, "-m", "tensorboard.main", *rospy.myargv()[1:]]
-    os.execv(sys.executable, command)
+    flags = [argument for argument in sys.argv[1:] if ":=" not in argument]
+    os.execv(sys.executable, [sys.executable, "-m", "tensorboard.main", *flags])

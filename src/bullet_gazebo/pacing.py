@@ -1,5 +1,6 @@
 """Keeps simulated time in step with the wall clock."""
 
+import math
 import time
 
 MAX_LAG = 0.1  # [s]; a host that falls behind further than this isn't made up for
@@ -15,11 +16,20 @@ class Pacer:
         """Begins to count from now, after a pause."""
         self._due = time.perf_counter()
 
-    def wait(self, period: float) -> None:
-        """Sleeps until `period` [s of wall time] after the previous due time; 0 never waits."""
+    def wait(self, period: float, longest: float = math.inf) -> bool:
+        """Sleeps until `period` [s of wall time] after the previous due time; 0 never waits.
+
+        Returns False when that takes longer than `longest` [s]: call wait_on() until it is due.
+        """
         self._due += period
-        delay = self._due - time.perf_counter()
-        if period <= 0.0 or delay < -MAX_LAG:
+        if period <= 0.0 or self._due - time.perf_counter() < -MAX_LAG:
             self._due = time.perf_counter()
-        elif delay > 0.0:
-            time.sleep(delay)
+            return True
+        return self.wait_on(longest)
+
+    def wait_on(self, longest: float) -> bool:
+        """Sleeps until the due time, but no longer than `longest` [s]; returns whether it is due."""
+        delay = self._due - time.perf_counter()
+        if delay > 0.0:
+            time.sleep(min(delay, longest))
+        return delay <= longest

@@ -3,8 +3,12 @@
 import threading
 from collections.abc import Callable, Mapping
 
+from bullet_gazebo.jobs import Jobs
 from bullet_gazebo.pacing import Pacer
+from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.projection import place_link
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.robot import Robot
 from bullet_gazebo.turns import TurnLock
@@ -40,6 +44,7 @@ class Simulator:
         self.relatch = relatch
         self.now = 0  # [ns] of simulated time
         self.robots: list[Robot] = []
+        self.jobs = Jobs()
         self.listeners: list[
             Callable[[int], None]
         ] = []  # called with `now` before each physics step
@@ -81,7 +86,21 @@ class Simulator:
             with self.lock:
                 if self._flowing.is_set():
                     self._tick()
-            pacer.wait(1.0 / self.max_update_rate if self.max_update_rate > 0.0 else 0.0)
+            self._keep_pace(pacer)
+
+    def _keep_pace(self, pacer: Pacer) -> None:
+        """Waits for the next tick's turn, or until a service changes what there is to wait for."""
+        rate = self.max_update_rate
+        due = pacer.wait(1.0 / rate if rate > 0.0 else 0.0, IDLE_POLL)
+        while not due:
+            due = pacer.wait_on(IDLE_POLL)
+            if (
+                rate != self.max_update_rate
+                or self._stopping.is_set()
+                or not self._flowing.is_set()
+            ):
+                pacer.restart()
+                return
 
     def stop(self) -> None:
         """Makes run() return after the tick in progress."""
@@ -103,6 +122,25 @@ class Simulator:
         for robot in self.robots:
             robot.read()
 
+    def step(self, ticks: int) -> None:
+        """Pauses the world and moves it by `ticks` physics steps, as fast as they can be computed.
+
+        The lock is taken for each tick, so services are answered in between.
+
+        Errors: ValueError for less than one tick.
+        """
+        if ticks < 1:
+            raise ValueError(f"ticks is {ticks}: at least 1 is needed")
+        self.pause()
+        for _ in range(ticks):
+            if self._stopping.is_set():
+                return
+            with self.lock:
+                self._tick()
+        with self.lock:
+            for robot in self.robots:
+                robot.read()
+
     def add_robot(self, robot: Robot) -> None:
         """Puts a robot under control; the caller holds the lock."""
         self.robots.append(robot)
@@ -114,9 +152,32 @@ class Simulator:
     def set_joint_positions(self, model: Model, positions: Mapping[str, float]) -> None:
         """Puts joints of `model` at `positions` [rad, m], at rest; the caller holds the lock."""
         model.set_joint_positions(positions)
-        for robot in self.robots:
-            if robot.model is model:
-                robot.joints_moved(self.now, self.relatch)
+        self._joints_moved(model)
+
+    def place_model(self, model: Model, pose: Pose, twist: Twist) -> None:
+        """Moves `model` rigidly, its joints at rest as in Gazebo; the caller holds the lock."""
+        before = model.joint_states()
+        model.place(pose, twist)
+        model.rest_joints()
+        if model.joint_states() != before:
+            self._joints_moved(model)
+
+    def place_link(self, model: Model, link: str, pose: Pose, twist: Twist) -> None:
+        """Moves one link as near as the joints that carry it allow; the caller holds the lock."""
+        before = model.joint_states()
+        place_link(model, link, pose, twist)
+        if model.joint_states() != before:
+            self._joints_moved(model)
+
+    def delete_model(self, model: Model) -> None:
+        """Takes a model out of the world, and its jobs with it; the caller holds the lock."""
+        self.jobs.forget(model)
+        self.world.delete(model.name)
+
+    def set_time_step(self, time_step: float) -> None:
+        """Sets the length of a tick [s], to the nanosecond; the caller holds the lock."""
+        self._period = round(time_step * NANOSECONDS)
+        self.world.set_time_step(time_step)
 
     def reset_world(self) -> None:
         """Returns models to their initial poses, at rest; time and joint positions stay."""
@@ -128,6 +189,18 @@ class Simulator:
         with self.lock:
             self.now = 0
             self._reset(joints=True)
+
+    def reset_time(self) -> None:
+        """Sets the time to zero; models and controllers go on from where they are."""
+        with self.lock:
+            self.now = 0
+            for robot in self.robots:
+                robot.joints_moved(self.now, relatch=False)
+
+    def _joints_moved(self, model: Model) -> None:
+        for robot in self.robots:
+            if robot.model is model:
+                robot.joints_moved(self.now, self.relatch)
 
     def _reset(self, joints: bool) -> None:
         self.world.reset(joints)
@@ -144,6 +217,9 @@ class Simulator:
         """One physics step, in Gazebo's order: the state before the step carries the time after it."""
         self.now = now = self.now + self._period
         dt = self.world.time_step
+        jobs = self.jobs
+        if jobs.efforts or jobs.wrenches:
+            jobs.apply(now)
         for robot in self.robots:
             robot.read()
             robot.manager.update(now, dt)

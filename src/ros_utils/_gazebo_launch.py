@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 
-from ros_utils import _log, _master, _packages, _processes, _services, _waiting
+from ros_utils import _log, _master, _packages, _processes, _services, _target, _waiting
+from ros_utils._started import Started
 from ros_utils._waiting import Outcome
 from ros_utils.ros_launch import start_roslaunch
 
 LABEL = "Gazebo"
 NODES = ("/gazebo", "/gazebo_gui")
-READY = "/gazebo/pause_physics"  # the last thing that a client needs before it can begin
+READY = "pause_physics"  # the last thing that a client needs before it can begin
 
 
 def launch_Gazebo(
@@ -34,7 +36,11 @@ def launch_Gazebo(
     seed: int | None = None,
     timeout: float = 30.0,
     extra_gazebo_args: str = "",
-) -> bool:
+    gazebo_ns: str = "/gazebo",
+    log_file: str | None = None,
+    env: Mapping[str, str] | None = None,
+    master_uri: str | None = None,
+) -> Started | bool:
     """Run ``roslaunch gazebo_ros empty_world.launch`` and wait until the simulator answers. Starts
     a master if needed.
 
@@ -63,17 +69,16 @@ def launch_Gazebo(
         seed: seed of the simulator (the stand-in's own argument).
         timeout: bound of the wait [s].
         extra_gazebo_args: further arguments for the server.
+        gazebo_ns: where its services are expected.
+        log_file: the file for its output; None for the terminal or one of its own.
+        env: variables on top of this process's.
+        master_uri: the master to run under; None for this process's.
 
     Returns:
-        True once it answers. False, with an error in the log, if package or world are missing, no
-        master can be used, the simulator ends, or it doesn't answer in time (it is ended then).
+        A handle that is true, once it answers. False, with an error in the log, if package or world
+        are missing, no master can be used, the simulator ends, or it doesn't answer in time (it is
+        ended then).
     """
-    if _services.answers(READY):
-        _log.warn(
-            f"{LABEL} runs already under {_master.uri()}: using it as it is"
-            " (ros_kill_all_processes ends it)"
-        )
-        return True
     switches = {
         "paused": paused,
         "use_sim_time": use_sim_time,
@@ -97,34 +102,45 @@ def launch_Gazebo(
     asked["use_clock_frequency"] = (
         True if pub_clock_frequency != 100 else None
     )  # without it the rate has no effect
-    try:
-        asked["world_name"] = _world(custom_world_path, custom_world_pkg, custom_world_name)
-        switches.update({name: value for name, value in asked.items() if value is not None})
-        arguments = [f"{name}:={value}" for name, value in switches.items()]
-        _packages.file("gazebo_ros", "launch", "empty_world.launch")
-        command = ["gazebo_ros", "empty_world.launch", *arguments]
-        screen = output == "screen" and not launch_new_term
-        handle = start_roslaunch(command, LABEL, launch_new_term, screen)
-    except (_packages.NotFound, _processes.CannotStart, _master.MasterDown) as fault:
-        _log.error(f"launch_Gazebo: {fault}")
-        return False
-    return _report(
-        handle, _waiting.until(lambda: _services.answers(READY), handle, timeout), timeout
-    )
+    with _target.using(master_uri):
+        ready = f"{gazebo_ns.rstrip('/')}/{READY}"
+        if _services.answers(ready):
+            _log.warn(
+                f"{LABEL} runs already under {_master.uri()}: using it as it is"
+                " (ros_kill_all_processes ends it)"
+            )
+            return Started()
+        try:
+            asked["world_name"] = _world(custom_world_path, custom_world_pkg, custom_world_name)
+            switches.update({name: value for name, value in asked.items() if value is not None})
+            arguments = [f"{name}:={value}" for name, value in switches.items()]
+            _packages.file("gazebo_ros", "launch", "empty_world.launch")
+            command = ["gazebo_ros", "empty_world.launch", *arguments]
+            screen = output == "screen" and not launch_new_term
+            handle = start_roslaunch(command, LABEL, launch_new_term, screen, log_file, env)
+        except (_packages.NotFound, _processes.CannotStart, _master.MasterDown) as fault:
+            _log.error(f"launch_Gazebo: {fault}")
+            return False
+        outcome = _waiting.until(lambda: _services.answers(ready), handle, timeout)
+        return _report(handle, outcome, ready, timeout)
 
 
-def close_Gazebo() -> bool:
+def close_Gazebo(*, master_uri: str | None = None) -> bool:
     """End the simulator: the launch that `launch_Gazebo` started, and the nodes /gazebo and
     /gazebo_gui.
 
     If the launch had brought up the master, the master ends with it.
 
+    Args:
+        master_uri: the master that it runs under; None for this process's.
+
     Returns:
         True if none of it is left.
     """
-    nodes = {name: address for name in NODES if (address := _master.node_uri(name))}
-    gone = _processes.end([entry for entry in _processes.started() if entry.label == LABEL])
-    left = _master.shut_down_nodes(nodes)
+    with _target.using(master_uri):
+        nodes = {name: address for name in NODES if (address := _master.node_uri(name))}
+        gone = _processes.end([entry for entry in _processes.started() if entry.label == LABEL])
+        left = _master.shut_down_nodes(nodes)
     if left:
         _log.warn(f"close_Gazebo: still registered: {', '.join(left)}")
     return gone and not left
@@ -154,13 +170,15 @@ def _world(path: str | None, package: str | None, name: str | None) -> str | Non
     return None
 
 
-def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> bool:
+def _report(
+    handle: _processes.Handle, outcome: Outcome, ready: str, timeout: float
+) -> Started | bool:
     if outcome is Outcome.READY:
-        return True
+        return Started(handle)
     if outcome is Outcome.ENDED:
         what = f"ended with exit code {handle.exit_code()} before it answered"
     else:
-        what = f"service {READY} doesn't answer after {timeout:g} s; ended it"
+        what = f"service {ready} doesn't answer after {timeout:g} s; ended it"
     _processes.end([handle.entry])
     _log.error(f"{LABEL}: {what}: {handle.reason()}{handle.where()}")
     return False

@@ -18,6 +18,8 @@ from xml.parsers.expat import ExpatError
 import rosgraph
 import rospy
 
+from ros_utils import _target
+
 CALLER = "/ros_utils"
 TIMEOUT = 2.0  # [s] for one question to the master or a node; a live one answers in milliseconds
 POLL = 0.05  # [s] between two looks at something that is being waited for
@@ -86,8 +88,8 @@ def call_plain(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> A
 
 
 def uri() -> str:
-    """The master's address: ROS_MASTER_URI, or ``__master:=`` of the command line."""
-    return rosgraph.get_master_uri()
+    """The master's address. See `_target`."""
+    return _target.uri()
 
 
 def host_and_port() -> tuple[str, int]:

@@ -19,13 +19,13 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import FrameType
 
 import rospkg
 
-from ros_utils import _endings, _log, _procfs, _registry
+from ros_utils import _endings, _log, _procfs, _registry, _target
 
 
 class CannotStart(Exception):
@@ -82,7 +82,14 @@ _lock = threading.Lock()
 
 
 def start(
-    command: Sequence[str], kind: str, label: str, *, window: bool = False, screen: bool = False
+    command: Sequence[str],
+    kind: str,
+    label: str,
+    *,
+    window: bool = False,
+    screen: bool = False,
+    log_file: str | None = None,
+    env: Mapping[str, str] | None = None,
 ) -> Handle:
     """Start a program in its own session.
 
@@ -93,6 +100,8 @@ def start(
         window: run it in an xterm if there is a display and xterm is installed; otherwise its
             output goes to a file.
         screen: its output goes to the caller's terminal instead of a file.
+        log_file: the file for its output; None for one of its own in ROS's log folder.
+        env: variables on top of the caller's.
 
     Raises:
         CannotStart: no such program, or the log file can't be written.
@@ -100,17 +109,17 @@ def start(
     if shutil.which(command[0]) is None:
         raise CannotStart(f"{command[0]}: no such program, or not executable")
     token = secrets.token_hex(8)
-    log = None if screen else _log_path(label, token)
+    log = log_file or (None if screen else _log_path(label, token))
     status_file = None
     full = [*_dying_with_caller(), *command]
-    if window and _has_window():
+    if window and not log_file and _has_window():
         log, status_file = None, _log_path(label, token) + ".status"
         full = _in_window(full, label, status_file)
-    elif window:
+    elif window and not log_file:
         _log.info(
             f"{label}: no display or no xterm, so its output goes to {log or 'this terminal'}"
         )
-    process = _spawn(full, token, log)
+    process = _spawn(full, {**_environment(token), **(env or {})}, log)
     data = _procfs.stat(process.pid)
     begun = data.start if data else 0  # already over: nothing will ever have start time 0
     entry = _registry.Entry(process.pid, begun, token, kind, label, _procfs.boot_id(), log)
@@ -162,10 +171,18 @@ def _environment(token: str) -> dict[str, str]:
     outer = os.environ.get(_procfs.MARK)
     path = os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", os.defpath)])
     mark = f"{outer}:{token}" if outer else token
-    return {**os.environ, _procfs.MARK: mark, "PATH": path, "PYTHONUNBUFFERED": "1"}
+    return {
+        **os.environ,
+        _procfs.MARK: mark,
+        "PATH": path,
+        "PYTHONUNBUFFERED": "1",
+        "ROS_MASTER_URI": _target.uri(),
+    }
 
 
-def _spawn(command: Sequence[str], token: str, log: str | None) -> subprocess.Popen[bytes]:
+def _spawn(
+    command: Sequence[str], environment: Mapping[str, str], log: str | None
+) -> subprocess.Popen[bytes]:
     with contextlib.ExitStack() as stack:
         try:
             output = stack.enter_context(open(log, "wb")) if log else None
@@ -174,7 +191,7 @@ def _spawn(command: Sequence[str], token: str, log: str | None) -> subprocess.Po
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT if output else None,
-                env=_environment(token),
+                env=environment,
                 start_new_session=True,
             )
         except (OSError, ValueError) as fault:

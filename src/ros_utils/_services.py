@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import socket
-import threading
 import time
 from typing import Any
 
 import rosgraph
 import rospy
 
-from ros_utils import _master
+from ros_utils import _master, _tcpros
 
 TIMEOUT = 30.0  # [s]
 
@@ -83,27 +82,14 @@ def call(name: str, service_class: Any, *request: Any, timeout: float = TIMEOUT)
         rospy.ROSInterruptException: the node was shut down meanwhile.
     """
     resolved = wait_for(name, timeout)
-    outcome: list[Any] = []
-    # rospy's call has no time limit of its own, so it is left behind in a thread if it gets no
-    # answer.
-    worker = threading.Thread(
-        target=_call_into, args=(outcome, resolved, service_class, request), daemon=True
-    )
-    worker.start()
-    worker.join(timeout)
-    if not outcome:
+    try:
+        address = str(_master.call(_master.uri(), "lookupService", resolved))
+        return _tcpros.call(address, resolved, service_class, request, timeout)
+    except TimeoutError as fault:
         raise Missing(
             f"service {resolved} gave no answer within {timeout:g} s: its node hangs or is paused"
-        )
-    if isinstance(outcome[0], rospy.ROSInterruptException):
-        raise outcome[0]
-    if isinstance(outcome[0], Exception):
-        raise ServiceError(f"service {resolved}: {outcome[0]}") from outcome[0]
-    return outcome[0]
-
-
-def _call_into(outcome: list[Any], name: str, service_class: Any, request: tuple[Any, ...]) -> None:
-    try:
-        outcome.append(rospy.ServiceProxy(name, service_class)(*request))
-    except Exception as fault:  # noqa: BLE001, the caller's thread reports whatever it is
-        outcome.append(fault)
+        ) from fault
+    except (_master.NoAnswer, _master.Refused, _tcpros.CallFailed) as fault:
+        if rospy.is_shutdown():
+            raise rospy.ROSInterruptException(f"shut down while calling {resolved}") from fault
+        raise ServiceError(f"service {resolved}: {fault}") from fault

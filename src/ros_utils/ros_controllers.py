@@ -8,17 +8,20 @@ bound for a service to come up and again for its answer [s]. A failure is logged
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from controller_manager_msgs.srv import (
-    ListControllers,
+    ListControllerTypes,
     LoadController,
     SwitchController,
     UnloadController,
 )
 
 from ros_utils import _log, _services
+from ros_utils._controller_calls import ListResult, service_name
+from ros_utils._controller_calls import names as _names
+from ros_utils._controller_calls import states as _states
+from ros_utils._controller_calls import until_ok as _until_ok
 
 
 def load_controller_srv(
@@ -51,15 +54,18 @@ def load_controller_list_srv(
     max_retries: int = 5,
     *,
     service_timeout: float = _services.TIMEOUT,
-) -> bool:
+) -> ListResult:
     """Load several controllers; all are tried.
 
     Returns:
-        True if every one was loaded.
+        True if every one was loaded; its `failed` names those that were not.
     """
-    return _all(
-        load_controller_srv(c, ns, max_retries, service_timeout=service_timeout)
-        for c in controller_list
+    return ListResult(
+        [
+            name
+            for name in controller_list
+            if not load_controller_srv(name, ns, max_retries, service_timeout=service_timeout)
+        ]
     )
 
 
@@ -92,15 +98,18 @@ def unload_controller_list_srv(
     max_retries: int = 5,
     *,
     service_timeout: float = _services.TIMEOUT,
-) -> bool:
+) -> ListResult:
     """Unload several controllers; all are tried.
 
     Returns:
-        True if every one was unloaded.
+        True if every one was unloaded; its `failed` names those that were not.
     """
-    return _all(
-        unload_controller_srv(c, ns, max_retries, service_timeout=service_timeout)
-        for c in controller_list
+    return ListResult(
+        [
+            name
+            for name in controller_list
+            if not unload_controller_srv(name, ns, max_retries, service_timeout=service_timeout)
+        ]
     )
 
 
@@ -250,49 +259,25 @@ def kill_controllers_srv(
     """
     return stop_controllers_srv(
         kill_controllers, ns, strictness, start_asap, timeout, service_timeout=service_timeout
-    ) and unload_controller_list_srv(kill_controllers, ns, service_timeout=service_timeout)
+    ) and bool(unload_controller_list_srv(kill_controllers, ns, service_timeout=service_timeout))
 
 
-def _names(controllers: Sequence[str]) -> str:
-    return ", ".join(controllers) or "none"
+def list_controllers_srv(
+    ns: str | None = None, *, service_timeout: float = _services.TIMEOUT
+) -> dict[str, str] | None:
+    """Name and state (initialized, running, stopped) of the loaded controllers, or None, with an
+    error in the log, if the manager doesn't tell."""
+    return _states(ns, service_timeout)
 
 
-def _all(results: Iterable[bool]) -> bool:
-    return all(list(results))  # a list first: each one is tried, whatever became of those before
-
-
-def _service(ns: str | None, service: str) -> str:
-    return f"{(ns or '').rstrip('/')}/controller_manager/{service}"
-
-
-def _states(ns: str | None, timeout: float) -> dict[str, str] | None:
-    """Name and state of the loaded controllers, or None if the manager doesn't tell."""
+def list_controller_types_srv(
+    ns: str | None = None, *, service_timeout: float = _services.TIMEOUT
+) -> list[str] | None:
+    """The types of controllers that can be loaded, or None. See `list_controllers_srv`."""
+    name = service_name(ns, "list_controller_types")
     try:
-        answer = _services.call(_service(ns, "list_controllers"), ListControllers, timeout=timeout)
+        answer = _services.call(name, ListControllerTypes, timeout=service_timeout)
     except _services.ServiceError as fault:
         _log.error(str(fault))
         return None
-    return {controller.name: controller.state for controller in answer.controller}
-
-
-def _until_ok(
-    service: str,
-    kind: Any,
-    request: tuple[Any, ...],
-    what: str,
-    ns: str | None,
-    max_retries: int,
-    timeout: float,
-) -> bool:
-    """Call a service until its answer is ok, at most `max_retries` times; a failed call ends it."""
-    try:
-        for _ in range(max_retries):
-            if _services.call(_service(ns, service), kind, *request, timeout=timeout).ok:
-                return True
-    except _services.ServiceError as fault:
-        _log.error(f"{service} ({what}): {fault}")
-        return False
-    _log.error(
-        f"{service} ({what}): refused {max_retries} times; the controller manager's log says why"
-    )
-    return False
+    return list(answer.types)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from ros_utils import _log, _master, _packages, _processes, _waiting
+from ros_utils import _log, _master, _packages, _processes, _target, _waiting
+from ros_utils._started import Started
 from ros_utils._waiting import Outcome
 
 SETTLE = 5.0  # [s] at most, for the nodes of a launch file to register after their processes run
@@ -23,7 +24,11 @@ def ros_launch_from_pkg(
     *,
     timeout: float = 30.0,
     output: str = "log",
-) -> bool:
+    wait: bool = True,
+    log_file: str | None = None,
+    env: Mapping[str, str] | None = None,
+    master_uri: str | None = None,
+) -> Started | bool:
     """Launch ``<pkg_name>/launch/<launch_file>``. Starts a master if there is none.
 
     Args:
@@ -34,20 +39,33 @@ def ros_launch_from_pkg(
             a log file.
         timeout: bound of the wait for roslaunch to start its nodes [s].
         output: "log" for a log file, "screen" for this terminal.
+        wait: False to go on at once.
+        log_file: the file for the output; None for one of its own in ROS's log folder.
+        env: variables on top of this process's.
+        master_uri: the master to launch under; None for this process's.
 
     Returns:
-        True once roslaunch has started its nodes (or has ended by itself without an error). A node
-        that dies at once
-        is named in a warning: the rest of the launch file goes on. False, with an error in the log,
-            if the package or
-        file is missing, no master can be used, or roslaunch fails.
+        A handle that is true, once roslaunch has started its nodes (or has ended by itself without
+        an error). A node that dies at once is named in a warning: the rest of the launch file goes
+        on. False, with an error in the log, if the package or file is missing, no master can be
+        used, or roslaunch fails.
     """
     try:
         path = _packages.file(pkg_name, "launch", launch_file)
     except _packages.NotFound as fault:
         _log.error(f"ros_launch_from_pkg: {fault}")
         return False
-    return ros_launch_from_path(path, args, launch_new_term, timeout=timeout, output=output)
+    return ros_launch_from_path(
+        path,
+        args,
+        launch_new_term,
+        timeout=timeout,
+        output=output,
+        wait=wait,
+        log_file=log_file,
+        env=env,
+        master_uri=master_uri,
+    )
 
 
 def ros_launch_from_path(
@@ -57,18 +75,26 @@ def ros_launch_from_path(
     *,
     timeout: float = 30.0,
     output: str = "log",
-) -> bool:
+    wait: bool = True,
+    log_file: str | None = None,
+    env: Mapping[str, str] | None = None,
+    master_uri: str | None = None,
+) -> Started | bool:
     """Launch a file by its path. See `ros_launch_from_pkg`."""
     label = f"roslaunch {os.path.basename(launch_file_path)}"
-    try:
-        path = os.path.abspath(_packages.existing(launch_file_path))
-        handle = start_roslaunch([path, *(args or [])], label, launch_new_term, output == "screen")
-    except (_packages.NotFound, _processes.CannotStart, _master.MasterDown) as fault:
-        _log.error(f"{label}: {fault}")
-        return False
-    return _report(
-        handle, _waiting.until(lambda: _ask_launch(handle) is not None, handle, timeout), timeout
-    )
+    with _target.using(master_uri):
+        try:
+            path = os.path.abspath(_packages.existing(launch_file_path))
+            command = [path, *(args or [])]
+            screen = output == "screen"
+            handle = start_roslaunch(command, label, launch_new_term, screen, log_file, env)
+        except (_packages.NotFound, _processes.CannotStart, _master.MasterDown) as fault:
+            _log.error(f"{label}: {fault}")
+            return False
+        if not wait:
+            return Started(handle)
+        outcome = _waiting.until(lambda: _ask_launch(handle) is not None, handle, timeout)
+        return _report(handle, outcome, timeout)
 
 
 def ros_kill_launch_process() -> bool:
@@ -81,7 +107,12 @@ def ros_kill_launch_process() -> bool:
 
 
 def start_roslaunch(
-    arguments: Sequence[str], label: str, window: bool, screen: bool
+    arguments: Sequence[str],
+    label: str,
+    window: bool,
+    screen: bool,
+    log_file: str | None = None,
+    env: Mapping[str, str] | None = None,
 ) -> _processes.Handle:
     """Start roslaunch without waiting for anything.
 
@@ -91,7 +122,13 @@ def start_roslaunch(
     """
     check_master_possible()
     return _processes.start(
-        ["roslaunch", *arguments], "launch", label, window=window, screen=screen
+        ["roslaunch", *arguments],
+        "launch",
+        label,
+        window=window,
+        screen=screen,
+        log_file=log_file,
+        env=env,
     )
 
 
@@ -131,7 +168,7 @@ def _ask_launch(handle: _processes.Handle) -> tuple[list[str], list[str]] | None
     return None
 
 
-def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> bool:
+def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> Started | bool:
     label = handle.entry.label
     if outcome is Outcome.LATE:
         _log.error(f"{label}: nothing runs after {timeout:g} s; ended it{handle.where()}")
@@ -142,7 +179,7 @@ def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> bool
     code = handle.exit_code()
     if code:
         _log.error(f"{label}: ended with exit code {code}: {handle.reason()}{handle.where()}")
-    return not code
+    return False if code else Started(handle)
 
 
 def _let_settle(handle: _processes.Handle) -> None:

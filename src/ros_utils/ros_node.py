@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import rosgraph
 import roslib.packages
 import rospkg
 import rospy
 
-from ros_utils import _log, _master, _packages, _processes, _waiting
+from ros_utils import _log, _master, _packages, _processes, _target, _waiting
+from ros_utils._started import Started
 from ros_utils._waiting import Outcome
 from ros_utils.ros_launch import check_master_possible
 
@@ -28,7 +29,10 @@ def ros_node_from_pkg(
     *,
     timeout: float = 30.0,
     wait: bool = True,
-) -> bool:
+    log_file: str | None = None,
+    env: Mapping[str, str] | None = None,
+    master_uri: str | None = None,
+) -> Started | bool:
     """Start a node, as rosrun does, and wait until it is registered at the master.
 
     Args:
@@ -44,30 +48,50 @@ def ros_node_from_pkg(
         args: arguments for the node: one string, split as a shell would, or a list.
         timeout: bound of the wait for the registration [s].
         wait: False for a program that is no ROS node, or to go on at once.
+        log_file: the file for the output; None for one of its own in ROS's log folder.
+        env: variables on top of this process's.
+        master_uri: the master to register at; None for this process's.
 
     Returns:
-        True once the node is registered, or if it has done its work and ended with exit code 0.
-        False, with an error in the log, if the package or executable is missing, no master answers,
-        or the node ends with another exit code or doesn't register in time (it is ended then).
+        A handle that is true, once the node is registered, or if it has done its work and ended
+        with exit code 0. False, with an error in the log, if the package or executable is missing,
+        no master answers, or the node ends with another exit code or doesn't register in time (it
+        is ended then).
     """
     label = f"node {pkg_name}/{node_name}"
-    try:
-        command = [_executable(pkg_name, node_name), *_arguments(args), *_remappings(name, ns)]
-        if launch_master and not _master.is_up() and not _start_master(launch_master_term, timeout):
+    with _target.using(master_uri):
+        try:
+            command = [_executable(pkg_name, node_name), *_arguments(args), *_remappings(name, ns)]
+            if (
+                launch_master
+                and not _master.is_up()
+                and not _start_master(launch_master_term, timeout)
+            ):
+                return False
+            _master.require()
+            before = set(_master.node_uris().values())
+            handle = _processes.start(
+                command,
+                "node",
+                label,
+                window=launch_new_term,
+                screen=output == "screen",
+                log_file=log_file,
+                env=env,
+            )
+        except (
+            _packages.NotFound,
+            _processes.CannotStart,
+            _master.MasterDown,
+            ValueError,
+        ) as fault:
+            _log.error(f"{label}: {fault}")
             return False
-        _master.require()
-        before = set(_master.node_uris().values())
-        handle = _processes.start(
-            command, "node", label, window=launch_new_term, screen=output == "screen"
-        )
-    except (_packages.NotFound, _processes.CannotStart, _master.MasterDown, ValueError) as fault:
-        _log.error(f"{label}: {fault}")
-        return False
-    if not wait:
-        return True
-    full_name = rosgraph.names.ns_join(_global(ns), name) if name else None
-    outcome = _waiting.until(lambda: _is_registered(handle, full_name, before), handle, timeout)
-    return _report(handle, outcome, timeout)
+        if not wait:
+            return Started(handle)
+        full_name = rosgraph.names.ns_join(_global(ns), name) if name else None
+        outcome = _waiting.until(lambda: _is_registered(handle, full_name, before), handle, timeout)
+        return _report(handle, outcome, timeout)
 
 
 def ros_kill_node(node_name: str) -> bool:
@@ -202,7 +226,7 @@ def _is_registered(handle: _processes.Handle, name: str | None, before: set[str]
     return any(handle.owns(_master.node_pid(address)) for address in new)
 
 
-def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> bool:
+def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> Started | bool:
     label = handle.entry.label
     if outcome is Outcome.LATE:
         _log.error(
@@ -214,4 +238,4 @@ def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> bool
     code = handle.exit_code() if outcome is Outcome.ENDED else 0
     if code:
         _log.error(f"{label}: ended with exit code {code}: {handle.reason()}{handle.where()}")
-    return not code
+    return False if code else Started(handle)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import rosgraph
 import rosparam
-import rospy
 import yaml
 
-from ros_utils import _log, _master, _packages
+from ros_utils import _log, _master, _packages, _params
 
 
 def ros_load_yaml_from_pkg(pkg_name: str, file_name: str, ns: str = "/") -> bool:
@@ -37,13 +35,12 @@ def ros_load_yaml_from_path(file_path: str, ns: str = "/") -> bool:
     `ros_load_yaml_from_pkg`."""
     try:
         documents = _read(_packages.existing(file_path))
-        _master.require()
         for document in documents:
-            rosparam.upload_params(rospy.resolve_name(ns or "/"), document)
+            _params.put(ns or "/", document)
     except (_packages.NotFound, _master.MasterDown) as fault:
         _log.error(f"ros_load_yaml: {fault}")
         return False
-    except (ValueError, OSError, rosparam.RosParamException, rosgraph.MasterException) as fault:
+    except (ValueError, OSError) as fault:
         _log.error(f"{file_path}: {fault}")
         return False
     return True

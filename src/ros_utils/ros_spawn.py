@@ -6,9 +6,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import rosgraph
-import rospy
 
-from ros_utils import _log, _master, ros_controllers, ros_gazebo, ros_node, ros_params, ros_urdf
+from ros_utils import (
+    _log,
+    _master,
+    _params,
+    ros_controllers,
+    ros_gazebo,
+    ros_node,
+    ros_params,
+    ros_urdf,
+)
 
 
 def init_robot_state_pub(
@@ -27,14 +35,15 @@ def init_robot_state_pub(
     if max_pub_freq is not None:
         name = rosgraph.names.ns_join(namespace or "/", "rob_st_pub/publish_frequency")
         try:
-            _master.require()
-            rospy.set_param(name, float(max_pub_freq))
-        except (_master.MasterDown, rosgraph.MasterException, OSError, ValueError) as fault:
+            _params.put(name, float(max_pub_freq))
+        except (_master.MasterDown, ValueError) as fault:
             _log.error(f"parameter {name}: {fault}")
             return False
     package = "robot_state_publisher"
-    return ros_node.ros_node_from_pkg(
-        package, package, launch_new_term=launch_new_term, name="rob_st_pub", ns=namespace
+    return bool(
+        ros_node.ros_node_from_pkg(
+            package, package, launch_new_term=launch_new_term, name="rob_st_pub", ns=namespace
+        )
     )
 
 
@@ -59,6 +68,9 @@ def spawn_model_in_gazebo(
     ori_z: float = 0.0,
     *,
     controllers_pkg: str | None = None,
+    timeout: float = ros_gazebo.TIMEOUT,
+    gazebo_ns: str = ros_gazebo.GAZEBO,
+    verify: bool = False,
 ) -> bool:
     """Load a robot's description, start its state publisher, spawn it, and load and start its
     controllers.
@@ -79,6 +91,8 @@ def spawn_model_in_gazebo(
         ori_w, ori_x, ori_y, ori_z: orientation, a quaternion with w first here; all zeros is no
             rotation.
         controllers_pkg: package of `controllers_file`; None for `pkg_name`.
+        timeout, gazebo_ns: see `ros_gazebo`.
+        verify: go on only once the model is in the world's list.
 
     Returns:
         True if every stage succeeded. The first failure ends it; earlier stages stay as they are.
@@ -106,12 +120,17 @@ def spawn_model_in_gazebo(
         ori_y,
         ori_z,
         ori_w,
+        timeout=timeout,
+        gazebo_ns=gazebo_ns,
+        verify=verify,
     )
     if not spawned:
         _log.error(f"spawn_model_in_gazebo: {gazebo_name}: {text}")
         return False
     if controllers_file is None:
         return True
-    return ros_params.ros_load_yaml_from_pkg(
-        controllers_pkg or pkg_name, controllers_file, ns
-    ) and ros_controllers.spawn_controllers_srv(controllers_list, ns)
+    if not ros_params.ros_load_yaml_from_pkg(controllers_pkg or pkg_name, controllers_file, ns):
+        return False
+    return bool(
+        ros_controllers.spawn_controllers_srv(controllers_list, ns, service_timeout=timeout)
+    )

@@ -7,11 +7,9 @@ import threading
 from collections.abc import Sequence
 from xml.parsers.expat import ExpatError
 
-import rosgraph
-import rospy
 import xacro
 
-from ros_utils import _log, _master, _packages
+from ros_utils import _log, _master, _packages, _params
 
 _lock = threading.Lock()  # xacro keeps its state in module variables
 
@@ -57,9 +55,8 @@ def urdf_load_from_path(
         return False
     name = param_name if ns in (None, "", "/") else f"{ns}/{param_name}"
     try:
-        _master.require()
-        rospy.set_param(name, xml)
-    except (_master.MasterDown, rospy.ROSException, rosgraph.MasterException, OSError) as fault:
+        _params.put(name, xml)
+    except _master.MasterDown as fault:
         _log.error(f"parameter {name}: {fault}")
         return False
     return True

@@ -88,6 +88,14 @@ def test_same_seed_same_files(tmp_path: Path) -> None:
     assert results[1] == results[3]
 
 
+def test_start_noise_is_seeded(tmp_path: Path) -> None:
+    lengths = []
+    for name, noise in (("first", 0.05), ("again", 0.05), ("none", 0.0)):
+        (tmp_path / name).mkdir()
+        lengths.append(trained(tmp_path / name, episodes=5, seed=4, start_noise=noise)["lengths"])
+    assert lengths[0] == lengths[1] != lengths[2]
+
+
 def test_a_simulator_that_dies_costs_only_its_episode(tmp_path: Path) -> None:
     plant = FakePlant(fail_after=300)
     with pytest.raises(CartpoleError, match=r"has ended; stopped after \d+ of") as raised:

@@ -7,12 +7,13 @@ from cartpole.training.pg_settings import Settings, settings
 
 
 def test_defaults() -> None:
-    assert settings([], {}) == Settings(600, 0, None, 100, False, False)
+    assert settings([], {}) == Settings(600, 0, None, 100, False, False, False, 0.0)
 
 
 def test_every_flag() -> None:
     flags = ["--episodes=5", "--seed=3", "--run-dir=out", "--save-every=2", "--realtime", "--gui"]
-    assert settings(flags, {}) == Settings(5, 3, "out", 2, True, True)
+    flags += ["--random-start", "--start-noise=0.05"]
+    assert settings(flags, {}) == Settings(5, 3, "out", 2, True, True, True, 0.05)
 
 
 def test_every_parameter() -> None:
@@ -23,8 +24,10 @@ def test_every_parameter() -> None:
         "save_every": 2,
         "realtime": True,
         "gui": True,
+        "random_start": True,
+        "start_noise": 0.05,
     }
-    assert settings([], parameters) == Settings(5, 3, "my run", 2, True, True)
+    assert settings([], parameters) == Settings(5, 3, "my run", 2, True, True, True, 0.05)
 
 
 def test_flags_win_over_parameters() -> None:
@@ -46,6 +49,9 @@ def test_empty_and_false_parameters_are_defaults() -> None:
         ["--seed", "-1"],
         ["--seed", str(2**40)],
         ["--save-every", "-1"],
+        ["--start-noise", "-0.1"],
+        ["--start-noise", "0.3"],
+        ["--start-noise", "nan"],
         ["--gui", "--headless"],
         ["--episods", "5", "--x"],
         ["surplus"],

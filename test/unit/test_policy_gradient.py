@@ -11,6 +11,8 @@ from unit.learning_fakes import FakePlant
 from cartpole.agents.policy_gradient import (
     Episode,
     PolicyGradientAgent,
+    PolicyNetwork,
+    ValueNetwork,
     discounted_returns,
 )
 from cartpole.envs.cartpole_env import CartPoleEnv
@@ -73,9 +75,10 @@ def test_returns_equal_the_documents_loop(length: int) -> None:
     assert discounted_returns(rewards) == pytest.approx(slow, rel=1e-12, abs=1e-12)
 
 
+@pytest.mark.parametrize("random_start", [False, True])
 @pytest.mark.parametrize("length", [1, 5, 300])
-def test_updates_equal_the_documents(length: int) -> None:
-    ours, theirs = PolicyGradientAgent(1), PolicyGradientAgent(1)
+def test_updates_equal_the_documents(length: int, random_start: bool) -> None:
+    ours, theirs = (PolicyGradientAgent(1, random_start) for _ in range(2))
     for seed in range(5):
         episode = random_episode(length, seed)
         assert tuple(ours.learn(episode)) == pytest.approx(
@@ -102,7 +105,7 @@ def test_probability_survives_huge_observations() -> None:
 
 
 def test_actions_follow_the_probability() -> None:
-    agent = PolicyGradientAgent(5)
+    agent = PolicyGradientAgent(5, random_start=True)
     observation = np.array([0.3, -1.0, 0.2, 0.5], np.float32)
     share = np.mean([agent.act(observation) == 0 for _ in range(20000)])
     assert share == pytest.approx(agent.probability_of_zero(observation), abs=0.015)
@@ -140,6 +143,21 @@ def test_same_seed_gives_the_same_weights_whatever_else_is_random() -> None:
     assert not all(torch.equal(mine, its) for mine, its in zip(first, other, strict=True))
 
 
+def test_it_starts_from_a_uniform_policy_and_no_value() -> None:
+    observation = np.random.default_rng(0).normal(size=4).astype(np.float32)
+    agent = PolicyGradientAgent(6)
+    assert agent.probability_of_zero(observation) == 0.5
+    assert agent.value(torch.from_numpy(observation).unsqueeze(0)).item() == 0.0
+
+
+def test_a_random_start_is_torchs_own() -> None:
+    torch.manual_seed(6)
+    policy, value = PolicyNetwork(), ValueNetwork()
+    expected = [p for net in (policy, value) for p in net.parameters()]
+    drawn = weights(PolicyGradientAgent(6, random_start=True))
+    assert all(torch.equal(mine, its) for mine, its in zip(drawn, expected, strict=True))
+
+
 def test_seeding_leaves_torchs_global_generator_alone() -> None:
     state = torch.get_rng_state()
     PolicyGradientAgent(9)
@@ -148,7 +166,7 @@ def test_seeding_leaves_torchs_global_generator_alone() -> None:
 
 def test_it_learns() -> None:
     history = History()
-    train(CartPoleEnv(FakePlant()), PolicyGradientAgent(2), 100, history, [])
+    train(CartPoleEnv(FakePlant()), PolicyGradientAgent(2), 200, history, [])
     assert np.mean(history.lengths[-20:]) > 2 * np.mean(history.lengths[:20])
 
 

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ros_utils import (
+    _gazebo_calls,
     ros_controllers,
     ros_gazebo,
     ros_launch,
@@ -288,7 +289,7 @@ def test_a_namespace_is_made_global(ns):
 
 @given(st.tuples(*[st.floats(-1, 1)] * 4))
 def test_a_quaternion_of_zeros_means_no_rotation(turn):
-    got = ros_gazebo._pose(1.0, 2.0, 3.0, *turn).orientation
+    got = _gazebo_calls.make_pose(1.0, 2.0, 3.0, *turn).orientation
     assert (got.x, got.y, got.z, got.w) == (turn if any(turn) else (0.0, 0.0, 0.0, 1.0))
 
 

@@ -210,3 +210,18 @@ def test_a_busy_simulation_does_not_keep_others_out():
     done.set()
     thread.join(BOUND)
     assert not thread.is_alive()
+
+
+def test_a_slow_rate_can_be_changed_and_stopped_at_once():
+    sim = Simulator(World(BulletEngine()), max_update_rate=5e-324)
+    thread = threading.Thread(target=sim.run)
+    thread.start()
+    ticking = threading.Event()
+    sim.listeners.append(lambda now: ticking.set() if now > 2_000_000 else None)
+    sim.max_update_rate = 1000.0
+    assert ticking.wait(BOUND)
+    sim.max_update_rate = 1e-12
+    sim.stop()
+    thread.join(BOUND)
+    assert not thread.is_alive()
+    sim.world.close()

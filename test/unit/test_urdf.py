@@ -1,5 +1,7 @@
 """Reading URDF: faults named with their place, and fixed joints lumped as Gazebo does."""
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,7 +12,7 @@ from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.pose import Pose, from_rpy, multiply, normalized, rotate, to_rpy
 from bullet_gazebo.physics.urdf import parse_urdf
 from bullet_gazebo.physics.urdf_writer import write_urdf
-from bullet_gazebo.physics.world import World
+from bullet_gazebo.physics.world import World, ground_plane
 
 INERTIAL = (
     '<inertial><origin xyz="{com}"/><mass value="{mass}"/>'
@@ -120,6 +122,13 @@ def test_a_floating_joint_to_the_world_is_a_free_base():
     assert (model.root, model.fixed_base, model.joints) == ("b", False, {})
 
 
+def test_a_link_called_world_inside_the_robot_is_a_link_like_others():
+    text = robot(link("a"), link("world"), link("b"), joint("j", "revolute", "a", "world"),
+                 joint("k", "floating", "world", "b"))  # fmt: skip
+    with pytest.raises(DescriptionError, match="joint 'k': a floating joint"):
+        parse_urdf(text)
+
+
 def test_plugins_of_the_model_are_kept():
     text = '<gazebo><plugin name="p" filename="libx.so"><a>1</a></plugin></gazebo>'
     (plugin,) = parse_urdf(robot(link("a"), text)).plugins
@@ -159,7 +168,7 @@ def test_plugins_of_the_model_are_kept():
         ),
         (
             robot(link("a", more='<visual><geometry><box size="1 2"/></geometry></visual>')),
-            "link 'a', visual: <box size='1 2'> must hold 3 numbers",
+            "link 'a', visual: <box size> must hold 3 numbers, not '1 2'",
         ),
     ],
 )  # fmt: skip
@@ -169,6 +178,152 @@ def test_a_fault_is_one_line_with_its_place(text, fault):
     assert str(raised.value).startswith("my.urdf: ")
     assert fault in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+def chain(count):
+    links = [link(f"l{i}") for i in range(count + 1)]
+    joints = [joint(f"j{i}", "revolute", f"l{i}", f"l{i + 1}") for i in range(count)]
+    return parse_urdf(robot(*links, *joints))
+
+
+def test_a_long_chain_moves_to_its_last_joint():
+    world = World(BulletEngine(), gravity=(0.0, 0.0, 0.0))
+    model = world.spawn("r", chain(121), Pose())
+    model.body.apply_efforts([0.0] * 120 + [0.1])
+    world.step()
+    assert model.joint_state("j120")[1] > 0.0
+    world.close()
+
+
+def test_links_may_come_before_the_ones_that_carry_them():
+    """PyBullet's process dies of it."""
+    text = robot(link("c"), link("b"), link("a"), joint("k", "revolute", "b", "c", "0 0 1"),
+                 joint("j", "revolute", "a", "b", "0 0 1"))  # fmt: skip
+    world = World(BulletEngine(), gravity=(0.0, 0.0, 0.0))
+    model = world.spawn("r", parse_urdf(text), Pose())
+    assert model.link_names == ["c", "b", "a"]
+    assert model.joint_names == ("k", "j")
+    assert model.link_state("c")[0].position == pytest.approx((0.0, 0.0, 2.0), abs=1e-6)
+    world.close()
+
+
+def test_a_chain_too_long_for_the_engine_is_refused():
+    world = World(BulletEngine())
+    with pytest.raises(DescriptionError, match="it has 122 joints"):
+        world.spawn("r", chain(122), Pose())
+    assert world.models == {}
+    world.close()
+
+
+DYNAMICS = '<dynamics damping="-1"/>'
+HUGE = '<collision><geometry><sphere radius="1e30"/></geometry></collision>'
+
+
+@pytest.mark.parametrize(
+    ("parts", "fault"),
+    [
+        ((link("a", mass=1e300),), "link 'a': a mass of 1e+300 kg"),
+        ((link("a", mass=1e-300),), "link 'a': a mass of 1e-300 kg"),
+        ((link("a", inertia=1e30),), "link 'a': a moment of inertia of 1e+30"),
+        ((link("a", more=HUGE),), "link 'a': 1e+30 m is beyond 1e+07 m"),
+        (
+            (link("a"), link("b"), joint("j", "revolute", "a", "b", "1e9 0 0")),
+            "joint 'j': 1000000000.0 m",
+        ),
+        (
+            (link("a"), link("b"), joint("j", "revolute", "a", "b", more=DYNAMICS)),
+            "joint 'j': a damping of -1.0",
+        ),
+    ],
+)
+def test_what_the_engine_would_crash_on_is_refused(parts, fault):
+    world = World(BulletEngine())
+    with pytest.raises(DescriptionError) as raised:
+        world.spawn("r", parse_urdf(robot(*parts)), Pose())
+    assert fault in str(raised.value)
+    assert world.models == {}
+    world.close()
+
+
+SPHERE = '<collision{name}><geometry><sphere radius="0.1"/></geometry></collision>'
+
+
+def test_collisions_are_named_as_sdformat_names_them():
+    plain, called = SPHERE.format(name=""), SPHERE.format(name=' name="knob"')
+    model = parse_urdf(
+        robot(
+            link("base", more=plain + plain + called), link("plate", more=plain),
+            link("tip", more=called), joint("a", "fixed", "base", "plate"),
+            joint("b", "fixed", "plate", "tip"),
+        )
+    )  # fmt: skip
+    assert [shape.name for shape in model.links["base"].collisions] == [
+        "base_collision", "base_collision_1", "knob_collision_2",
+        "base_fixed_joint_lump__plate_collision_3", "base_fixed_joint_lump__knob_collision_4",
+    ]  # fmt: skip
+
+
+def test_fixed_joints_are_kept_where_the_file_says():
+    extra = (
+        '<gazebo reference="a"><preserveFixedJoint>true</preserveFixedJoint></gazebo>'
+        '<gazebo reference="b"><disableFixedJointLumping>true</disableFixedJointLumping></gazebo>'
+    )
+    model = parse_urdf(
+        robot(link("base"), link("x"), link("y"), joint("a", "fixed", "base", "x", "1 0 0"),
+              joint("b", "fixed", "x", "y", "1 0 0"), extra)
+    )  # fmt: skip
+    assert [(j.name, j.kind) for j in model.joints.values()] == [("a", "fixed"), ("b", "revolute")]
+    assert (model.joints["b"].lower, model.joints["b"].upper) == (0.0, 0.0)
+    world = World(BulletEngine())
+    spawned = world.spawn("r", model, Pose())
+    assert spawned.link_names == ["base", "x", "y"]
+    for _ in range(200):
+        world.step()
+    base, end = spawned.link_state("base")[0], spawned.link_state("y")[0]
+    assert end.relative_to(base).position == pytest.approx((2.0, 0.0, 0.0), abs=1e-4)
+    world.close()
+
+
+def test_gazebo_blocks_set_friction_and_gravity():
+    extra = (
+        '<gazebo reference="base"><mu1>0.3</mu1><mu2>0.4</mu2><kp>1e6</kp><material>Gazebo/Red</material>'
+        "<turnGravityOff>true</turnGravityOff><maxVel>1</maxVel></gazebo>"
+        '<gazebo reference="nobody"><mu1>1</mu1></gazebo>'
+    )
+    model = parse_urdf(robot(link("base"), extra))
+    assert (model.links["base"].mu, model.links["base"].gravity) == (0.3, False)
+    assert model.warnings == ["<gazebo reference='nobody'> refers to no link or joint"]
+
+
+def test_friction_decides_whether_a_box_slides():
+    """On a slope of 20 degrees, by gravity turned so, with a coefficient below and above its tangent."""
+    slope = (9.8 * math.sin(math.radians(20)), 0.0, -9.8 * math.cos(math.radians(20)))
+    shape = '<collision><geometry><box size="0.4 0.4 0.1"/></geometry></collision>'
+    ways = []
+    for mu in (0.2, 0.6):
+        world = World(BulletEngine(), gravity=slope)
+        world.spawn("ground_plane", ground_plane(), Pose())
+        text = robot(link("b", more=shape), f'<gazebo reference="b"><mu1>{mu}</mu1></gazebo>')
+        box = world.spawn("b", parse_urdf(text), Pose((0.0, 0.0, 0.05)))
+        for _ in range(1000):
+            world.step()
+        ways.append(box.state()[0].position[0])
+        world.close()
+    sliding = 0.5 * 9.8 * (math.sin(math.radians(20)) - 0.2 * math.cos(math.radians(20)))
+    assert ways == pytest.approx([sliding, 0.0], abs=0.05)
+
+
+def test_sensors_are_left_out_and_named():
+    extra = (
+        '<gazebo reference="base"><sensor type="ray" name="scan"><plugin filename="l.so"/></sensor>'
+        '<sensor type="imu" name="tilt"/></gazebo>'
+    )
+    model = parse_urdf(robot(link("base"), extra))
+    assert model.left_out == [
+        "ray sensor 'scan' of link 'base'",
+        "imu sensor 'tilt' of link 'base'",
+    ]
+    assert model.plugins == []
 
 
 angles = st.floats(-3.1, 3.1)

@@ -44,24 +44,32 @@ class Link:
     inertia: Inertia | None = None
     collisions: list[Shape] = field(default_factory=list)
     visuals: list[Shape] = field(default_factory=list)
+    mu: float = 1.0  # coefficient of friction; Gazebo's default
+    gravity: bool = True  # whether gravity acts on it
 
 
 @dataclass
 class Joint:
-    """A joint; limits in [rad, m], [N m, N] and [rad/s, m/s]. `pose` places the child in the parent link."""
+    """A joint; limits in [rad, m], [N m, N] and [rad/s, m/s]. `pose` places the child in the parent link.
+
+    `anchor` is the joint's frame, seen from the child link; `axis` is given in it. A URDF's joint frame is
+    the child's own frame; an SDF's can lie anywhere.
+    """
 
     name: str
     kind: str
     parent: str
     child: str
     pose: Pose = Pose()
+    anchor: Pose = Pose()
     axis: Vector = (1.0, 0.0, 0.0)
     lower: float = 0.0
     upper: float = 0.0
-    effort: float = 0.0
-    velocity: float = 0.0
+    effort: float = -1.0  # negative: no limit, as in SDF
+    velocity: float = -1.0
     damping: float = 0.0
     friction: float = 0.0
+    kept: bool = False  # a fixed joint that is not lumped
 
     @property
     def movable(self) -> bool:
@@ -81,9 +89,33 @@ class Plugin:
     element: Element
 
 
+Color = tuple[float, float, float, float]
+"""Red, green, blue, alpha: 0 to 1."""
+
+
+@dataclass
+class Light:
+    """A light. Nothing is lit in here: it is kept so that clients find it and read back what they set."""
+
+    name: str
+    diffuse: Color = (1.0, 1.0, 1.0, 1.0)
+    specular: Color = (0.1, 0.1, 0.1, 1.0)
+    attenuation_constant: float = 1.0
+    attenuation_linear: float = 1.0  # [1/m]
+    attenuation_quadratic: float = 0.0  # [1/m²]
+    direction: Vector = (0.0, 0.0, -1.0)
+    pose: Pose = Pose()
+    cast_shadows: bool = False
+    kind: str = "point"  # or directional, spot
+
+
 @dataclass
 class ModelDescription:
-    """Links and joints in document order. `world_joints` fix the root link to the world, if there are any."""
+    """Links and joints in document order. `world_joints` fix the root link to the world, if there are any.
+
+    `initial_pose` is where the file puts the model, `root_pose` the root link in the model. `islands` are
+    links of a static model that no joint connects with the root, and where they are, seen from it.
+    """
 
     name: str
     links: dict[str, Link]
@@ -93,6 +125,9 @@ class ModelDescription:
     world_joints: list[str] = field(default_factory=list)
     plugins: list[Plugin] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)  # sensors and the like, which nothing simulates
+    islands: dict[str, Pose] = field(default_factory=dict)
+    initial_pose: Pose = Pose()
     static: bool = False
     self_collide: bool = False
 

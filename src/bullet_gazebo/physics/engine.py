@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
-from bullet_gazebo.physics.description import ModelDescription
+from bullet_gazebo.physics.description import Inertia, ModelDescription
 from bullet_gazebo.physics.pose import Pose, Vector
 
 Twist = tuple[Vector, Vector]
@@ -25,6 +25,35 @@ class Body(ABC):
         """Applies one effort [N m, N] to each joint during the next step only."""
 
     @abstractmethod
+    def add_effort(self, index: int, effort: float) -> None:
+        """Adds an effort [N m, N] to joint `index` during the next step, on top of all others."""
+
+    @abstractmethod
+    def add_wrench(self, link: str, force: Vector, torque: Vector) -> None:
+        """Adds a force [N] at the centre of mass of `link` and a torque [N m], in world axes, during the
+        next step."""
+
+    @abstractmethod
+    def set_inertia(self, link: str, old: Inertia | None, new: Inertia) -> bool:
+        """Gives `link` another inertia. False, and nothing done, if that takes loading the model anew."""
+
+    @abstractmethod
+    def set_damping(self, index: int, damping: float) -> None:
+        """Sets the viscous damping [N m s/rad, N s/m] of joint `index`. It acts explicitly: beyond the
+        joint's inertia / time step it would drive instead of damp."""
+
+    @abstractmethod
+    def set_limits(self, index: int, lower: float, upper: float) -> None:
+        """Sets the stops [rad, m] of joint `index`; none if `lower` is above `upper`."""
+
+    @abstractmethod
+    def set_motor(self, index: int, velocity: float, effort: float) -> None:
+        """Lets a motor of at most `effort` [N m, N] drive joint `index` at `velocity` [rad/s, m/s].
+
+        At velocity 0 that is dry friction.
+        """
+
+    @abstractmethod
     def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
         """Puts joint `index` at `position` with `velocity`, without touching the other joints."""
 
@@ -35,6 +64,14 @@ class Body(ABC):
     @abstractmethod
     def link_state(self, name: str) -> tuple[Pose, Twist]:
         """Returns pose and twist of the frame of link `name`, in the world."""
+
+    @abstractmethod
+    def set_link_gravity(self, name: str, on: bool) -> None:
+        """Lets gravity act on link `name`, or not."""
+
+    @abstractmethod
+    def link_gravity(self, name: str) -> bool:
+        """Returns whether gravity acts on link `name`."""
 
 
 class Engine(ABC):
@@ -58,6 +95,10 @@ class Engine(ABC):
     @abstractmethod
     def set_time_step(self, dt: float) -> None:
         """Sets the length of a step [s]."""
+
+    @abstractmethod
+    def set_iterations(self, count: int) -> None:
+        """Sets how often the solver of contacts, stops and motors goes over them in a step."""
 
     @abstractmethod
     def step(self) -> None:

@@ -26,18 +26,34 @@ def combine(a: Inertia | None, b: Inertia | None) -> Inertia | None:
 def _about(body: Inertia, point: np.ndarray) -> np.ndarray:
     """The tensor (3, 3) about `point`, in the axes of the link."""
     rotation = _matrix(body.com.orientation)
-    own = np.array(
+    own = _tensor(body)
+    arm = np.array(body.com.position) - point
+    steiner = body.mass * (np.dot(arm, arm) * np.eye(3) - np.outer(arm, arm))
+    return rotation @ own @ rotation.T + steiner
+
+
+def _tensor(body: Inertia) -> np.ndarray:
+    """The tensor (3, 3) about the centre of mass, in the axes of `com`."""
+    return np.array(
         [
             [body.ixx, body.ixy, body.ixz],
             [body.ixy, body.iyy, body.iyz],
             [body.ixz, body.iyz, body.izz],
         ]
     )
-    arm = np.array(body.com.position) - point
-    steiner = body.mass * (np.dot(arm, arm) * np.eye(3) - np.outer(arm, arm))
-    return rotation @ own @ rotation.T + steiner
 
 
 def _matrix(q: Quaternion) -> np.ndarray:
     columns = [rotate(q, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     return np.array(columns).T
+
+
+def is_positive_definite(inertia: Inertia) -> bool:
+    """Returns whether mass and tensor are those of a body that an engine can turn about any axis."""
+    return inertia.mass > 0.0 and bool(np.linalg.eigvalsh(_tensor(inertia)).min() > 0.0)
+
+
+def tensor_in(inertia: Inertia, orientation: Quaternion) -> np.ndarray:
+    """The tensor (3, 3) about the centre of mass, in the axes that `orientation` of the link is given in."""
+    rotation = _matrix(orientation) @ _matrix(inertia.com.orientation)
+    return rotation @ _tensor(inertia) @ rotation.T

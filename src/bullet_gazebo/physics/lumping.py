@@ -17,19 +17,33 @@ from bullet_gazebo.physics.inertia import combine
 from bullet_gazebo.physics.pose import Pose
 
 WORLD = "world"
+LUMPED = "_fixed_joint_lump__"
 
 
 def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
     """Returns `model` with its fixed joints lumped and its massless links gone (changed in place)."""
-    _detach_from_world(model)
-    for name in [j.name for j in model.joints.values() if j.kind == "fixed"][::-1]:
+    detach_from_world(model)
+    lumped = [j.name for j in model.joints.values() if j.kind == "fixed" and not j.kept]
+    for name in lumped[::-1]:
         _lump(model, name)
     _drop_free_joints(model)
-    _drop_massless(model)
+    drop_massless(model)
+    for link in model.links.values():
+        link.collisions = _named(link, link.collisions, "_collision")
+        link.visuals = _named(link, link.visuals, "_visual")
     return model
 
 
-def _detach_from_world(model: ModelDescription) -> None:
+def _named(link: Link, shapes: list[Shape], suffix: str) -> list[Shape]:
+    """Names shapes as sdformat does: after themselves or their link, numbered from the second one on."""
+    names = []
+    for count, shape in enumerate(shapes):
+        stem = link.name + shape.name if shape.name.startswith(LUMPED) else shape.name or link.name
+        names.append(f"{stem}{suffix}_{count}" if count else f"{stem}{suffix}")
+    return [replace(shape, name=name) for shape, name in zip(shapes, names, strict=True)]
+
+
+def detach_from_world(model: ModelDescription) -> None:
     """A single fixed joint from the link `world` makes the model's base immovable; `world` is dropped."""
     if model.root != WORLD:
         return
@@ -45,6 +59,9 @@ def _detach_from_world(model: ModelDescription) -> None:
 def _lump(model: ModelDescription, name: str) -> None:
     joint = model.joints.pop(name)
     parent, child = model.links[joint.parent], model.links.pop(joint.child)
+    if not parent.collisions:
+        parent.mu = child.mu  # of what there is to touch
+    parent.gravity = parent.gravity and child.gravity
     parent.inertia = combine(parent.inertia, _moved(child.inertia, joint.pose))
     parent.collisions += [_lumped(shape, joint.pose, child.name) for shape in child.collisions]
     parent.visuals += [_lumped(shape, joint.pose, child.name) for shape in child.visuals]
@@ -58,15 +75,15 @@ def _moved(inertia: Inertia | None, pose: Pose) -> Inertia | None:
 
 
 def _lumped(shape: Shape, pose: Pose, link: str) -> Shape:
-    name = shape.name or f"fixed_joint_lump__{link}"
+    name = shape.name if shape.name.startswith(LUMPED) else LUMPED + (shape.name or link)
     return replace(shape, pose=pose.compose(shape.pose), name=name)
 
 
 def _drop_free_joints(model: ModelDescription) -> None:
     """Gazebo makes no joint of a floating or planar one; a robot that hangs from the world by it is free."""
-    for joint in [j for j in model.joints.values() if not j.movable]:
+    for joint in [j for j in model.joints.values() if not j.movable and not j.kept]:
         if (
-            joint.parent != WORLD
+            not joint.parent == model.root == WORLD
             or len([j for j in model.joints.values() if j.parent == WORLD]) > 1
         ):
             raise DescriptionError(
@@ -76,7 +93,7 @@ def _drop_free_joints(model: ModelDescription) -> None:
         model.root, model.root_pose, model.world_joints = joint.child, joint.pose, []
 
 
-def _drop_massless(model: ModelDescription) -> None:
+def drop_massless(model: ModelDescription) -> None:
     for name in list(model.links):
         link = model.links.get(name)
         if link is None or name == WORLD or (link.inertia is not None and link.inertia.mass > 0.0):

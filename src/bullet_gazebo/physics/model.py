@@ -2,11 +2,15 @@
 
 from collections.abc import Mapping
 
-from bullet_gazebo.physics.description import ModelDescription
+from bullet_gazebo.physics.description import ModelDescription, Shape
 from bullet_gazebo.physics.engine import Body, Twist
+from bullet_gazebo.physics.lumping import WORLD
+from bullet_gazebo.physics.mass_matrix import effective_inertias
 from bullet_gazebo.physics.pose import ZERO, Pose
-from bullet_gazebo.physics.urdf import WORLD
 
+NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
+FASTEST = 1e9  # [rad/s, m/s] that a motor can be asked for
+GENTLEST = 0.5  # of the damping that would stop a joint in one step
 AT_REST: Twist = (ZERO, ZERO)
 
 
@@ -18,6 +22,8 @@ class Model:
         self.description = description
         self.body = body
         self.initial_pose = pose
+        self._damped: set[str] = set()  # joints that the engine has been given a damping for
+        self._motors: dict[str, tuple[float, float]] = {}  # speed [rad/s, m/s] and effort [N m, N]
         self._joints = {joint: index for index, joint in enumerate(body.joint_names)}
 
     @property
@@ -30,9 +36,43 @@ class Model:
         """Names of the movable joints, in document order."""
         return self.body.joint_names
 
+    @property
+    def all_joints(self) -> list[str]:
+        """Names of all joints that Gazebo would list, fixed ones included."""
+        anchors = [name for name in self.description.world_joints if name != WORLD]
+        others = [name for name in self.description.joints if name not in anchors]
+        return anchors + others
+
+    def joint_index(self, name: str) -> int:
+        """Returns the place of a movable joint in the body's list; KeyError if there is none."""
+        return self._joints[name]
+
+    def collisions(self, link: str) -> dict[str, Shape]:
+        """Returns the collision shapes of `link` by name."""
+        return {shape.name: shape for shape in self.description.links[link].collisions}
+
+    def carriers(self, link: str) -> list[str]:
+        """Names of the movable joints between the root and `link`, from the root on."""
+        found: list[str] = []
+        parents = {joint.child: joint for joint in self.description.joints.values()}
+        while link in parents:
+            found.insert(0, parents[link].name)
+            link = parents[link].parent
+        return [name for name in found if name in self._joints]
+
+    @property
+    def geom_names(self) -> list[str]:
+        """Names of the collision shapes, link by link."""
+        links = self.description.links
+        return [shape.name for link in self.link_names for shape in links[link].collisions]
+
     def link_state(self, name: str) -> tuple[Pose, Twist]:
         """Returns pose and twist of the frame of link `name`, in world axes."""
         return self.body.link_state(name)
+
+    def root_state(self) -> tuple[Pose, Twist]:
+        """Returns pose and twist of the canonical (first) link's frame, in world axes."""
+        return self.body.link_state(self.description.root)
 
     def state(self) -> tuple[Pose, Twist]:
         """Returns the model frame's pose and the twist of its canonical (first) link, in world axes."""
@@ -44,7 +84,9 @@ class Model:
         self.body.reset_base(pose.compose(self.description.root_pose), twist)
 
     def joint_state(self, name: str) -> tuple[float, float]:
-        """Returns position [rad, m] and velocity [rad/s, m/s] of a joint; KeyError if there is none."""
+        """Returns position [rad, m] and velocity [rad/s, m/s] of a joint; zeros for a fixed one."""
+        if name not in self._joints and name in self.all_joints:
+            return 0.0, 0.0
         state = self.body.joint_states()[self._joints[name]]
         return state[0], state[1]
 
@@ -55,11 +97,67 @@ class Model:
         """
         for name in sorted(set(positions) & set(self._joints)):
             joint = self.description.joints[name]
-            position = positions[name]
-            if joint.bounded:
-                position = max(joint.lower, min(joint.upper, position))
-            self.body.reset_joint(self._joints[name], position)
+            self.body.reset_joint(self._joints[name], self.clamped(name, positions[name]))
             self._rest(self._below(joint.child))
+
+    def clamped(self, name: str, position: float) -> float:
+        """Returns `position` [rad, m] within the stops of joint `name`."""
+        joint = self.description.joints[name]
+        if not joint.bounded or joint.lower > joint.upper:
+            return position
+        return max(joint.lower, min(joint.upper, position))
+
+    def set_stops(self, name: str, lower: float | None, upper: float | None) -> None:
+        """Sets a joint's stops [rad, m]; None leaves one. Crossed stops are none, as in ODE."""
+        joint = self.description.joints[name]
+        if not joint.bounded:
+            joint.kind, joint.lower, joint.upper = "revolute", -NO_STOP, NO_STOP
+        joint.lower = joint.lower if lower is None else max(-NO_STOP, min(NO_STOP, lower))
+        joint.upper = joint.upper if upper is None else max(-NO_STOP, min(NO_STOP, upper))
+        self.body.set_limits(self._joints[name], joint.lower, joint.upper)
+
+    def set_motor(self, name: str, velocity: float | None, effort: float | None) -> None:
+        """Sets speed [rad/s, m/s] and most effort [N m, N] of a joint's own motor; None leaves one.
+
+        ODE's dry friction is such a motor of speed 0, so a new effort takes the friction's place.
+        """
+        old = self._motors.get(name, (0.0, self.description.joints[name].friction))
+        speed = old[0] if velocity is None else velocity
+        most = old[1] if effort is None else effort
+        self._motors[name] = (max(-FASTEST, min(FASTEST, speed)), min(most, NO_STOP))
+        self.body.set_motor(self._joints[name], *self._motors[name])
+
+    def apply_damping(self, time_step: float) -> None:
+        """Hands the joints' damping to the engine, which would blow up if it were stiffer than a step."""
+        damped = {n for n in self._joints if self.description.joints[n].damping > 0.0}
+        if not damped | self._damped:
+            return
+        poses = {name: self.body.link_state(name)[0] for name in self.body.link_names}
+        inertias = effective_inertias(self.description, poses)
+        for name in damped | self._damped:
+            most = GENTLEST * inertias[name] / time_step
+            damping = min(self.description.joints[name].damping, most)
+            self.body.set_damping(self._joints[name], damping)
+        self._damped |= damped
+
+    def move_into(self, body: Body) -> None:
+        """Goes on in another body of the engine, loaded from the same description, in the same state."""
+        pose, twist = self.root_state()
+        states = self.joint_states()
+        self.body = body
+        body.reset_base(pose, twist)
+        for index, (position, velocity) in enumerate(states):
+            body.reset_joint(index, position, velocity)
+        for name, motor in self._motors.items():
+            body.set_motor(self._joints[name], *motor)
+
+    def joint_states(self) -> list[tuple[float, float]]:
+        """Returns position [rad, m] and velocity [rad/s, m/s] of each movable joint."""
+        return [(state[0], state[1]) for state in self.body.joint_states()]
+
+    def rest_joints(self) -> None:
+        """Takes the velocity out of all joints; the root link keeps its own."""
+        self._rest(list(self._joints))
 
     def rest(self) -> None:
         """Takes all velocity out of the model; poses and joint positions stay."""

@@ -1,28 +1,60 @@
 """Writes a ModelDescription as the URDF that the engine reads: lumped, without Gazebo's extensions."""
 
-from xml.etree.ElementTree import Element, SubElement, tostring
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from bullet_gazebo.physics.description import Inertia, Joint, Link, ModelDescription, Shape
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    Inertia,
+    Joint,
+    Link,
+    ModelDescription,
+    Shape,
+)
+from bullet_gazebo.physics.meshes import engine_mesh
 from bullet_gazebo.physics.pose import Pose, to_rpy
 
 
-def write_urdf(model: ModelDescription) -> str:
-    """Returns URDF text with the numbers of `model` to the last digit."""
-    robot = Element("robot", name=model.name or "model")
+def write_urdf(model: ModelDescription, folder: Path | None = None) -> str:
+    """Returns URDF text with the numbers of `model` to the last digit.
+
+    Meshes that the engine can't read as they are get rewritten into `folder`, if one is given.
+    Errors: DescriptionError for a mesh.
+    """
+    robot = Element("robot", name="model")
     for link in model.links.values():
-        _write_link(robot, link)
+        _write_link(robot, link, model.static, folder)
     for joint in model.joints.values():
         _write_joint(robot, joint)
+    indent(robot)  # the engine reads lines of up to 8 KiB and breaks longer ones anywhere
     return tostring(robot, encoding="unicode")
 
 
-def _write_link(robot: Element, link: Link) -> None:
+def _write_link(robot: Element, link: Link, static: bool, folder: Path | None) -> None:
     element = SubElement(robot, "link", name=link.name)
     # Without an inertial the engine would assume 1 kg; only the immovable link `world` has none.
     _write_inertia(element, link.inertia or Inertia(mass=0.0))
     for tag, shapes in (("visual", link.visuals), ("collision", link.collisions)):
         for shape in shapes:
-            _write_shape(SubElement(element, tag), shape)
+            mesh = _mesh_file(shape, folder, needed=tag == "collision")
+            if mesh is None:
+                continue
+            written = SubElement(element, tag)
+            if static and shape.kind == "mesh" and tag == "collision":
+                written.set("concave", "yes")  # what moves collides by its convex hull
+            _write_shape(written, shape, mesh)
+
+
+def _mesh_file(shape: Shape, folder: Path | None, needed: bool) -> str | None:
+    """Returns the file that the engine reads; None for that of a visual that it can't read."""
+    if shape.kind != "mesh" or folder is None:
+        return shape.mesh
+    try:
+        return str(engine_mesh(Path(shape.mesh), folder))
+    except DescriptionError:
+        if needed:
+            raise
+        return None
 
 
 def _write_inertia(link: Element, inertia: Inertia) -> None:
@@ -35,7 +67,7 @@ def _write_inertia(link: Element, inertia: Inertia) -> None:
     SubElement(inertial, "inertia", tensor)
 
 
-def _write_shape(element: Element, shape: Shape) -> None:
+def _write_shape(element: Element, shape: Shape, mesh: str) -> None:
     _write_origin(element, shape.pose)
     geometry = SubElement(element, "geometry")
     if shape.kind == "box":
@@ -44,8 +76,10 @@ def _write_shape(element: Element, shape: Shape) -> None:
         SubElement(geometry, "cylinder", radius=repr(shape.size[0]), length=repr(shape.size[1]))
     elif shape.kind == "sphere":
         SubElement(geometry, "sphere", radius=repr(shape.size[0]))
+    elif shape.kind == "plane":
+        SubElement(geometry, "plane", normal="0 0 1")
     else:
-        SubElement(geometry, "mesh", filename=shape.mesh, scale=_words(shape.size))
+        SubElement(geometry, "mesh", filename=mesh, scale=_words(shape.size))
     if shape.rgba is not None:
         material = SubElement(element, "material", name=f"rgba {_words(shape.rgba)}")
         SubElement(material, "color", rgba=_words(shape.rgba))

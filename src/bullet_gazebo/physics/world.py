@@ -2,10 +2,18 @@
 
 from typing import NamedTuple
 
-from bullet_gazebo.physics.description import Link, ModelDescription, Shape
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    Inertia,
+    Light,
+    Link,
+    ModelDescription,
+    Shape,
+)
 from bullet_gazebo.physics.engine import Engine, Twist
 from bullet_gazebo.physics.model import AT_REST, Model
 from bullet_gazebo.physics.pose import Pose, Vector
+from bullet_gazebo.physics.settings import SolverSettings
 
 GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
 TIME_STEP = 0.001  # [s], Gazebo's default
@@ -17,11 +25,15 @@ class NameTaken(ValueError):
 
 
 class Entity(NamedTuple):
-    """What a name stands for: `kind` is model, link or joint; `name` is plain."""
+    """What a name stands for: `kind` is model, link, collision or joint; `name` is plain.
+
+    `link` is the link that a collision belongs to.
+    """
 
     kind: str
     model: Model
     name: str
+    link: str = ""
 
 
 class World:
@@ -32,10 +44,12 @@ class World:
     ) -> None:
         self.engine = engine
         self.models: dict[str, Model] = {}
+        self.lights: dict[str, Light] = {}
         self._entities: dict[str, Entity] = {}
         self._joints: dict[str, Entity] = {}
         self.time_step = time_step
         self.gravity = gravity
+        self.solver = SolverSettings()
         engine.set_gravity(gravity)
         engine.set_time_step(time_step)
 
@@ -47,9 +61,15 @@ class World:
         if name in self.models:
             raise NameTaken(name)
         body = self.engine.load(description, pose.compose(description.root_pose))
-        self.models[name] = Model(name, description, body, pose)
+        model = Model(name, description, body, pose)
+        try:
+            model.apply_damping(self.time_step)
+        except Exception:
+            self.engine.remove(body)
+            raise
+        self.models[name] = model
         self._index()
-        return self.models[name]
+        return model
 
     def delete(self, name: str) -> None:
         """Takes model `name` out of the world; KeyError if there is none."""
@@ -61,19 +81,68 @@ class World:
         entity = self._entities.get(name)
         return entity.model if entity is not None and entity.kind == "model" else None
 
+    def link(self, name: str) -> tuple[Model, str] | None:
+        """Returns model and plain name of what the name look-up finds, if it is a link."""
+        entity = self._entities.get(name)
+        return (entity.model, entity.name) if entity is not None and entity.kind == "link" else None
+
     def joint(self, name: str) -> tuple[Model, str] | None:
         """Returns the first model that has joint `name` (plain or scoped), and the joint's plain name."""
         entity = self._joints.get(name)
         return None if entity is None else (entity.model, entity.name)
 
     def frame(self, name: str) -> tuple[Pose, Twist] | None:
-        """Returns pose and twist of the named model or link, or of the world; None if unknown."""
+        """Returns pose and twist of the named model, link or collision, or of the world; None if unknown."""
         entity = self._entities.get(name)
         if entity is None or entity.kind == "joint":
             return (Pose(), AT_REST) if entity is None and name in WORLD_FRAMES else None
         if entity.kind == "model":
             return entity.model.state()
-        return entity.model.link_state(entity.name)
+        if entity.kind == "link":
+            return entity.model.link_state(entity.name)
+        pose, twist = entity.model.link_state(entity.link)
+        return pose.compose(entity.model.collisions(entity.link)[entity.name].pose), twist
+
+    def is_world_frame(self, name: str) -> bool:
+        """Returns whether `name` stands for the world itself: an entity of that name goes first."""
+        return name in WORLD_FRAMES and name not in self._entities
+
+    def set_gravity(self, gravity: Vector) -> None:
+        """Sets the acceleration of gravity [m/s²]."""
+        self.gravity = gravity
+        self.engine.set_gravity(gravity)
+
+    def set_time_step(self, time_step: float) -> None:
+        """Sets the length of a physics step [s]."""
+        self.time_step = time_step
+        self.engine.set_time_step(time_step)
+        for model in self.models.values():
+            model.apply_damping(time_step)
+
+    def set_solver(self, solver: SolverSettings) -> None:
+        """Keeps the solver's settings; the number of iterations acts."""
+        self.solver = solver
+        self.engine.set_iterations(solver.iterations)
+
+    def set_inertia(self, model: Model, link: str, inertia: Inertia) -> None:
+        """Gives a link of `model` another inertia; poses and velocities stay.
+
+        Errors: DescriptionError if the engine can't take it; the model is as it was then.
+        """
+        record = model.description.links[link]
+        old, record.inertia = record.inertia, inertia
+        if model.description.static:
+            return
+        if not model.body.set_inertia(link, old, inertia):
+            try:
+                fresh = self.engine.load(model.description, model.root_state()[0])
+            except DescriptionError:
+                record.inertia = old
+                raise
+            stale = model.body
+            model.move_into(fresh)
+            self.engine.remove(stale)
+        model.apply_damping(self.time_step)
 
     def step(self) -> None:
         """Integrates all models by one time step."""
@@ -93,13 +162,20 @@ class World:
         self._entities, self._joints = {}, {}
         for model in self.models.values():
             self._entities.setdefault(model.name, Entity("model", model, model.name))
-            for kind, names in (("link", model.link_names), ("joint", model.joint_names)):
-                for name in names:
-                    entity = Entity(kind, model, name)
-                    for key in (f"{model.name}::{name}", name):
-                        self._entities.setdefault(key, entity)
-                        if kind == "joint":
-                            self._joints.setdefault(key, entity)
+            for link in model.link_names:
+                self._enter(Entity("link", model, link), f"{model.name}::{link}")
+                for name in model.collisions(link):
+                    scoped = f"{model.name}::{link}::{name}"
+                    self._enter(Entity("collision", model, name, link), scoped)
+            for name in model.all_joints:
+                joint, scoped = Entity("joint", model, name), f"{model.name}::{name}"
+                self._enter(joint, scoped)
+                for key in (scoped, name):
+                    self._joints.setdefault(key, joint)
+
+    def _enter(self, entity: Entity, scoped: str) -> None:
+        for key in (scoped, entity.name):
+            self._entities.setdefault(key, entity)
 
 
 def ground_plane() -> ModelDescription:

@@ -45,3 +45,11 @@ def to_joint_state(sample: JointStateSample) -> JointState:
 
 def to_joint_controller_state(sample: JointControllerSample) -> JointControllerState:
     return JointControllerState(Header(stamp=to_time(sample.stamp)), *sample[1:])
+
+
+def to_vector(msg: Point | Vector3) -> poses.Vector:
+    return (msg.x, msg.y, msg.z)
+
+
+def from_twist_msg(msg: Twist) -> tuple[poses.Vector, poses.Vector]:
+    return to_vector(msg.linear), to_vector(msg.angular)

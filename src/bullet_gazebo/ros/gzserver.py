@@ -1,49 +1,30 @@
 """The node `gazebo`: what `rosrun gazebo_ros gzserver` runs."""
 
 import argparse
-import os
 import threading
 import traceback
 
 import rospy
 
 from bullet_gazebo.physics.bullet import BulletEngine
-from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.physics.world import World
 from bullet_gazebo.ros.control_plugin import FILENAME as CONTROL_PLUGIN
 from bullet_gazebo.ros.control_plugin import ControlPlugin
-from bullet_gazebo.ros.joint_services import JointServices
-from bullet_gazebo.ros.model_services import ModelServices
+from bullet_gazebo.ros.joint_state_plugin import FILENAME as JOINT_STATE_PLUGIN
+from bullet_gazebo.ros.joint_state_plugin import JointStatePlugin
 from bullet_gazebo.ros.plugins import PluginRegistry
+from bullet_gazebo.ros.server_args import parse_args, seed_random_numbers
+from bullet_gazebo.ros.signals import Ending
 from bullet_gazebo.ros.spawn_services import SpawnServices
 from bullet_gazebo.ros.state_topics import advertise_states
 from bullet_gazebo.ros.step_service import StepService
-from bullet_gazebo.ros.time_services import advertise_time_services
+from bullet_gazebo.ros.world_control import WorldControl
+from bullet_gazebo.ros.world_loader import fill_world, load_plugins, read_world
+from bullet_gazebo.ros.world_services import advertise_world_services
 from bullet_gazebo.simulator import Simulator
 
-EMPTY_WORLD = "empty.world"
 ENGINES = ("ode", "bullet", "simbody", "dart")
 STOP_TIMEOUT = 5.0  # [s]
-
-
-def parse_args(argv: list[str]) -> argparse.Namespace:
-    """Reads gzserver's command line (contract: gazebo_api.md section 4.2). What is inert is accepted."""
-    parser = argparse.ArgumentParser(
-        prog="gzserver", description="A PyBullet stand-in for Gazebo's server."
-    )
-    parser.add_argument("world", nargs="?", default=EMPTY_WORLD, help="world file")
-    parser.add_argument("-u", dest="paused", action="store_true", help="start paused")
-    parser.add_argument(
-        "-e", "--physics", default="ode", help="accepted; physics is always PyBullet"
-    )
-    parser.add_argument("--lockstep", action="store_true", help="time moves only by ~step_world")
-    parser.add_argument("--seed", type=int, help="accepted; the physics uses no random numbers")
-    parser.add_argument("-r", dest="record", action="store_true", help="accepted, without effect")
-    parser.add_argument("--verbose", action="store_true", help="accepted, without effect")
-    parser.add_argument("-s", "--server-plugin", action="append", help="accepted, without effect")
-    args, ignored = parser.parse_known_args(argv)
-    args.ignored = ignored
-    return args
 
 
 class GazeboNode:
@@ -53,9 +34,9 @@ class GazeboNode:
         if not rospy.has_param("/use_sim_time"):
             rospy.set_param("/use_sim_time", True)
         world = World(BulletEngine())
-        world.spawn("ground_plane", ground_plane(), Pose())
         relatch = rospy.get_param("~relatch_on_reset", True)
         self.sim = Simulator(world, lockstep=args.lockstep, relatch=bool(relatch))
+        fill_world(self.sim, read_world(args.world))
         if args.paused:
             self.sim.pause()
         self._advertise(bool(rospy.get_param("~enable_ros_network", True)))
@@ -63,26 +44,33 @@ class GazeboNode:
         self._fault = False
 
     def _advertise(self, network: bool) -> None:
+        WorldControl(self.sim).offer()
         advertise_states(self.sim, float(rospy.get_param("~pub_clock_frequency", 0)), network)
+        plugins = PluginRegistry(
+            self.sim,
+            {
+                CONTROL_PLUGIN: ControlPlugin,
+                JOINT_STATE_PLUGIN: JointStatePlugin,
+            },
+        )
+        load_plugins(self.sim, plugins)
         if not network:
             return
-        plugins = PluginRegistry(self.sim, {CONTROL_PLUGIN: ControlPlugin})
         self._services = [
             SpawnServices(self.sim, plugins),
-            ModelServices(self.sim),
-            JointServices(self.sim),
-            *advertise_time_services(self.sim),
+            *advertise_world_services(self.sim),
         ]
         if self.sim.lockstep:
             self._services.append(StepService(self.sim))
 
-    def run(self) -> int:
+    def run(self, ending: Ending) -> int:
         """Simulates until the node is shut down; returns the exit code."""
         rospy.on_shutdown(
             self._stop
         )  # called before the topics close, so no tick publishes to a closed one
         self._thread.start()
-        rospy.spin()
+        ending.wait()
+        self._stop()  # a shutdown that came before the hook was there doesn't call it
         return 1 if self._fault else 0
 
     def _simulate(self) -> None:
@@ -103,11 +91,11 @@ class GazeboNode:
 def main(argv: list[str] | None = None) -> int:
     """Runs the node; returns its exit code."""
     args = parse_args(rospy.myargv(argv)[1:])
-    rospy.init_node("gazebo")
-    if os.path.basename(args.world) != EMPTY_WORLD:
-        rospy.logwarn("World files are not read yet: %s is taken as a ground plane", args.world)
+    ending = Ending()
+    rospy.init_node("gazebo", disable_signals=True)
     if args.physics not in ENGINES:
         rospy.logwarn("Physics engine '%s' is not known; PyBullet is used", args.physics)
     if args.ignored:
         rospy.logwarn("Arguments without effect here: %s", " ".join(args.ignored))
-    return GazeboNode(args).run()
+    seed_random_numbers(args.seed)
+    return GazeboNode(args).run(ending)

@@ -1,4 +1,4 @@
-"""get_joint_properties and set_model_configuration (contract: gazebo_api.md sections 2.10 and 2.16)."""
+"""Joint properties and set_model_configuration (contract: gazebo_api.md sections 2.10, 2.16 and 2.17)."""
 
 import math
 
@@ -7,21 +7,30 @@ from gazebo_msgs.srv import (
     GetJointProperties,
     GetJointPropertiesRequest,
     GetJointPropertiesResponse,
+    SetJointProperties,
+    SetJointPropertiesRequest,
+    SetJointPropertiesResponse,
     SetModelConfiguration,
     SetModelConfigurationRequest,
     SetModelConfigurationResponse,
 )
 
+from bullet_gazebo.physics.properties import JointProperties, PropertyError, set_joint_properties
+from bullet_gazebo.ros.checks import bad_number
 from bullet_gazebo.simulator import Simulator
+
+LONGEST_NAME = 80  # of a joint that is told in the log
+INFINITE = 1.7e308  # ODE's users write stops that are none as 1e16 and beyond
 
 
 class JointServices:
-    """Services that read and place joints."""
+    """Services that read, change and place joints."""
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._services = [
             rospy.Service("~get_joint_properties", GetJointProperties, self._get_properties),
+            rospy.Service("~set_joint_properties", SetJointProperties, self._set_properties),
             rospy.Service(
                 "~set_model_configuration", SetModelConfiguration, self._set_configuration
             ),
@@ -45,6 +54,29 @@ class JointServices:
             status_message="GetJointProperties: got properties",
         )
 
+    def _set_properties(self, request: SetJointPropertiesRequest) -> SetJointPropertiesResponse:
+        with self._sim.lock:
+            found = self._sim.world.joint(request.joint_name)
+            if found is None:
+                return _not_set("joint not found")
+            ode = request.ode_joint_config
+            fault = bad_number(ode, INFINITE)
+            if fault:
+                return _not_set(fault)
+            # Element i is for axis i, and no joint here has a second one. An empty list changes nothing.
+            # What is left out (erp, cfm, stop_erp, stop_cfm, fudge_factor) has no getter and no effect.
+            wanted = JointProperties(
+                *(
+                    next(iter(values), None)
+                    for values in (ode.damping, ode.loStop, ode.hiStop, ode.fmax, ode.vel)
+                )
+            )
+            try:
+                set_joint_properties(*found, wanted, self._sim.world.time_step)
+            except PropertyError as error:
+                return _not_set(str(error))
+        return SetJointPropertiesResponse(True, "SetJointProperties: properties set")
+
     def _set_configuration(
         self, request: SetModelConfigurationRequest
     ) -> SetModelConfigurationResponse:
@@ -59,10 +91,14 @@ class JointServices:
                 return _not_configured(f"joint positions must be finite, not {list(positions)}")
             plain = [name.removeprefix(f"{model.name}::") for name in names]
             self._sim.set_joint_positions(model, dict(zip(plain, positions, strict=True)))
-        unknown = sorted(set(plain) - set(model.joint_names))
+        unknown = sorted(name[:LONGEST_NAME] for name in set(plain) - set(model.joint_names))
         if unknown:  # Gazebo ignores them without a word
             rospy.logwarn("SetModelConfiguration: model '%s' has no joint %s", model.name, unknown)
         return SetModelConfigurationResponse(True, "SetModelConfiguration: success")
+
+
+def _not_set(fault: str) -> SetJointPropertiesResponse:
+    return SetJointPropertiesResponse(False, f"SetJointProperties: {fault}")
 
 
 def _not_configured(fault: str) -> SetModelConfigurationResponse:

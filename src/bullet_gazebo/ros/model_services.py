@@ -1,9 +1,12 @@
-"""get_model_state and get_world_properties (contract: gazebo_api.md sections 2.7 and 2.9)."""
+"""get_model_state, get_model_properties, get_world_properties (gazebo_api.md sections 2.7 to 2.9)."""
 
 from collections import Counter
 
 import rospy
 from gazebo_msgs.srv import (
+    GetModelProperties,
+    GetModelPropertiesRequest,
+    GetModelPropertiesResponse,
     GetModelState,
     GetModelStateRequest,
     GetModelStateResponse,
@@ -33,6 +36,7 @@ class ModelServices:
         self._calls: Counter[str] = Counter()  # header.seq counts the calls for each name
         self._services = [
             rospy.Service("~get_model_state", GetModelState, self._get_state),
+            rospy.Service("~get_model_properties", GetModelProperties, self._get_properties),
             rospy.Service("~get_world_properties", GetWorldProperties, self._get_world),
         ]
 
@@ -44,6 +48,23 @@ class ModelServices:
                 rendering_enabled=True,
                 success=True,
                 status_message="GetWorldProperties: got properties",
+            )
+
+    def _get_properties(self, request: GetModelPropertiesRequest) -> GetModelPropertiesResponse:
+        with self._sim.lock:
+            model = self._sim.world.model(request.model_name)
+            if model is None:
+                return GetModelPropertiesResponse(
+                    status_message="GetModelProperties: model does not exist"
+                )
+            # All names are unscoped, and canonical_body_name is never filled.
+            return GetModelPropertiesResponse(
+                body_names=model.link_names,
+                geom_names=[name for link in model.link_names for name in model.collisions(link)],
+                joint_names=model.all_joints,
+                is_static=model.description.static,
+                success=True,
+                status_message="GetModelProperties: got properties",
             )
 
     def _get_state(self, request: GetModelStateRequest) -> GetModelStateResponse:

@@ -1,8 +1,13 @@
-"""Model plugins: what stands in for the shared libraries that a model file names."""
+"""Model plugins: what stands in for the shared libraries that a model file names.
 
+How to add one's own: docs/plugins.md.
+"""
+
+import importlib
 import os
+import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import rospy
@@ -10,6 +15,9 @@ import rospy
 from bullet_gazebo.physics.description import Plugin
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.simulator import Simulator
+
+PARAMETER = "~plugins"  # library's file name: "module:Factory"
+Update = Callable[[int], None]
 
 
 @dataclass(frozen=True)
@@ -20,10 +28,41 @@ class PluginContext:
     model: Model
     plugin: Plugin
     namespace: str
+    _updates: list[Update] = field(default_factory=list, repr=False)
 
     def text(self, tag: str, default: str) -> str:
         """Returns the text of the plugin's child element `tag`."""
         return (self.plugin.element.findtext(tag) or "").strip() or default
+
+    def on_update(self, update: Update) -> None:
+        """Has `update` called before each physics step with the simulated time after it [ns].
+
+        It is called under the simulator's lock: it may touch the model, and must not wait for
+        anything. One that raises is reported, and not called again. It ends with the plugin.
+        """
+
+        def guarded(now: int) -> None:
+            try:
+                update(now)
+            except Exception:  # noqa: BLE001 - a user's code must not stop the world
+                self._report("is not called any more, because it raised")
+                self.sim.listeners = [each for each in self.sim.listeners if each is not guarded]
+
+        self._updates.append(guarded)
+        with self.sim.lock:
+            # A new list: the old one may be in use by the tick that removes an update.
+            self.sim.listeners = [*self.sim.listeners, guarded]
+
+    def release(self) -> None:
+        """Ends the updates."""
+        with self.sim.lock:
+            self.sim.listeners = [each for each in self.sim.listeners if each not in self._updates]
+
+    def _report(self, what: str) -> None:
+        rospy.logerr(
+            "Plugin %s of model '%s' %s:\n%s",
+            self.plugin.filename, self.model.name, what, traceback.format_exc(),
+        )  # fmt: skip
 
 
 class LoadedPlugin(Protocol):
@@ -33,33 +72,78 @@ class LoadedPlugin(Protocol):
         """Ends it; its model is about to be deleted. Not called under the simulator's lock."""
 
 
-Factory = Callable[[PluginContext], LoadedPlugin]
+Factory = Callable[[PluginContext], LoadedPlugin | None]
 
 
 class PluginRegistry:
-    """Makes plugins by the file name of their library."""
+    """Makes plugins by the file name of their library.
+
+    The built-in ones come first, then those of the parameter `~plugins`.
+    """
 
     def __init__(self, sim: Simulator, factories: dict[str, Factory]) -> None:
         self._sim = sim
         self._factories = dict(factories)
-        self._loaded: dict[Model, list[LoadedPlugin]] = {}
+        self._loaded: dict[Model, list[tuple[PluginContext, LoadedPlugin | None]]] = {}
 
     def load(self, model: Model, robot_namespace: str) -> None:
-        """Starts the plugins of `model`. An unknown one is a warning (gazebo_api.md section 2.4)."""
-        plugins = self._loaded.setdefault(model, [])
+        """Starts the plugins of `model`. One that is unknown or fails is a message, and left out
+        (gazebo_api.md section 2.4)."""
+        loaded = self._loaded.setdefault(model, [])
         for plugin in model.description.plugins:
-            factory = self._factories.get(os.path.basename(plugin.filename))
+            factory = self._find(plugin, model)
             if factory is None:
-                rospy.logwarn(
-                    "Model '%s': there is no stand-in for the plugin %s; it is left out",
-                    model.name, plugin.filename or "without a filename",
-                )  # fmt: skip
                 continue
             default = robot_namespace or model.name
             own = (plugin.element.findtext("robotNamespace") or "").strip()
-            plugins.append(factory(PluginContext(self._sim, model, plugin, own or default)))
+            context = PluginContext(self._sim, model, plugin, own or default)
+            try:
+                loaded.append((context, factory(context)))
+            except Exception:  # noqa: BLE001 - a user's code must not stop the world
+                context._report("is left out, because it raised")
+                context.release()
 
     def unload(self, model: Model) -> None:
         """Ends the plugins of `model`."""
-        for plugin in self._loaded.pop(model, []):
-            plugin.shutdown()
+        for context, plugin in self._loaded.pop(model, []):
+            context.release()
+            try:
+                if plugin is not None:
+                    plugin.shutdown()
+            except Exception:  # noqa: BLE001 - a user's code must not keep a model from going
+                context._report("raised when it was ended")
+
+    def _find(self, plugin: Plugin, model: Model) -> Factory | None:
+        """Returns the plugin's factory; None if there is none."""
+        library = os.path.basename(plugin.filename)
+        if library in self._factories:
+            return self._factories[library]
+        place = _registered().get(library)
+        if place is None:
+            # One warning will name it together with the sensors (spawn_services.warn).
+            unknown = f"plugin {plugin.filename or 'without a filename'}"
+            model.description.left_out.append(unknown)
+            return None
+        try:
+            return _imported(str(place))
+        except Exception as error:  # noqa: BLE001 - importing runs a user's code
+            rospy.logerr(
+                "Model '%s': the plugin %s is left out: %s of the parameter %s can't be imported: %s",
+                model.name, library, place, rospy.resolve_name(PARAMETER), error,
+            )  # fmt: skip
+            return None
+
+
+def _registered() -> dict[str, object]:
+    """Read at each look-up, so that a plugin can be added while the simulator runs."""
+    places = rospy.get_param(PARAMETER, {})
+    return places if isinstance(places, dict) else {}
+
+
+def _imported(place: str) -> Factory:
+    """Returns what `module:name` stands for."""
+    module, _, name = place.partition(":")
+    factory: Factory = getattr(importlib.import_module(module), name)
+    if not callable(factory):
+        raise TypeError(f"{place} can't be called")
+    return factory

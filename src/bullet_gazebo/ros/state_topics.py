@@ -80,7 +80,8 @@ class ClockTopic:
 
     def _thinned(self) -> bool:
         rate = self._sim.max_update_rate
-        return self._sim.lockstep or rate <= 0.0 or rate * PERIOD > 1.0
+        # Ticks of a paused world come from step(), as fast as they can be computed.
+        return self._sim.lockstep or self._sim.paused or rate <= 0.0 or rate * PERIOD > 1.0
 
     def _send_newest(self) -> None:
         while not self._ending.wait(PERIOD):

@@ -16,6 +16,7 @@ from cartpole.agents.policy_gradient import (
 from cartpole.envs.cartpole_env import CartPoleEnv
 from cartpole.envs.plant import Plant
 from cartpole.errors import CartpoleError
+from cartpole.task import BalanceTask
 from cartpole.training import run_folder
 from cartpole.training.checkpoints import NetworkSaver
 from cartpole.training.evaluation import Evaluation, evaluate
@@ -52,7 +53,7 @@ class Training:
         self._folder = folder
         self._plant = plant
         self._interrupt = interrupt
-        self._agent = PolicyGradientAgent(settings.seed)
+        self._agent = PolicyGradientAgent(settings.seed, settings.random_start)
         self._saver = NetworkSaver(folder, self._agent, settings.save_every)
         self._history = History()  # its clock starts here
 
@@ -80,9 +81,11 @@ class Training:
         log = TensorBoardLog(self._folder, {**asdict(settings), **hyperparameters()})
         shown = progress(settings.episodes)
         say(f"training for {settings.episodes} episodes with seed {settings.seed}")
+        env = CartPoleEnv(self._plant, BalanceTask(noise=settings.start_noise))
         try:
+            env.reset(seed=settings.seed)  # the loop's own resets go on from here
             train(
-                CartPoleEnv(self._plant),
+                env,
                 self._agent,
                 settings.episodes,
                 self._history,

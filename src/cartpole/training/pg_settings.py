@@ -13,8 +13,11 @@ Trains the cart-pole by policy gradient over ROS, in lock-step with the simulato
 
 Starts what isn't running (master, simulator, robot, controllers) and stops exactly that.
 Every flag is a private rosparam too (~episodes, ~seed, ~run_dir, ~save_every, ~realtime,
-~gui); the command line wins. Ctrl-C saves what was learned and exits with 130 (SIGTERM: 143).
+~gui, ~random_start, ~start_noise); the command line wins. Ctrl-C saves what was learned and exits with 130 (SIGTERM: 143).
 Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
+
+LARGEST_NOISE = 0.2  # [m], [rad]; just inside the angle at which an episode ends
+SWITCHES = ("realtime", "gui", "random_start")
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,8 @@ class Settings:
     save_every: int = 100
     realtime: bool = False
     gui: bool = False
+    random_start: bool = False
+    start_noise: float = 0.0
 
 
 def parser() -> argparse.ArgumentParser:
@@ -63,6 +68,20 @@ def parser() -> argparse.ArgumentParser:
         action="store_true",
         help="let the world run by itself, as the existing script does",
     )
+    add(
+        "--random-start",
+        action="store_true",
+        help="draw all initial weights at random, as the existing script does; by default the "
+        "output layers start at zero, which learns more reliably",
+    )
+    add(
+        "--start-noise",
+        type=_noise,
+        default=default.start_noise,
+        metavar="X",
+        help="episodes start within +-X of the origin [m] and of upright [rad]; 0, as the existing "
+        "script does, starts them all alike (default %(default)s)",
+    )
     window = result.add_mutually_exclusive_group()
     window.add_argument("--gui", action="store_true", help="show the simulator's window")
     window.add_argument(
@@ -79,6 +98,13 @@ def _at_least(minimum: int) -> Any:
         return value
 
     return number
+
+
+def _noise(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value <= LARGEST_NOISE:
+        raise argparse.ArgumentTypeError(f"must lie between 0 and {LARGEST_NOISE}: {text}")
+    return value
 
 
 def as_flags(parameters: dict[str, Any]) -> list[str]:
@@ -99,7 +125,7 @@ def as_flags(parameters: dict[str, Any]) -> list[str]:
 
 def _flag(name: str, value: Any) -> list[str]:
     flag = f"--{name.replace('_', '-')}"
-    if name in ("realtime", "gui"):
+    if name in SWITCHES:
         if not isinstance(value, bool):
             raise CartpoleError(f"parameter ~{name} must be true or false, not {value!r}")
         return [flag] if value else []

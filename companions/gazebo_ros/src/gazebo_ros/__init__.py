@@ -1,0 +1,1 @@
+"""Python names of Gazebo's package gazebo_ros."""

@@ -1,0 +1,69 @@
+"""What an effort on a joint has to move: the mass matrix of an articulated model where it stands."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from bullet_gazebo.physics.description import Joint, ModelDescription
+from bullet_gazebo.physics.inertia import tensor_in
+from bullet_gazebo.physics.pose import Pose, rotate
+
+
+def effective_inertias(model: ModelDescription, poses: Mapping[str, Pose]) -> dict[str, float]:
+    """Returns for each movable joint effort / acceleration [kg m², kg], all other joints being free.
+
+    `poses` are those of the links, in the world.
+    """
+    joints = model.movable_joints
+    base = 0 if model.fixed_base else 6
+    matrix = np.zeros((base + len(joints), base + len(joints)))
+    for name, pose in poses.items():
+        inertia = model.links[name].inertia
+        if inertia is None:
+            continue
+        com = np.array(pose.compose(inertia.com).position)
+        linear, angular = _jacobian(model, joints, base, poses, name, com)
+        tensor = tensor_in(inertia, pose.orientation)
+        matrix += inertia.mass * linear.T @ linear + angular.T @ tensor @ angular
+    mobility = np.diag(np.linalg.pinv(matrix, hermitian=True))[base:]
+    return {
+        joint.name: float(1.0 / part) if part > 0.0 else 0.0
+        for joint, part in zip(joints, mobility, strict=True)
+    }
+
+
+def _jacobian(
+    model: ModelDescription,
+    joints: list[Joint],
+    base: int,
+    poses: Mapping[str, Pose],
+    link: str,
+    point: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Linear velocity of `point` of `link` and angular velocity, (3, base + joints) each."""
+    linear, angular = np.zeros((2, 3, base + len(joints)))
+    if base:
+        linear[:, :3] = angular[:, 3:6] = np.eye(3)
+        arm = point - np.array(poses[model.root].position)
+        linear[:, 3:6] = np.cross(np.eye(3), arm).T
+    carriers = _carriers(model, link)
+    for column, joint in enumerate(joints, start=base):
+        if joint.name not in carriers:
+            continue
+        frame = poses[joint.child].compose(joint.anchor)
+        axis = np.array(rotate(frame.orientation, joint.axis))
+        if joint.kind == "prismatic":
+            linear[:, column] = axis
+        else:
+            linear[:, column] = np.cross(axis, point - np.array(frame.position))
+            angular[:, column] = axis
+    return linear, angular
+
+
+def _carriers(model: ModelDescription, link: str) -> set[str]:
+    parents = {joint.child: joint for joint in model.joints.values()}
+    found = set()
+    while link in parents:
+        found.add(parents[link].name)
+        link = parents[link].parent
+    return found

@@ -1,0 +1,80 @@
+"""Properties of links and joints that change while the world runs."""
+
+import math
+from dataclasses import dataclass, replace
+
+from bullet_gazebo.physics.description import Inertia
+from bullet_gazebo.physics.inertia import is_positive_definite
+from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.world import World
+
+GAZEBO_INERTIA = Inertia(mass=1.0, ixx=1.0, iyy=1.0, izz=1.0)  # of a link that has none in its file
+
+
+class PropertyError(ValueError):
+    """A property that no body can have; the text says which and why."""
+
+
+@dataclass(frozen=True)
+class JointProperties:
+    """What of a joint is to change; None leaves it. [N m s/rad, N s/m], [rad, m], [N m, N], [rad/s, m/s]."""
+
+    damping: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    motor_effort: float | None = None
+    motor_velocity: float | None = None
+
+
+def link_inertia(model: Model, link: str) -> Inertia:
+    """Returns mass, centre of mass and tensor of a link, as Gazebo would tell them."""
+    return model.description.links[link].inertia or GAZEBO_INERTIA
+
+
+def set_link_properties(
+    world: World, model: Model, link: str, inertia: Inertia, gravity: bool
+) -> None:
+    """Gives a link another inertia and gravity mode. A static one keeps them without effect.
+
+    Errors: PropertyError; the world is as it was then.
+    """
+    if not is_positive_definite(inertia):
+        raise PropertyError(
+            f"mass {inertia.mass} and inertia of '{link}' must be positive (definite)"
+        )
+    if inertia != model.description.links[link].inertia:
+        world.set_inertia(model, link, inertia)
+    model.description.links[link].gravity = gravity
+    model.body.set_link_gravity(link, gravity)
+
+
+def set_joint_properties(
+    model: Model, name: str, wanted: JointProperties, time_step: float
+) -> None:
+    """Changes a joint's damping, stops and motor, as far as `wanted` names them.
+
+    Errors: PropertyError; the joint is as it was then.
+    """
+    if wanted.damping is not None and wanted.damping < 0.0:
+        raise PropertyError(f"a damping of {wanted.damping} would drive the joint; it must be >= 0")
+    if wanted.motor_effort is not None and wanted.motor_effort < 0.0:
+        raise PropertyError(f"fmax is {wanted.motor_effort}; it must be >= 0")
+    if name not in model.joint_names:
+        return  # a fixed joint: there is nothing that could move
+    if wanted.damping is not None:
+        model.description.joints[name].damping = wanted.damping
+        model.apply_damping(time_step)
+    if wanted.lower is not None or wanted.upper is not None:
+        model.set_stops(name, wanted.lower, wanted.upper)
+    if wanted.motor_effort is not None or wanted.motor_velocity is not None:
+        model.set_motor(name, wanted.motor_velocity, wanted.motor_effort)
+
+
+def at(inertia: Inertia, position: tuple[float, float, float]) -> Inertia:
+    """Returns `inertia` with its centre of mass at `position` [m] of the link; its axes stay."""
+    return replace(inertia, com=inertia.com._replace(position=position))
+
+
+def is_bounded(values: tuple[float, ...], most: float = math.inf) -> bool:
+    """Returns whether all are finite, and none is larger than `most` either way."""
+    return all(math.isfinite(value) and abs(value) <= most for value in values)

@@ -1,0 +1,87 @@
+"""What `<gazebo>` blocks of a URDF say beyond URDF: plugins, friction, gravity, kept fixed joints.
+
+Contract: gazebo_api.md section 2.4. Sensors are out of scope: they are listed in `left_out`.
+"""
+
+from xml.etree.ElementTree import Element
+
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    Joint,
+    Link,
+    ModelDescription,
+    Plugin,
+)
+from bullet_gazebo.physics.elements import finite, truth
+
+
+def apply_extensions(model: ModelDescription, robot: Element) -> None:
+    """Writes what the `<gazebo>` children of `robot` say into `model`, before its joints are lumped.
+
+    Errors: DescriptionError. A reference to nothing is a warning, as in Gazebo.
+    """
+    for block in robot.findall("gazebo"):
+        reference = block.get("reference")
+        if not reference:
+            _apply_to_model(model, block)
+        elif reference in model.links:
+            _apply_to_link(model, model.links[reference], block)
+        elif reference in model.joints:
+            _apply_to_joint(model.joints[reference], block)
+        else:
+            model.warnings.append(
+                f"<gazebo reference='{reference[:80]}'> refers to no link or joint"
+            )
+
+
+def read_plugin(element: Element) -> Plugin:
+    return Plugin(element.get("filename", ""), element.get("name", ""), element)
+
+
+def name_sensor(element: Element, owner: str) -> str:
+    """Returns what to call a sensor that is left out."""
+    kind, name = element.get("type", "unknown"), element.get("name", "")
+    return f"{kind} sensor '{name}' of {owner}"
+
+
+def _apply_to_model(model: ModelDescription, block: Element) -> None:
+    model.plugins += [read_plugin(element) for element in block.findall("plugin")]
+    for element in block:
+        if element.tag == "static":
+            model.static = model.static or truth(element.text)
+        elif element.tag == "self_collide":
+            model.self_collide = model.self_collide or truth(element.text)
+
+
+def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
+    for element in block:
+        place = f"<gazebo reference='{link.name}'>, <{element.tag}>"
+        if element.tag == "mu1":
+            link.mu = _not_negative(element.text or "", place)
+        elif element.tag == "turnGravityOff":
+            link.gravity = not truth(element.text)
+        elif element.tag == "gravity":
+            link.gravity = truth(element.text, default=True)
+        elif element.tag == "selfCollide":
+            model.self_collide = model.self_collide or truth(element.text)
+        elif element.tag == "sensor":
+            model.left_out.append(name_sensor(element, f"link '{link.name}'"))
+        elif element.tag == "plugin":
+            model.left_out.append(f"plugin {element.get('filename', '')} of link '{link.name}'")
+
+
+def _apply_to_joint(joint: Joint, block: Element) -> None:
+    """A fixed joint is kept as it is, or as a hinge that can't turn."""
+    if joint.kind != "fixed":
+        return
+    if truth(block.findtext("preserveFixedJoint")):
+        joint.kept = True
+    elif truth(block.findtext("disableFixedJointLumping")):
+        joint.kind = "revolute"
+
+
+def _not_negative(text: str, place: str) -> float:
+    value = finite(text, place)
+    if value < 0.0:
+        raise DescriptionError(f"{place}: {value} is negative")
+    return value

@@ -1,0 +1,93 @@
+"""Python module `gazebo_ros.gazebo_interface` (contract: gazebo_api.md section 4.2)."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import rospy
+from gazebo_msgs.srv import SetModelConfiguration, SpawnModel
+from geometry_msgs.msg import Pose
+
+REMIND = 10.0  # [s of wall time]
+
+
+def spawn_sdf_model_client(
+    model_name: str,
+    model_xml: str,
+    robot_namespace: str,
+    initial_pose: Pose,
+    reference_frame: str,
+    gazebo_namespace: str,
+) -> bool | None:
+    """Spawns a model from SDF text; waits for the simulator without limit.
+
+    Returns:
+        Whether it was spawned; None, after a message, if the call failed.
+    """
+    request = (model_name, model_xml, robot_namespace, initial_pose, reference_frame)
+    return _spawn(f"{gazebo_namespace}/spawn_sdf_model", request)
+
+
+def spawn_urdf_model_client(
+    model_name: str,
+    model_xml: str,
+    robot_namespace: str,
+    initial_pose: Pose,
+    reference_frame: str,
+    gazebo_namespace: str,
+) -> bool | None:
+    """Spawns a model from URDF text. See `spawn_sdf_model_client`."""
+    request = (model_name, model_xml, robot_namespace, initial_pose, reference_frame)
+    return _spawn(f"{gazebo_namespace}/spawn_urdf_model", request)
+
+
+def set_model_configuration_client(
+    model_name: str,
+    model_param_name: str,
+    joint_names: Sequence[str],
+    joint_positions: Sequence[float],
+    gazebo_namespace: str,
+) -> bool | None:
+    """Puts joints at positions [rad, m]. See `spawn_sdf_model_client`."""
+    request = (model_name, model_param_name, joint_names, joint_positions)
+    name = f"{gazebo_namespace}/set_model_configuration"
+    return _succeeded(_call(name, SetModelConfiguration, request))
+
+
+def wait_for_service(name: str) -> None:
+    """Waits without limit, and says so every 10 s.
+
+    Raises:
+        rospy.ROSInterruptException: the node was shut down meanwhile.
+    """
+    while True:
+        try:
+            rospy.wait_for_service(name, REMIND)
+            return
+        except rospy.ROSInterruptException:
+            raise
+        except rospy.ROSException:
+            rospy.logwarn("Still waiting for service %s: is the simulator running?", name)
+
+
+def _spawn(name: str, request: tuple[Any, ...]) -> bool | None:
+    answer = _call(name, SpawnModel, request)
+    if answer is not None and answer.success:
+        rospy.loginfo("Spawn status: %s", answer.status_message)
+    return _succeeded(answer)
+
+
+def _call(name: str, kind: Any, request: tuple[Any, ...]) -> Any:
+    wait_for_service(name)
+    try:
+        return rospy.ServiceProxy(name, kind)(*request)
+    except rospy.ServiceException as fault:
+        print(f"Service call failed: {fault}")
+        return None
+
+
+def _succeeded(answer: Any) -> bool | None:
+    if answer is None:
+        return None
+    if not answer.success:
+        rospy.logerr("%s", answer.status_message)
+    return bool(answer.success)

@@ -1,0 +1,31 @@
+"""All services that read and change what is in the world already, one object for each group."""
+
+from bullet_gazebo.ros.force_services import ForceServices
+from bullet_gazebo.ros.joint_services import JointServices
+from bullet_gazebo.ros.light_services import LightServices
+from bullet_gazebo.ros.link_services import LinkServices
+from bullet_gazebo.ros.model_services import ModelServices
+from bullet_gazebo.ros.motion_services import MotionServices
+from bullet_gazebo.ros.physics_services import PhysicsServices
+from bullet_gazebo.ros.reconfigure import PhysicsReconfigure
+from bullet_gazebo.ros.time_services import advertise_time_services
+from bullet_gazebo.simulator import Simulator
+
+
+def advertise_world_services(sim: Simulator) -> list[object]:
+    """Offers them to ROS; returns what keeps them alive."""
+    physics = PhysicsServices(sim)
+    groups = (
+        ModelServices,
+        LinkServices,
+        JointServices,
+        MotionServices,
+        ForceServices,
+        LightServices,
+    )
+    return [
+        *(group(sim) for group in groups),
+        *advertise_time_services(sim),
+        physics,
+        PhysicsReconfigure(physics),
+    ]

@@ -1,0 +1,125 @@
+"""A simulator with a master of its own, as a handle.
+
+Several can run side by side, in one process or many::
+
+    with Simulation(lockstep=True) as simulation:
+        with simulation.active():
+            ros_gazebo.gazebo_spawn_urdf_path("robot.urdf", "robot")
+        subprocess.run(["python3", "client.py"], env=simulation.environment())
+
+rospy knows one master for each process, so that publishers and subscribers of this process belong to
+ROS_MASTER_URI's; the functions of this package go where `active` says.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+from types import TracebackType
+from typing import Any
+
+from ros_utils import _master, _target, ros_gazebo, ros_node
+from ros_utils._started import Started
+
+LOOPBACK = "127.0.0.1"
+
+
+class CannotSimulate(Exception):
+    """The simulator didn't come up; the text says where to look."""
+
+
+def reserved_port() -> int:
+    """A free TCP port on this machine's loopback, reserved for about a minute.
+
+    The kernel chooses it. A connection to it that was closed keeps it from being given to anybody who
+    asks for some free port, while a server that names it, as a ROS master does, gets it.
+    """
+    with socket.socket() as listener, socket.socket() as client:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((LOOPBACK, 0))
+        listener.listen(1)
+        client.connect(listener.getsockname())
+        accepted, _ = listener.accept()
+        with contextlib.closing(accepted):
+            return int(listener.getsockname()[1])
+
+
+class Simulation:
+    """A running simulator: master, Gazebo-like server, and all that is started under them."""
+
+    def __init__(
+        self, *, port: int | None = None, gui: bool = False, timeout: float = 30.0, **launch: Any
+    ) -> None:
+        """Start master and simulator, and wait until it answers.
+
+        Args:
+            port: the master's; None for a free one.
+            gui: with a window.
+            timeout: bound of the wait [s].
+            launch: further arguments of `ros_gazebo.launch_Gazebo`, e.g. ``lockstep=True``.
+
+        Raises:
+            CannotSimulate: the port is in use, or the simulator doesn't come up.
+        """
+        self.master_uri = f"http://{LOOPBACK}:{reserved_port() if port is None else port}"
+        with self.active():
+            if _master.is_up():
+                raise CannotSimulate(f"there is a master at {self.master_uri} already")
+            arguments = {"launch_new_term": False, "output": "log", **launch}
+            started = ros_gazebo.launch_Gazebo(
+                gui=gui, timeout=timeout, env={"ROS_IP": LOOPBACK}, **arguments
+            )
+        if not isinstance(started, Started):
+            raise CannotSimulate(f"no simulator at {self.master_uri}; the log says why")
+        self._started = started
+
+    @property
+    def log_file(self) -> str | None:
+        """Where the output of master and simulator goes."""
+        return self._started.log_file
+
+    @property
+    def running(self) -> bool:
+        """True while master and simulator run."""
+        return self._started.running
+
+    def active(self) -> contextlib.AbstractContextManager[None]:
+        """A block in which the functions of this package go to this simulator."""
+        return _target.using(self.master_uri)
+
+    def environment(self) -> dict[str, str]:
+        """The environment for a process that is to talk to this simulator."""
+        return {**os.environ, "ROS_MASTER_URI": self.master_uri, "ROS_IP": LOOPBACK}
+
+    def model_names(self) -> list[str]:
+        """The names of the models in the world."""
+        with self.active():
+            return ros_gazebo.gazebo_get_model_names()
+
+    def close(self) -> bool:
+        """End the simulator, its master, and what was started under it; a second time does nothing.
+
+        Returns:
+            True if nothing is left.
+        """
+        if not self.running and not _is_up(self.master_uri):
+            return True
+        with self.active():
+            return ros_node.ros_kill_all_processes()
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _is_up(master_uri: str) -> bool:
+    with _target.using(master_uri):
+        return _master.is_up()

@@ -1,0 +1,265 @@
+#!/usr/bin/env python3
+"""Package gazebo_ros as a user has it: own robot, own launch file, spawn_model, gz, gazebo."""
+
+import os
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+from gazebo_msgs.srv import DeleteModel, GetJointProperties, GetModelState, GetWorldProperties
+from gazebo_ros import gazebo_interface
+from geometry_msgs.msg import Pose
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Empty
+
+BOUND = 40.0  # [s]
+PACKAGE = """<package format="2"><name>my_arm</name><version>0.0.1</version>
+<description>An arm.</description><maintainer email="a@example.com">a</maintainer>
+<license>BSD</license></package>"""
+INERTIAL = (
+    '<inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>'
+    "</inertial>"
+)
+URDF = f"""<?xml version="1.0"?>
+<!-- a comment -->
+<robot name="arm">
+  <link name="base">{INERTIAL}</link>
+  <link name="lower">{INERTIAL}</link>
+  <link name="upper">{INERTIAL}</link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="lower"/>
+    <axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="10" velocity="5"/></joint>
+  <joint name="elbow" type="revolute"><parent link="lower"/><child link="upper"/>
+    <origin xyz="0.5 0 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="10" velocity="5"/>
+  </joint>
+  <transmission name="t"><type>transmission_interface/SimpleTransmission</type>
+    <joint name="elbow"><hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface>
+    </joint><actuator name="m"/></transmission>
+  <gazebo><plugin name="c" filename="libgazebo_ros_control.so"/></gazebo>
+  <gazebo><plugin name="j" filename="libgazebo_ros_joint_state_publisher.so">
+    <robotNamespace>/listed</robotNamespace><jointName>elbow, shoulder</jointName>
+    <updateRate>50</updateRate></plugin></gazebo>
+  <gazebo><plugin name="u" filename="libmine.so"><robotNamespace>/mine</robotNamespace></plugin>
+  </gazebo>
+  <gazebo><plugin name="b" filename="libbroken.so"/></gazebo>
+  <gazebo><plugin name="x" filename="libnobody_has.so"/></gazebo>
+</robot>
+"""
+YAML = """
+states: {type: joint_state_controller/JointStateController, publish_rate: 100}
+elbow_position: {type: effort_controllers/JointPositionController, joint: elbow,
+                 pid: {p: 10.0, i: 0.0, d: 1.0}}
+"""
+LAUNCH = """<launch>
+  <rosparam ns="gazebo">plugins: {libmine.so: "my_plugins:Counter", libbroken.so: "my_plugins:Broken"}
+  </rosparam>
+  <include file="$(find gazebo_ros)/launch/empty_world.launch">
+    <arg name="gui" value="false"/><arg name="physics" value="ode"/>
+    <arg name="extra_gazebo_args" value="-o --seed 3 -s libx.so --verbose"/>
+  </include>
+  <param name="robot_description" textfile="$(find my_arm)/urdf/arm.urdf"/>
+  <rosparam command="load" file="$(find my_arm)/config/control.yaml"/>
+  <node name="spawn_arm" pkg="gazebo_ros" type="spawn_model"
+        args="-urdf -param robot_description -model arm -z 0.5 -J elbow 0.25"/>
+  <node name="controller_spawner" pkg="controller_manager" type="spawner"
+        args="states elbow_position"/>
+</launch>"""
+PLUGINS = """
+import rospy
+from std_msgs.msg import Int32
+
+class Counter:
+    def __init__(self, context):
+        self._topic = rospy.Publisher(f"{context.namespace}/count", Int32, queue_size=1, latch=True)
+        self._count = 0
+        context.on_update(self.update)
+
+    def update(self, now):
+        self._count += 1
+        self._topic.publish(self._count)
+        if self._count == 50:
+            raise RuntimeError("enough")
+
+    def shutdown(self):
+        self._topic.unregister()
+
+def Broken(context):
+    raise ValueError("broken on purpose")
+"""
+
+
+def call(name, kind, *request):
+    rospy.wait_for_service(name, BOUND)
+    return rospy.ServiceProxy(name, kind)(*request)
+
+
+def sim_time():
+    return call("/gazebo/get_world_properties", GetWorldProperties).sim_time
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + BOUND
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.05)
+
+
+def write_package(folder):
+    files = {"package.xml": PACKAGE, "urdf/arm.urdf": URDF, "config/control.yaml": YAML,
+             "launch/arm.launch": LAUNCH, "python/my_plugins.py": PLUGINS}  # fmt: skip
+    for name, text in files.items():
+        path = Path(folder, "my_arm", name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+
+class GazeboRos(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        write_package(cls.folder.name)
+        extra = {"ROS_PACKAGE_PATH": cls.folder.name,
+                 "PYTHONPATH": f"{cls.folder.name}/my_arm/python"}  # fmt: skip
+        cls.environment = os.environ | {
+            name: f"{value}:{os.environ.get(name, '')}" for name, value in extra.items()
+        }
+        cls.launch = cls.start("roslaunch", "my_arm", "arm.launch")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.launch.send_signal(signal.SIGINT)
+        cls.launch.wait(BOUND)
+        cls.folder.cleanup()
+
+    @classmethod
+    def start(cls, *command, **kwargs):
+        return subprocess.Popen(command, env=cls.environment, **kwargs)
+
+    def run_command(self, *command, code=0, text=""):
+        result = subprocess.run(
+            command, check=False, env=self.environment, input=text, text=True,
+            capture_output=True, timeout=BOUND,
+        )  # fmt: skip
+        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
+        return result.stdout + result.stderr
+
+    def spawn(self, *arguments, **kwargs):
+        return self.run_command("rosrun", "gazebo_ros", "spawn_model", *arguments, **kwargs)
+
+    def models(self):
+        return call("/gazebo/get_world_properties", GetWorldProperties).model_names
+
+    def test_1_a_users_launch_file(self):
+        wait_until(lambda: "arm" in self.models())
+        state = rospy.wait_for_message("/joint_states", JointState, BOUND)
+        self.assertEqual(state.name, ["elbow"])
+        wait_until(lambda: abs(self.elbow() - 0.25) < 0.2)
+
+    def elbow(self):
+        return call("/gazebo/get_joint_properties", GetJointProperties, "arm::elbow").position[0]
+
+    def test_2_joint_state_publisher(self):
+        heard = []
+        listener = rospy.Subscriber("/listed/joint_states", JointState, heard.append)
+        wait_until(lambda: len(heard) > 20)
+        self.assertEqual(heard[-1].name, ["elbow", "shoulder"])
+        steps = {
+            round((b.header.stamp - a.header.stamp).to_sec(), 4)
+            for a, b in zip(heard, heard[1:], strict=False)
+        }
+        self.assertEqual(steps, {0.02})
+        call("/gazebo/pause_physics", Empty)
+        time.sleep(0.3)
+        heard.clear()
+        time.sleep(0.3)
+        self.assertEqual(heard, [], "time stands still")
+        call("/gazebo/reset_simulation", Empty)
+        call("/gazebo/unpause_physics", Empty)
+        wait_until(lambda: len(heard) > 3)
+        self.assertLess(heard[0].header.stamp.to_sec(), 0.1)
+        listener.unregister()
+
+    def test_3_plugins_of_a_user(self):
+        from std_msgs.msg import Int32
+
+        self.assertEqual(rospy.wait_for_message("/mine/count", Int32, BOUND).data, 50)
+        before = sim_time()
+        time.sleep(0.2)
+        self.assertGreater(sim_time(), before, "the world goes on")
+
+    def test_4_spawn_model(self):
+        path = f"{self.folder.name}/my_arm/urdf/arm.urdf"
+        pose = ("-x", "-1e-1", "-Y", "1.5708", "-reference_frame", "arm")
+        self.spawn("-urdf", "-file", path, "-model", "a", "-robot_namespace", "/a", *pose)
+        turned = call("/gazebo/get_model_state", GetModelState, "a", "arm").pose
+        self.assertAlmostEqual(turned.orientation.z, 0.7071, places=2)
+        self.spawn(
+            "-urdf", "-stdin", "-model", "b", "-robot_namespace", "/b", "-wait", "a", text=URDF
+        )
+        self.assertIn("b", self.models())
+        self.assertIn("already exists", self.spawn("-urdf", "-file", path, "-model", "b", code=1))
+        self.assertIn("not set", self.spawn("-urdf", "-param", "nix", "-model", "c", code=1))
+        self.assertIn("can't be read", self.spawn("-urdf", "-file", "/nix", "-model", "c", code=1))
+        self.spawn("-urdf", "-stdin", "-model", "c", text="<robot", code=1)
+        self.spawn("-urdf", "-stdin", "-model", "c", text="", code=1)
+        self.spawn("-urdf", "-model", "c", code=2)
+        call("/gazebo/pause_physics", Empty)
+        self.spawn("-urdf", "-file", path, "-model", "d", "-robot_namespace", "/d", "-wait", "a",
+                   "-unpause", "-package_to_model")  # fmt: skip
+        before = sim_time()
+        wait_until(lambda: sim_time() > before)
+
+    def test_5_bond(self):
+        bond = self.start("rosrun", "gazebo_ros", "spawn_model", "-urdf", "-stdin", "-model", "bond",
+                          "-robot_namespace", "/bond", "-b", stdin=subprocess.PIPE)  # fmt: skip
+        bond.stdin.write(URDF.encode())
+        bond.stdin.close()
+        wait_until(lambda: "bond" in self.models())
+        time.sleep(1.0)  # rospy's handler of SIGINT may hang a node that is in the middle of a call
+        bond.send_signal(signal.SIGINT)
+        bond.wait(BOUND)
+        wait_until(lambda: "bond" not in self.models())
+
+    def test_6_gz(self):
+        self.run_command("gz", "world", "-p", "1")
+        before = sim_time()
+        self.run_command("gz", "world", "-m", "1500")
+        self.assertAlmostEqual(sim_time(), before + 1.5, places=6)
+        self.run_command("gz", "world", "-s")
+        self.assertAlmostEqual(sim_time(), before + 1.501, places=6)
+        self.run_command("gz", "world", "-o")
+        self.assertAlmostEqual(sim_time(), before + 1.501, places=6)
+        self.run_command("gz", "world", "-t")
+        self.assertEqual(sim_time(), 0.0)
+        self.run_command("gz", "world", "-s")
+        self.run_command("gz", "world", "-r")
+        self.assertEqual(sim_time(), 0.0)
+        self.run_command("gz", "world", "-p", "0")
+        wait_until(lambda: sim_time() > 0.0)
+
+    def test_7_gazebo_interface(self):
+        place = (Pose(), "", "/gazebo")
+        spawn = gazebo_interface.spawn_urdf_model_client
+        self.assertTrue(spawn("e", URDF, "/e", *place))
+        self.assertIs(spawn("e", URDF, "/e", *place), False)
+        self.assertIsNone(spawn("f", "<sdf/>", "/f", *place))
+        move = gazebo_interface.set_model_configuration_client
+        self.assertTrue(move("e", "", ["shoulder"], [0.5], "/gazebo"))
+        self.assertIs(move("nix", "", ["shoulder"], [0.5], "/gazebo"), False)
+        self.assertTrue(call("/gazebo/delete_model", DeleteModel, "e").success)
+
+    def test_8_gazebo_is_server_and_window_in_one(self):
+        gazebo = self.start("rosrun", "gazebo_ros", "gazebo", "-u", "__ns:=/second", "--seed", "1")
+        name = "/second/gazebo/get_world_properties"
+        self.assertEqual(call(name, GetWorldProperties).sim_time, 0.0)
+        gazebo.send_signal(signal.SIGTERM)
+        self.assertEqual(gazebo.wait(BOUND), 0)
+
+
+if __name__ == "__main__":
+    rospy.init_node("gazebo_ros_test")
+    rostest.rosrun("cartpole", "gazebo_ros", GazeboRos)

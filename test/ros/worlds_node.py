@@ -1,0 +1,233 @@
+#!/usr/bin/env python3
+"""A world from a file, and SDF models spawned into it, as a client sees them (gazebo_api.md 2.3 to 2.5)."""
+
+import time
+import unittest
+
+import rospy
+import rostest
+from gazebo_msgs.srv import (
+    DeleteModel,
+    GetLinkState,
+    GetModelProperties,
+    GetModelState,
+    GetPhysicsProperties,
+    GetWorldProperties,
+    SpawnModel,
+    SpawnModelRequest,
+)
+from geometry_msgs.msg import Point, Pose, Quaternion
+
+BOUND = 20.0  # [s of wall time]
+UNKNOWN = (
+    "GazeboRosApiPlugin SpawnModel Failure: input model_xml not SDF or URDF, or cannot be converted "
+    "to Gazebo compatible format."
+)
+INERTIAL = (
+    "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia>"
+    "</inertial>"
+)
+BOX = (
+    f'<sdf version="1.6"><model name="x">{{more}}<link name="body">{INERTIAL}<collision name="shell">'
+    "<geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision></link></model></sdf>"
+)
+ROBOT = (
+    f'<sdf version="1.5"><model name="x"><link name="base">{INERTIAL}<collision name="c1"><geometry>'
+    "<box><size>0.4 0.4 0.2</size></box></geometry></collision></link>"
+    f'<link name="arm"><pose>0 0 0.3 0 0 0</pose>{INERTIAL}</link><joint name="shoulder" '
+    'type="revolute"><parent>base</parent><child>arm</child><pose>0 0 -0.2 0 0 0</pose><axis>'
+    "<xyz>0 1 0</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis></joint></model></sdf>"
+)
+URDF = (
+    '<robot name="r"><link name="a"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
+    'ixz="0" iyz="0"/></inertial><collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    '</link><link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" '
+    'iyz="0"/></inertial><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
+    '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>'
+)
+
+
+def call(name, kind, *args, **kwargs):
+    rospy.wait_for_service(name, BOUND)
+    return rospy.ServiceProxy(name, kind)(*args, **kwargs)
+
+
+def spawn(name, xml, service="sdf", **kwargs):
+    request = SpawnModelRequest(model_name=name, model_xml=xml, **kwargs)
+    return call(f"/gazebo/spawn_{service}_model", SpawnModel, request)
+
+
+def delete(name):
+    return call("/gazebo/delete_model", DeleteModel, name)
+
+
+def position(name, relative_to=""):
+    found = call("/gazebo/get_model_state", GetModelState, name, relative_to)
+    assert found.success, found.status_message
+    return found.pose.position
+
+
+def models():
+    return call("/gazebo/get_world_properties", GetWorldProperties).model_names
+
+
+def resting_height(name):
+    """Waits until `name` has come to rest; returns the height [m] of its origin."""
+    deadline = time.monotonic() + BOUND
+    last = None
+    while time.monotonic() < deadline:
+        height = position(name).z
+        if last is not None and abs(height - last) < 1e-5:
+            return height
+        last = height
+        time.sleep(0.2)
+    raise AssertionError(f"{name} still moves")
+
+
+def at(x=0.0, y=0.0, z=0.0):
+    return Pose(Point(x, y, z), Quaternion(0, 0, 0, 0))
+
+
+class WorldFile(unittest.TestCase):
+    def test_models_that_can_be_read_are_there_in_order(self):
+        self.assertEqual(models()[:4], ["ground_plane", "table", "box", "crate_one"])
+        self.assertNotIn("broken", models())
+
+    def test_boxes_rest_on_what_is_under_them(self):
+        self.assertAlmostEqual(resting_height("box"), 0.65, delta=0.005)  # on the table
+        self.assertAlmostEqual(resting_height("crate_one"), 0.2, delta=0.01)
+        self.assertAlmostEqual(position("table").z, 0.0, delta=1e-6)
+
+    def test_links_of_a_static_model_stand_where_the_file_puts_them(self):
+        state = call("/gazebo/get_link_state", GetLinkState, "table::leg", "").link_state
+        self.assertAlmostEqual(state.pose.position.z, 0.225, delta=1e-6)
+
+    def test_physics_is_the_files(self):
+        physics = call("/gazebo/get_physics_properties", GetPhysicsProperties)
+        self.assertAlmostEqual(physics.gravity.z, -9.81)
+        self.assertAlmostEqual(physics.time_step, 0.002)
+        self.assertAlmostEqual(physics.max_update_rate, 500.0)
+        self.assertEqual(physics.ode_config.sor_pgs_iters, 80)
+
+
+class Spawning(unittest.TestCase):
+    def spawned(self, name, xml, **kwargs):
+        answer = spawn(name, xml, **kwargs)
+        self.addCleanup(delete, name)
+        self.assertEqual(
+            (answer.success, answer.status_message),
+            (True, "SpawnModel: Successfully spawned entity"),
+        )
+
+    def test_an_sdf_box_falls_and_rests(self):
+        self.spawned("sdf_box", BOX.format(more=""), initial_pose=at(5.0, 0.0, 0.5))
+        self.assertAlmostEqual(resting_height("sdf_box"), 0.1, delta=0.005)
+        found = call("/gazebo/get_model_properties", GetModelProperties, "sdf_box")
+        self.assertEqual((found.body_names, found.geom_names), (["body"], ["shell"]))
+
+    def test_an_sdf_robot_has_its_names_and_stands(self):
+        self.spawned("sdf_robot", ROBOT, initial_pose=at(0.0, 5.0, 0.2), robot_namespace="/arm")
+        found = call("/gazebo/get_model_properties", GetModelProperties, "sdf_robot")
+        self.assertEqual(found.body_names, ["base", "arm"])
+        self.assertEqual(found.joint_names, ["shoulder"])
+        self.assertAlmostEqual(resting_height("sdf_robot"), 0.1, delta=0.01)
+
+    def test_the_files_pose_is_taken_in_the_requested_one(self):
+        more = "<pose>0 0 1 0 0 0</pose><static>1</static>"
+        self.spawned("high", BOX.format(more=more), initial_pose=at(1.0), reference_frame="table")
+        self.assertAlmostEqual(position("high").x, 3.0, delta=1e-6)
+        self.assertAlmostEqual(position("high").z, 1.0, delta=1e-6)
+
+    def test_a_world_include_brings_a_model_from_the_path(self):
+        include = '<sdf version="1.4"><world name="d"><include><uri>model://{}</uri></include></world></sdf>'
+        self.spawned("mine", include.format("crate"), initial_pose=at(0.0, -5.0, 0.3))
+        self.assertAlmostEqual(resting_height("mine"), 0.2, delta=0.01)
+        self.spawned("floor", include.format("ground_plane"), initial_pose=at(0.0, 0.0, -1.0))
+        self.assertIn("floor", models())
+
+    def test_a_urdf_root_is_taken_too_and_collisions_are_named(self):
+        self.spawned("urdf", URDF, initial_pose=at(-5.0, 0.0, 1.0))
+        found = call("/gazebo/get_model_properties", GetModelProperties, "urdf")
+        self.assertEqual(found.geom_names, ["a_collision", "a_fixed_joint_lump__b_collision_1"])
+
+    def test_static_models_can_be_deleted(self):
+        spawn("block", BOX.format(more="<static>true</static>"), initial_pose=at(9.0))
+        self.assertEqual(delete("block").status_message, "DeleteModel: successfully deleted model")
+        self.assertNotIn("block", models())
+
+    def test_a_light_is_spawned_under_the_models_name(self):
+        xml = (
+            '<sdf version="1.6"><light name="l" type="point"><pose>0 0 1 0 0 0</pose></light></sdf>'
+        )
+        self.assertTrue(spawn("torch", xml).success)
+        again = spawn("torch", xml)
+        self.assertEqual(
+            (again.success, again.status_message),
+            (False, "SpawnModel: Failure - entity already exists."),
+        )
+        self.assertNotIn("torch", models())
+
+
+class Refusals(unittest.TestCase):
+    def refused(self, text, name, xml, **kwargs):
+        before, start = models(), time.monotonic()
+        answer = spawn(name, xml, **kwargs)
+        self.assertFalse(answer.success)
+        self.assertIn(text, answer.status_message)
+        self.assertLess(time.monotonic() - start, 10.0)
+        self.assertEqual(models(), before)
+
+    def test_texts_of_gazebo(self):
+        self.refused("SpawnModel: Failure - entity already exists.", "box", BOX.format(more=""))
+        self.refused(UNKNOWN, "new", "<world/>")
+        self.refused(UNKNOWN, "new", BOX[:50])
+        self.refused(UNKNOWN, "new", "")
+        self.refused(
+            "SpawnModel: reference reference_frame not found, did you forget to scope the link by model "
+            "name?", "new", BOX.format(more=""), reference_frame="nowhere",
+        )  # fmt: skip
+
+    def test_a_sdf_is_no_urdf(self):
+        with self.assertRaises(rospy.ServiceException):
+            spawn("new", BOX.format(more=""), service="urdf")
+
+    def test_traps_and_giants(self):
+        bomb = '<!DOCTYPE a [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><sdf>&b;</sdf>'
+        self.refused("<!DOCTYPE>", "new", bomb)
+        self.refused("nested more than 100 deep", "new", "<sdf>" * 100000)
+        self.refused("has no mass", "new", f'<robot name="r"><link name="{"x" * 900}"/></robot>')
+        self.refused(
+            "longer than 1000 bytes", "new", f'<robot name="r"><link name="{"x" * 10**7}"/></robot>'
+        )
+        links = "".join(f'<link name="l{i}"/>' for i in range(500_000))
+        self.refused("links", "new", f'<robot name="r">{links}</robot>')
+        with self.assertRaises(rospy.ServiceException):
+            spawn("new", "<!--" * 2_500_000, service="urdf")
+        with self.assertRaises(rospy.ServiceException):
+            spawn("new", "<?" * 5_000_000, service="urdf")
+
+    def test_a_name_may_be_huge(self):
+        name = "n" * 100_000
+        self.assertTrue(spawn(name, BOX.format(more=""), initial_pose=at(20.0)).success)
+        self.assertTrue(delete(name).success)
+
+    def test_a_missing_mesh_is_named(self):
+        mesh = "<mesh><uri>model://gone/x.dae</uri></mesh>"
+        xml = BOX.replace("<box><size>0.2 0.2 0.2</size></box>", mesh).format(more="")
+        self.refused(
+            "link 'body', collision 'shell': 'model://gone/x.dae' is not found", "new", xml
+        )
+
+
+class Worlds(unittest.TestSuite):
+    def __init__(self):
+        super().__init__()
+        loader = unittest.defaultTestLoader
+        self.addTests(
+            loader.loadTestsFromTestCase(kind) for kind in (WorldFile, Spawning, Refusals)
+        )
+
+
+if __name__ == "__main__":
+    rospy.init_node("worlds_test")
+    rostest.rosrun("cartpole", "worlds", "__main__.Worlds")
