@@ -91,8 +91,8 @@ class GazeboNode:
 def main(argv: list[str] | None = None) -> int:
     """Runs the node; returns its exit code."""
     args = parse_args(rospy.myargv(argv)[1:])
-    ending = Ending()
     rospy.init_node("gazebo", disable_signals=True)
+    ending = Ending()  # not before: while there is no master, a signal ends the process as such
     if args.physics not in ENGINES:
         rospy.logwarn("Physics engine '%s' is not known; PyBullet is used", args.physics)
     if args.ignored:

@@ -17,7 +17,7 @@ class Ending:
     """Notes a signal, and shuts the node down where that is safe."""
 
     def __init__(self) -> None:
-        """Call it in the main thread; the node is initialised with ``disable_signals=True``."""
+        """For the main thread, once the node is initialised, with ``disable_signals=True``."""
         self._asked = threading.Event()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._note)

@@ -13,7 +13,8 @@ Trains the cart-pole by policy gradient over ROS, in lock-step with the simulato
 
 Starts what isn't running (master, simulator, robot, controllers) and stops exactly that.
 Every flag is a private rosparam too (~episodes, ~seed, ~run_dir, ~save_every, ~realtime,
-~gui, ~random_start, ~start_noise); the command line wins. Ctrl-C saves what was learned and exits with 130 (SIGTERM: 143).
+~gui, ~random_start, ~start_noise); the command line wins. Ctrl-C saves what was learned and
+exits with 130 (SIGTERM: 143).
 Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
 
 LARGEST_NOISE = 0.2  # [m], [rad]; just inside the angle at which an episode ends
