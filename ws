@@ -54,8 +54,9 @@ Apart from Debian's packages everything lies in $CHECKOUT/.ws.
 
 ROS talks over loopback only, to a master on this checkout's own port: $DEFAULT_MASTER
 Set ROS_MASTER_URI, ROS_IP or ROS_HOSTNAME to use another master or network.
-The caller's PYTHONPATH, CMAKE_PREFIX_PATH, ROS_PACKAGE_PATH, conda and virtual
-environments are left out.
+Packages on the caller's ROS_PACKAGE_PATH are found, behind those of the workspace. The
+caller's PYTHONPATH, CMAKE_PREFIX_PATH, ROS_NAMESPACE, conda and virtual environments are
+left out.
 END
 }
 

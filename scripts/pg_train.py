@@ -3,7 +3,9 @@
 
 import sys
 
-from cartpole.training.pg_cli import main
-
 if __name__ == "__main__":
+    try:
+        from cartpole.training.pg_cli import main
+    except KeyboardInterrupt:  # Ctrl-C while it is still being read; main() sees to the rest
+        sys.exit(130)
     sys.exit(main())

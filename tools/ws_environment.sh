@@ -7,6 +7,7 @@ is_loopback() {
 # Nothing of the caller's Python, CMake or ROS environment may decide what runs here.
 leave_other_workspaces() {
     local prefix kept= entry
+    callers_packages=${callers_packages-${ROS_PACKAGE_PATH-}}
     IFS=: read -ra prefixes <<<"${CMAKE_PREFIX_PATH-}"
     IFS=: read -ra entries <<<"${LD_LIBRARY_PATH-}"
     for entry in "${entries[@]}"; do
@@ -18,7 +19,7 @@ leave_other_workspaces() {
     export LD_LIBRARY_PATH=$kept
     unset PYTHONPATH PYTHONHOME VIRTUAL_ENV PYENV_VERSION CONDA_PREFIX CONDA_DEFAULT_ENV \
         CMAKE_PREFIX_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH PKG_CONFIG_PATH \
-        ROS_PACKAGE_PATH ROS_ROOT ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION ROS_ETC_DIR \
+        ROS_PACKAGE_PATH ROS_NAMESPACE ROS_ROOT ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION ROS_ETC_DIR \
         ROSLISP_PACKAGE_DIRECTORIES CATKIN_SHELL CATKIN_TEST_RESULTS_DIR ROS_TEST_RESULTS_DIR
     export PYTHONNOUSERSITE=1  # ~/.local would otherwise come before the venv's base
     export PATH=$VENV/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin:$PATH
@@ -49,5 +50,7 @@ enter_workspace() {
     # shellcheck disable=SC1091
     source "$WS/devel/setup.bash"
     set -u
+    # Behind ours: the caller's own packages are found, and none of them hides one of ours.
+    export ROS_PACKAGE_PATH=$ROS_PACKAGE_PATH${callers_packages:+:$callers_packages}
     export PATH=$VENV/bin:$PATH  # catkin's own entries came first
 }

@@ -143,24 +143,27 @@ make_extras() { pip_install base.txt extras.txt; }
 # --- catkin workspace ----------------------------------------------------------------------
 
 # What CMake reads, and the names of what it links to; sources are used where they are.
+PARTS=(CMakeLists.txt LICENSE README.md package.xml setup.py
+    benchmark config docs launch rviz scripts src srv test urdf)  # of the package
+
 key_build() {
     key_place
+    echo "${PARTS[@]}"
     cd -- "$ROOT"
-    find . -mindepth 1 -maxdepth 1 ! -name '.*' | sort
     find scripts src -mindepth 1 -maxdepth 1 ! -name __pycache__ 2>/dev/null | sort || true
     find CMakeLists.txt package.xml setup.py srv companions -type f ! -name '*.pyc' -print0 |
         sort -z | xargs -0 sha256sum
 }
 
-# .ws/src holds links to the package and its companions. The package is a folder of links to what
-# lies in the repository's root, not a link to the root: rosrun looks for executables everywhere
-# below a package, and would find those in .ws as well.
+# .ws/src holds links to the package and its companions. The package is a folder of links to its
+# parts, not a link to the root: rosrun looks for executables everywhere below a package, and would
+# find those in .ws, and in whatever folder a training leaves in the root, as well.
 link_sources() {
     local entry
     rm -rf -- "$WS/src"
     mkdir -p -- "$WS/src/cartpole"
-    for entry in "$ROOT"/*; do
-        [[ $entry == */companions || $entry == */ws ]] || ln -s -- "$entry" "$WS/src/cartpole/"
+    for entry in "${PARTS[@]}"; do
+        ln -s -- "$ROOT/$entry" "$WS/src/cartpole/"
     done
     ln -s -- "$ROOT"/companions/* "$WS/src/"
 }

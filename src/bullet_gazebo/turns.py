@@ -27,6 +27,11 @@ class TurnLock:
             self._waiting.append(turn)
         turn.acquire()
 
+    def yield_turn(self) -> None:
+        """Lets everybody who waits have their turn first; for the holder, in the middle of long work."""
+        self.__exit__(None, None, None)
+        self.__enter__()
+
     def __exit__(
         self,
         kind: type[BaseException] | None,

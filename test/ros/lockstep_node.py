@@ -99,6 +99,16 @@ class LockstepTest(unittest.TestCase):
             thread.join(BOUND)
         self.assertAlmostEqual(self.world().sim_time, 0.2, places=9)
 
+    def test_a_long_step_lets_other_services_answer(self):
+        step = proxy("/gazebo/step_world", StepWorld)
+        worker = threading.Thread(target=step, args=(100_000, [], []))
+        worker.start()
+        seen = set()
+        while worker.is_alive():
+            seen.add(self.world().sim_time)
+        self.assertGreater(len(seen), 3)
+        self.assertAlmostEqual(self.world().sim_time, 100.0, places=6)
+
     def test_the_last_clock_always_arrives(self):
         seen, arrived = [], threading.Event()
 

@@ -48,7 +48,9 @@ class SpawnerTest(unittest.TestCase):
 
     def run_script(self, name, *args):
         command = ["rosrun", "controller_manager", name, *args]
-        program = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        program = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
         self.programs.append(program)
         return program
 

@@ -77,7 +77,8 @@ def wait_until(condition, bound=BOUND):
 
 def spawn(name="cartpole", xml=None, **kwargs):
     xml = rospy.get_param("/robot_description") if xml is None else xml
-    request = SpawnModelRequest(model_name=name, model_xml=xml, robot_namespace="/", **kwargs)
+    fields = {"robot_namespace": "/"} | kwargs
+    request = SpawnModelRequest(model_name=name, model_xml=xml, **fields)
     return call("/gazebo/spawn_urdf_model", SpawnModel, request)
 
 
@@ -193,6 +194,41 @@ class StandInTest(unittest.TestCase):
                 self.assertIn(text, answer.status_message)
         world = call("/gazebo/get_world_properties", GetWorldProperties)
         self.assertEqual(world.model_names, ["ground_plane", "cartpole"])
+
+    def test_spawning_and_deleting_at_once_keeps_the_world_alive(self):
+        ends = threading.Event()
+
+        def delete():
+            while not ends.is_set():
+                call("/gazebo/delete_model", DeleteModel, "second")
+
+        call("/gazebo/delete_model", DeleteModel, "cartpole")
+        call("/gazebo/unpause_physics", Empty)
+        threads = [threading.Thread(target=delete) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for _ in range(15):
+            spawn("second")
+        ends.set()
+        for thread in threads:
+            thread.join(BOUND)
+        before = call("/gazebo/get_world_properties", GetWorldProperties).sim_time
+        self.assertTrue(
+            wait_until(
+                lambda: call("/gazebo/get_world_properties", GetWorldProperties).sim_time > before
+            )
+        )
+
+    def test_a_namespace_or_name_that_ros_refuses_is_refused_here(self):
+        self.assertTrue(spawn("second", robot_namespace="/bad ns").success)
+        listed = call("/controller_manager/list_controllers", ListControllers).controller
+        self.assertEqual(listed, [])  # the first robot's manager, untouched
+        self.assertFalse(call("/controller_manager/load_controller", LoadController, "bad name").ok)
+
+    def test_a_pose_out_of_this_world_is_refused(self):
+        answer = spawn("second", initial_pose=Pose(position=Point(1e300, 0.0, 0.0)))
+        self.assertFalse(answer.success)
+        self.assertIn("beyond 1e+06 m", answer.status_message)
 
     def test_a_second_robot_in_the_same_namespace_stands_without_control(self):
         self.start_controllers()

@@ -154,7 +154,15 @@ def test_extra_joints_stand_last_and_bad_ones_are_left_out(hardware):
 
 
 @pytest.mark.parametrize(
-    "params", [{}, {"publish_rate": "120"}, {"publish_rate": 1, "joints": ["x"]}]
+    "params",
+    [
+        {},
+        {"publish_rate": "120"},
+        {"publish_rate": math.nan},
+        {"publish_rate": math.inf},
+        {"publish_rate": 1, "joints": ["x"]},
+        {"publish_rate": 1, "joints": [["cart_pole"]]},
+    ],
 )
 def test_bad_joint_state_parameters_are_refused(hardware, params):
     with pytest.raises(ControlError):

@@ -12,7 +12,7 @@ def test_defaults() -> None:
 
 def test_every_flag() -> None:
     flags = ["--episodes=5", "--seed=3", "--run-dir=out", "--save-every=2", "--realtime", "--gui"]
-    flags += ["--random-start", "--start-noise=0.05"]
+    flags += ["--random-weights", "--start-noise=0.05"]
     assert settings(flags, {}) == Settings(5, 3, "out", 2, True, True, True, 0.05)
 
 
@@ -24,7 +24,7 @@ def test_every_parameter() -> None:
         "save_every": 2,
         "realtime": True,
         "gui": True,
-        "random_start": True,
+        "random_weights": True,
         "start_noise": 0.05,
     }
     assert settings([], parameters) == Settings(5, 3, "my run", 2, True, True, True, 0.05)

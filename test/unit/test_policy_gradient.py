@@ -75,10 +75,10 @@ def test_returns_equal_the_documents_loop(length: int) -> None:
     assert discounted_returns(rewards) == pytest.approx(slow, rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("random_start", [False, True])
+@pytest.mark.parametrize("random_weights", [False, True])
 @pytest.mark.parametrize("length", [1, 5, 300])
-def test_updates_equal_the_documents(length: int, random_start: bool) -> None:
-    ours, theirs = (PolicyGradientAgent(1, random_start) for _ in range(2))
+def test_updates_equal_the_documents(length: int, random_weights: bool) -> None:
+    ours, theirs = (PolicyGradientAgent(1, random_weights) for _ in range(2))
     for seed in range(5):
         episode = random_episode(length, seed)
         assert tuple(ours.learn(episode)) == pytest.approx(
@@ -105,7 +105,7 @@ def test_probability_survives_huge_observations() -> None:
 
 
 def test_actions_follow_the_probability() -> None:
-    agent = PolicyGradientAgent(5, random_start=True)
+    agent = PolicyGradientAgent(5, random_weights=True)
     observation = np.array([0.3, -1.0, 0.2, 0.5], np.float32)
     share = np.mean([agent.act(observation) == 0 for _ in range(20000)])
     assert share == pytest.approx(agent.probability_of_zero(observation), abs=0.015)
@@ -150,11 +150,11 @@ def test_it_starts_from_a_uniform_policy_and_no_value() -> None:
     assert agent.value(torch.from_numpy(observation).unsqueeze(0)).item() == 0.0
 
 
-def test_a_random_start_is_torchs_own() -> None:
+def test_a_random_weights_is_torchs_own() -> None:
     torch.manual_seed(6)
     policy, value = PolicyNetwork(), ValueNetwork()
     expected = [p for net in (policy, value) for p in net.parameters()]
-    drawn = weights(PolicyGradientAgent(6, random_start=True))
+    drawn = weights(PolicyGradientAgent(6, random_weights=True))
     assert all(torch.equal(mine, its) for mine, its in zip(drawn, expected, strict=True))
 
 

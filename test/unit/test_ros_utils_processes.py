@@ -102,9 +102,7 @@ def test_a_recycled_process_id_is_not_touched():
     try:
         handle = _processes.start(SLEEP, "node", "sleeper")
         _processes.end([handle.entry])
-        _registry.add(
-            dataclasses.replace(handle.entry, pid=stranger.pid, start=1)
-        )
+        _registry.add(dataclasses.replace(handle.entry, pid=stranger.pid, start=1))
         assert ros_node.ros_kill_all_processes()
         assert stranger.poll() is None
     finally:

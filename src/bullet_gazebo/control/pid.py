@@ -33,7 +33,7 @@ class Gains:
             d=_number(params, "d", 0.0, place),
             i_max=max(0.0, _number(params, "i_clamp_max", clamp, place)),
             i_min=min(0.0, _number(params, "i_clamp_min", -clamp, place)),
-            antiwindup=bool(params.get("antiwindup", False)),
+            antiwindup=params.get("antiwindup", False) is True,
         )
 
 

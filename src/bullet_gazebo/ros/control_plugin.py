@@ -2,6 +2,7 @@
 
 import threading
 
+import rosgraph
 import rospy
 
 from bullet_gazebo.control.description import read_description
@@ -75,6 +76,8 @@ class ControlPlugin:
         return True
 
     def _start(self, text: str) -> None:
+        if not rosgraph.names.is_legal_name(self._namespace):
+            raise ControlError(f"'{self._namespace}' is not a legal namespace")
         limits = rospy.get_param(rospy.names.ns_join(self._namespace, "joint_limits"), {})
         description = read_description(text).limited_by(limits)
         for warning in description.warnings:
@@ -86,7 +89,7 @@ class ControlPlugin:
         self._services = self._offer(manager)
         with self._sim.lock:
             self._sim.add_robot(robot)
-        self._robot = robot
+        self._robot = robot  # shutdown() waits for us, and takes it away before the model goes
         rospy.loginfo("Loaded gazebo_ros_control for model '%s'.", self._context.model.name)
 
     def _offer(self, manager: ControllerManager) -> ControllerServices:

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable
 
+import rosgraph
 import rospy
 from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
 from controller_manager_msgs.srv import (
@@ -74,9 +75,9 @@ class ControllerServices:
 
     def _load(self, request: LoadControllerRequest) -> bool:
         # An empty name would fetch the whole namespace, and resolve to it.
-        params = request.name and rospy.get_param(
-            rospy.names.ns_join(self._namespace, request.name), None
-        )
+        if not rosgraph.names.is_legal_name(request.name):
+            return _refused(ControlError(f"'{request.name}' is not a legal name of a controller"))
+        params = rospy.get_param(rospy.names.ns_join(self._namespace, request.name), None)
         try:
             with self._sim.lock:
                 controller = self._manager.load(request.name, params)

@@ -45,7 +45,7 @@ class GazeboNode:
 
     def _advertise(self, network: bool) -> None:
         WorldControl(self.sim).offer()
-        advertise_states(self.sim, float(rospy.get_param("~pub_clock_frequency", 0)), network)
+        advertise_states(self.sim, _clock_frequency(), network)
         plugins = PluginRegistry(
             self.sim,
             {
@@ -65,9 +65,8 @@ class GazeboNode:
 
     def run(self, ending: Ending) -> int:
         """Simulates until the node is shut down; returns the exit code."""
-        rospy.on_shutdown(
-            self._stop
-        )  # called before the topics close, so no tick publishes to a closed one
+        # Called before the topics close, so that no tick publishes to a closed one.
+        rospy.on_shutdown(self._stop)
         self._thread.start()
         ending.wait()
         self._stop()  # a shutdown that came before the hook was there doesn't call it
@@ -86,6 +85,15 @@ class GazeboNode:
         self.sim.stop()
         if threading.current_thread() is not self._thread:
             self._thread.join(STOP_TIMEOUT)
+
+
+def _clock_frequency() -> float:
+    """Returns ~pub_clock_frequency [Hz of simulated time]; 0 is every tick, and what is no number too."""
+    value = rospy.get_param("~pub_clock_frequency", 0)
+    if isinstance(value, (int, float)):
+        return float(value)
+    rospy.logwarn("~pub_clock_frequency is %r, not a number: /clock comes with every tick", value)
+    return 0.0
 
 
 def main(argv: list[str] | None = None) -> int:

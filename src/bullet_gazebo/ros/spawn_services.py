@@ -1,6 +1,7 @@
 """spawn_urdf_model, spawn_sdf_model and delete_model (contract: gazebo_api.md sections 2.3 to 2.5)."""
 
 import re
+import threading
 
 import rospkg
 import rospy
@@ -30,6 +31,7 @@ UNKNOWN_FORMAT = (
     "or cannot be converted to Gazebo compatible format."
 )
 TAKEN = "SpawnModel: Failure - entity already exists."
+FURTHEST = 1e6  # [m] from the origin; the engine holds some figures as 32-bit floats
 
 
 class SpawnServices:
@@ -38,6 +40,9 @@ class SpawnServices:
     def __init__(self, sim: Simulator, plugins: PluginRegistry) -> None:
         self._sim = sim
         self._plugins = plugins
+        # Spawning and deleting take several steps each, with plugins between them: one at a time, as
+        # Gazebo serialises all its services (gazebo_api.md section 1.1).
+        self._one_at_a_time = threading.Lock()
         self._services = [
             rospy.Service("~spawn_urdf_model", SpawnModel, self._spawn_urdf),
             rospy.Service("~spawn_sdf_model", SpawnModel, self._spawn_sdf),
@@ -56,6 +61,10 @@ class SpawnServices:
         return self._spawn(request, request.model_xml)
 
     def _spawn(self, request: SpawnModelRequest, text: str) -> SpawnModelResponse:
+        with self._one_at_a_time:
+            return self._spawn_alone(request, text)
+
+    def _spawn_alone(self, request: SpawnModelRequest, text: str) -> SpawnModelResponse:
         try:
             pose = self._checked_pose(request)
             entity = read_entity(text, request.model_name, resources())
@@ -85,8 +94,10 @@ class SpawnServices:
             if name in self._sim.world.models:
                 raise NameTaken(name)
         pose = frame[0].compose(pose)
-        if not is_finite(pose):
-            raise DescriptionError(f"the initial pose of '{shown(name)}' is not finite")
+        if not is_finite(pose) or max(map(abs, pose.position)) > FURTHEST:
+            raise DescriptionError(
+                f"the initial pose of '{shown(name)}' is not finite, or beyond {FURTHEST:g} m"
+            )
         return pose
 
     def _add(
@@ -106,14 +117,17 @@ class SpawnServices:
         warn(model.name, entity)
 
     def _delete(self, request: DeleteModelRequest) -> DeleteModelResponse:
+        with self._one_at_a_time:
+            return self._delete_alone(request)
+
+    def _delete_alone(self, request: DeleteModelRequest) -> DeleteModelResponse:
         with self._sim.lock:
             model = self._sim.world.model(request.model_name)
         if model is None:
             return DeleteModelResponse(False, "DeleteModel: model does not exist")
         self._plugins.unload(model)
         with self._sim.lock:
-            if self._sim.world.models.get(model.name) is model:
-                self._sim.delete_model(model)
+            self._sim.delete_model(model)
         return DeleteModelResponse(True, "DeleteModel: successfully deleted model")
 
 

@@ -1,6 +1,7 @@
 """step_world: moves a world in lock-step, and answers with the state (srv/StepWorld.srv)."""
 
 import math
+import threading
 
 import rospy
 from sensor_msgs.msg import JointState
@@ -13,7 +14,8 @@ from bullet_gazebo.ros.conversions import to_time
 from bullet_gazebo.simulator import Simulator
 from cartpole.srv import StepWorld, StepWorldRequest, StepWorldResponse
 
-MAX_TICKS = 1_000_000  # a request beyond this is a mistake, and would hold the world for minutes
+MAX_TICKS = 1_000_000  # a request beyond this is a mistake, and would take minutes
+SLICE = 500  # ticks between which other services get their turn
 
 
 class StepService:
@@ -21,16 +23,25 @@ class StepService:
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
+        self._one_at_a_time = threading.Lock()  # nobody else's ticks within a request's
         self._service = rospy.Service("~step_world", StepWorld, self._step)
 
     def _step(self, request: StepWorldRequest) -> StepWorldResponse:
-        sim = self._sim
+        with self._one_at_a_time:
+            return self._step_alone(request)
+
+    def _step_alone(self, request: StepWorldRequest) -> StepWorldResponse:
+        sim, left = self._sim, request.ticks
         with sim.lock:
             try:
                 self._command(request)  # everything is checked before the first tick
             except ControlError as error:
                 return StepWorldResponse(False, f"StepWorld: {error}", sim.sim_time, self._state())
-            sim.advance(request.ticks)
+            while left > SLICE:
+                sim.advance(SLICE)
+                left -= SLICE
+                sim.lock.yield_turn()
+            sim.advance(left)
             return StepWorldResponse(True, "", sim.sim_time, self._state())
 
     def _command(self, request: StepWorldRequest) -> None:

@@ -99,15 +99,15 @@ class PolicyGradientAgent:
     Args:
         seed: makes the initial weights and the choice of actions repeatable, through
             generators of its own.
-        random_start: draw the output layers too, as the document's script does.
+        random_weights: draw the output layers too, as the document's script does.
     """
 
-    def __init__(self, seed: int = 0, random_start: bool = False) -> None:
+    def __init__(self, seed: int = 0, random_weights: bool = False) -> None:
         with torch.random.fork_rng():
             torch.manual_seed(seed)
             self.policy = PolicyNetwork()
             self.value = ValueNetwork()
-        if not random_start:
+        if not random_weights:
             _zero(self.policy.fc)
             _zero(self.value.fc2)
         self.policy_optimizer = torch.optim.Adam(self.policy.parameters(), POLICY_LEARNING_RATE)

@@ -76,7 +76,13 @@ class RosSession:
         self._undo.callback(rospy.signal_shutdown, "training ended")
 
     def _check_mode(self) -> None:
-        if not self._realtime and not ros_node.service_is_registered(STEP_SERVICE):
+        lockstep = ros_node.service_is_registered(STEP_SERVICE)
+        if self._realtime and lockstep:
+            raise CartpoleError(
+                f"the running simulator moves in lock-step (it has {STEP_SERVICE}): its time would stand "
+                "still; train without --realtime, or start it with lockstep:=false"
+            )
+        if not self._realtime and not lockstep:
             raise CartpoleError(
                 f"the running simulator has no {STEP_SERVICE}: start it with lockstep:=true "
                 "(roslaunch cartpole simulation.launch does), or train with --realtime"

@@ -23,8 +23,7 @@ def main(argv: list[str] | None = None) -> int:
         name = ros_node.full_name(argv, NODE)
         return run(settings(flags, ros_node.private_parameters(name)), name, argv, interrupt)
     except CartpoleError as error:
-        print(f"{NODE}: {error}", file=sys.stderr)
-        return interrupt.exit_code or 1
+        return _failed(error, interrupt)
     except KeyboardInterrupt:
         print(f"{NODE}: interrupted before the training began", file=sys.stderr)
         return interrupt.exit_code or 130
@@ -37,8 +36,11 @@ def run(chosen: Settings, name: str, argv: list[str], interrupt: Interrupt) -> i
         name: this node's full name.
         argv: the process's arguments, with roslaunch's remappings.
 
+    Returns:
+        The exit code. A failure that the user can mend is one line; what was learned is saved.
+
     Raises:
-        CartpoleError: if something fails that the user can mend; what was learned is saved.
+        CartpoleError: if the run folder can't be made.
     """
     # Slow to import, and --help needs none of it.
     from cartpole.envs.ros_session import RosSession
@@ -50,11 +52,18 @@ def run(chosen: Settings, name: str, argv: list[str], interrupt: Interrupt) -> i
         plant = session.start(say)
         interrupt.defer()
         Training(chosen, folder, plant, interrupt).run()
+    except CartpoleError as error:
+        return _failed(error, interrupt)  # told before the closing: a hung simulator takes its time
     finally:
         interrupt.defer()
         session.close()
         _remove_if_empty(folder)
     return interrupt.exit_code
+
+
+def _failed(error: CartpoleError, interrupt: Interrupt) -> int:
+    print(f"{NODE}: {error}", file=sys.stderr, flush=True)
+    return interrupt.exit_code or 1
 
 
 def _remove_if_empty(folder: Path) -> None:

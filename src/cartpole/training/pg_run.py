@@ -53,7 +53,7 @@ class Training:
         self._folder = folder
         self._plant = plant
         self._interrupt = interrupt
-        self._agent = PolicyGradientAgent(settings.seed, settings.random_start)
+        self._agent = PolicyGradientAgent(settings.seed, settings.random_weights)
         self._saver = NetworkSaver(folder, self._agent, settings.save_every)
         self._history = History()  # its clock starts here
 

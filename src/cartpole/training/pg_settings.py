@@ -13,12 +13,12 @@ Trains the cart-pole by policy gradient over ROS, in lock-step with the simulato
 
 Starts what isn't running (master, simulator, robot, controllers) and stops exactly that.
 Every flag is a private rosparam too (~episodes, ~seed, ~run_dir, ~save_every, ~realtime,
-~gui, ~random_start, ~start_noise); the command line wins. Ctrl-C saves what was learned and
+~gui, ~random_weights, ~start_noise); the command line wins. Ctrl-C saves what was learned and
 exits with 130 (SIGTERM: 143).
 Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
 
 LARGEST_NOISE = 0.2  # [m], [rad]; just inside the angle at which an episode ends
-SWITCHES = ("realtime", "gui", "random_start")
+SWITCHES = ("realtime", "gui", "random_weights")
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Settings:
     save_every: int = 100
     realtime: bool = False
     gui: bool = False
-    random_start: bool = False
+    random_weights: bool = False
     start_noise: float = 0.0
 
 
@@ -70,7 +70,7 @@ def parser() -> argparse.ArgumentParser:
         help="let the world run by itself, as the existing script does",
     )
     add(
-        "--random-start",
+        "--random-weights",
         action="store_true",
         help="draw all initial weights at random, as the existing script does; by default the "
         "output layers start at zero, which learns more reliably",

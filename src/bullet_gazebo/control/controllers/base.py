@@ -1,5 +1,6 @@
 """What a controller is: a life cycle, an update on each control tick, inputs and outputs."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import ClassVar
@@ -87,6 +88,8 @@ def text_param(params: Mapping, key: str, place: str) -> str:
 def number_param(params: Mapping, key: str, place: str) -> float:
     """Returns the numeric parameter `key`; ControlError if it is missing or no number."""
     value = params.get(key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ControlError(f"parameter {place}/{key} is missing or is not a number: {value!r}")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ControlError(
+            f"parameter {place}/{key} is missing or is not a finite number: {value!r}"
+        )
     return float(value)

@@ -9,6 +9,7 @@ from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.samples import JointStateSample
 
 NANOSECONDS = 1_000_000_000
+SLOWEST = 1e-6  # [Hz]; below it, as at 0, nothing is ever published
 EXTRA_FIELDS = ("position", "velocity", "effort")
 
 
@@ -23,7 +24,7 @@ class JointStateController(Controller):
     ) -> None:
         super().__init__(name)
         self._joints = joints
-        self._period = round(NANOSECONDS / rate) if rate > 0.0 else None
+        self._period = round(NANOSECONDS / rate) if rate > SLOWEST else None
         self._last = 0
         self._names = tuple(j.name for j in joints) + tuple(e[0] for e in extra)
         self._extra = tuple(tuple(e[k] for e in extra) for k in (1, 2, 3))
@@ -34,7 +35,7 @@ class JointStateController(Controller):
     def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> "JointStateController":
         rate = number_param(params, "publish_rate", name)
         wanted = params.get("joints", list(hardware.joints))
-        if not isinstance(wanted, list):
+        if not isinstance(wanted, list) or not all(isinstance(joint, str) for joint in wanted):
             raise ControlError(f"parameter {name}/joints must be a list of joint names: {wanted!r}")
         unknown = [joint for joint in wanted if joint not in hardware.joints]
         if unknown:
