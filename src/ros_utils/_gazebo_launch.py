@@ -59,8 +59,8 @@ def launch_Gazebo(
         custom_world_path: world file; wins over the package's.
         custom_world_pkg, custom_world_name: world file ``<pkg>/worlds/<name>``.
         respawn_gazebo: start the server again if it dies.
-        pub_clock_frequency: messages on /clock per second [Hz]; only a value other than 100 is
-            passed on.
+        pub_clock_frequency: messages on /clock per second of simulated time [Hz]; 0 for one each
+            step. At 1 kHz each rospy node spends a tenth of its time on them.
         server_required: end the launch when the server ends.
         gui_required: end the launch when the window ends.
         launch_new_term: in an xterm, if there is a display and xterm; otherwise the output goes to
@@ -88,6 +88,7 @@ def launch_Gazebo(
         "verbose": verbose,
         "output": output,
         "respawn_gazebo": respawn_gazebo,
+        "use_clock_frequency": True,  # without it the rate has no effect
         "pub_clock_frequency": pub_clock_frequency,
         "server_required": server_required,
         "gui_required": gui_required,
@@ -99,9 +100,6 @@ def launch_Gazebo(
         "seed": seed,
         "extra_gazebo_args": extra_gazebo_args or None,
     }
-    asked["use_clock_frequency"] = (
-        True if pub_clock_frequency != 100 else None
-    )  # without it the rate has no effect
     with _target.using(master_uri):
         ready = f"{gazebo_ns.rstrip('/')}/{READY}"
         if _services.answers(ready):

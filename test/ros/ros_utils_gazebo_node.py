@@ -30,6 +30,7 @@ class Gazebo(unittest.TestCase):
     def launch(self):
         self.assertTrue(ros_gazebo.launch_Gazebo(paused=True, gui=True))
         self.assertIn("/gazebo", registered())
+        self.assertTrue(rospy.has_param("/gazebo/pub_clock_frequency"), "the rate has an effect")
         address = rosgraph.Master("/test").lookupNode("/gazebo")
         self.assertTrue(ros_gazebo.launch_Gazebo(), "the running one is used")
         self.assertEqual(rosgraph.Master("/test").lookupNode("/gazebo"), address)
