@@ -28,6 +28,10 @@ import rospkg
 from ros_utils import _endings, _log, _procfs, _registry, _target
 
 
+# A caller that a shell put into the background ignores Ctrl-C, and so would all that it starts.
+LISTENING = ("env", "--default-signal=INT")
+
+
 class CannotStart(Exception):
     """The program can't be started; the text says why."""
 
@@ -111,7 +115,7 @@ def start(
     token = secrets.token_hex(8)
     log = log_file or (None if screen else _log_path(label, token))
     status_file = None
-    full = [*_dying_with_caller(), *command]
+    full = [*_dying_with_caller(), *LISTENING, *command]
     if window and not log_file and _has_window():
         log, status_file = None, _log_path(label, token) + ".status"
         full = _in_window(full, label, status_file)
