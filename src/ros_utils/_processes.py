@@ -27,7 +27,6 @@ import rospkg
 
 from ros_utils import _endings, _log, _procfs, _registry, _target
 
-
 # A caller that a shell put into the background ignores Ctrl-C, and so would all that it starts.
 LISTENING = ("env", "--default-signal=INT")
 
