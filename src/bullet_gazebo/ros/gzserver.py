@@ -56,12 +56,13 @@ class GazeboNode:
         load_plugins(self.sim, plugins)
         if not network:
             return
+        # Clients take the world for ready once it can be paused, so the step service comes first.
+        stepping = [StepService(self.sim)] if self.sim.lockstep else []
         self._services = [
+            *stepping,
             SpawnServices(self.sim, plugins),
             *advertise_world_services(self.sim),
         ]
-        if self.sim.lockstep:
-            self._services.append(StepService(self.sim))
 
     def run(self, ending: Ending) -> int:
         """Simulates until the node is shut down; returns the exit code."""

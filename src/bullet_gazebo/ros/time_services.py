@@ -11,10 +11,10 @@ from bullet_gazebo.simulator import Simulator
 def advertise_time_services(sim: Simulator) -> list[rospy.Service]:
     """Offers the services that start, stop and reset time."""
     actions = {
-        "~pause_physics": sim.pause,
         "~unpause_physics": sim.unpause,
         "~reset_world": sim.reset_world,
         "~reset_simulation": sim.reset_simulation,
+        "~pause_physics": sim.pause,  # the last: clients take the world for ready when this is there
     }
     return [rospy.Service(name, Empty, _handler(action)) for name, action in actions.items()]
 

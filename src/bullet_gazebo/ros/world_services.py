@@ -25,7 +25,7 @@ def advertise_world_services(sim: Simulator) -> list[object]:
     )
     return [
         *(group(sim) for group in groups),
-        *advertise_time_services(sim),
         physics,
         PhysicsReconfigure(physics),
+        *advertise_time_services(sim),  # the last, see there
     ]
