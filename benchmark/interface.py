@@ -22,13 +22,14 @@ import rospy
 from gazebo_msgs.srv import GetWorldProperties, SetModelConfiguration
 from std_srvs.srv import Empty
 
-from ros_utils import ros_gazebo
+from ros_utils import ros_gazebo, ros_urdf
 from ros_utils.simulation import Simulation
 
 LISTENER = (
     "import rospy; from rosgraph_msgs.msg import Clock; rospy.init_node('l', anonymous=True,"
     " disable_rosout=True, disable_rostime=True); rospy.Subscriber('/clock', Clock, lambda m: None,"
-    " tcp_nodelay=True); rospy.spin()"
+    " tcp_nodelay=True); rospy.wait_for_message('/clock', Clock); print('heard', flush=True);"
+    " rospy.spin()"
 )
 TARGETS = {  # [ms] for median and 99th percentile, None for no target; a factor for the last one
     "launch to a stepping world": (3500.0, None),
@@ -62,25 +63,13 @@ def launch() -> float:
 
 
 def spawns(count: int) -> list[float]:
-    xml = Path(ros_gazebo_urdf()).read_text(encoding="utf-8")
+    xml = ros_urdf.urdf_parse_from_pkg("cartpole_gazebo", "cartpole_v1.urdf", "/robots") or ""
     taken = []
     for _ in range(count):
         taken += times(lambda: ros_gazebo.gazebo_spawn_urdf_string(xml, "cartpole"), 1)
         ros_gazebo.gazebo_delete_model("cartpole")
     ros_gazebo.gazebo_spawn_urdf_string(xml, "cartpole")
     return taken
-
-
-def ros_gazebo_urdf() -> str:
-    """The robot, expanded by xacro into a file."""
-    import tempfile
-
-    from ros_utils import ros_urdf
-
-    xml = ros_urdf.urdf_parse_from_pkg("cartpole_gazebo", "cartpole_v1.urdf", "/robots")
-    with tempfile.NamedTemporaryFile("w", suffix=".urdf", delete=False, encoding="utf-8") as file:
-        file.write(xml or "")
-    return file.name
 
 
 def calls(count: int) -> dict[str, list[float]]:
@@ -104,11 +93,14 @@ def calls(count: int) -> dict[str, list[float]]:
 def factor(simulation: Simulation) -> list[float]:
     """Simulated over wall time while five processes hear every /clock."""
     listeners = [
-        subprocess.Popen([sys.executable, "-c", LISTENER], env=simulation.environment())
+        subprocess.Popen(
+            [sys.executable, "-c", LISTENER], env=simulation.environment(), stdout=subprocess.PIPE
+        )
         for _ in range(5)
     ]
     try:
-        time.sleep(4.0)
+        for listener in listeners:
+            listener.stdout.readline()  # it hears the clock now, or has ended
         begin, start = time.perf_counter(), ros_gazebo.gazebo_get_world_properties()[1]
         time.sleep(FACTOR_TIME)
         end = ros_gazebo.gazebo_get_world_properties()[1]
@@ -116,7 +108,7 @@ def factor(simulation: Simulation) -> list[float]:
     finally:
         for listener in listeners:
             listener.terminate()
-            listener.wait()
+            listener.communicate()
 
 
 def measure(launches: int, count: int) -> dict[str, list[float]]:

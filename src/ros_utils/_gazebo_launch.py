@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 
-from ros_utils import _log, _master, _packages, _processes, _services, _target, _waiting
+from ros_utils import _log, _master, _nodes, _packages, _processes, _services, _target, _waiting
 from ros_utils._started import Started
 from ros_utils._waiting import Outcome
 from ros_utils.ros_launch import start_roslaunch
@@ -136,9 +136,9 @@ def close_Gazebo(*, master_uri: str | None = None) -> bool:
         True if none of it is left.
     """
     with _target.using(master_uri):
-        nodes = {name: address for name in NODES if (address := _master.node_uri(name))}
+        nodes = {name: address for name in NODES if (address := _nodes.node_uri(name))}
         gone = _processes.end([entry for entry in _processes.started() if entry.label == LABEL])
-        left = _master.shut_down_nodes(nodes)
+        left = _nodes.shut_down_nodes(nodes)
     if left:
         _log.warn(f"close_Gazebo: still registered: {', '.join(left)}")
     return gone and not left

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import rosgraph
 from gazebo_msgs import srv
-from geometry_msgs.msg import Pose
 
 from ros_utils import _log, _master, _params, _services
 from ros_utils._gazebo_calls import (
@@ -16,51 +15,56 @@ from ros_utils._gazebo_calls import (
     BadNumber,
     call,
     check_finite,
-    pose_numbers,
+    make_pose,
     succeeded,
 )
 
 
-class Model(NamedTuple):
-    """A request to spawn, in the order of the service's fields."""
+class Target(NamedTuple):
+    """What the spawn functions have in common: where the model goes, and how to call."""
 
-    xml: str
     name: str
     namespace: str
-    pose: Pose
     frame: str
+    pose: tuple[float, float, float, float, float, float, float]  # x, y, z and a quaternion
+    timeout: float
+    gazebo_ns: str
+    verify: bool
 
 
-def spawn(
-    service: str, model: Model, timeout: float, gazebo_ns: str, verify: bool
-) -> tuple[bool, str]:
-    """Spawn a model.
+def spawn(kind: str, xml: str, target: Target) -> tuple[bool, str]:
+    """Spawn a model from XML text; `kind` is "urdf" or "sdf".
 
     Returns:
         Whether it was spawned (and, with `verify`, is in the world's list), and why not.
     """
-    name = f"{gazebo_ns.rstrip('/')}/{service}"
+    name = f"{target.gazebo_ns.rstrip('/')}/spawn_{kind}_model"
     try:
-        check_finite(f"spawn {model.name}: its pose", *pose_numbers(model.pose))
-        request = (model.name, model.xml, model.namespace, model.pose, model.frame)
-        answer = _services.call(name, srv.SpawnModel, *request, timeout=timeout)
+        check_finite(f"spawn {target.name}: its pose", *target.pose)
+        pose = make_pose(*target.pose)
+        request = (target.name, xml, target.namespace, pose, target.frame)
+        answer = _services.call(name, srv.SpawnModel, *request, timeout=target.timeout)
     except (_services.ServiceError, BadNumber) as fault:
         return _failed(str(fault))
-    if answer.success and verify and not _appears(model.name, True, timeout, gazebo_ns):
-        return _failed(f"{model.name} isn't in the world {timeout:g} s after it was spawned")
-    return bool(answer.success), str(answer.status_message)
+    if not answer.success:
+        return _failed(str(answer.status_message))
+    if target.verify and not _appears(target.name, True, target.timeout, target.gazebo_ns):
+        return _failed(
+            f"{target.name} isn't in the world {target.timeout:g} s after it was spawned"
+        )
+    return True, str(answer.status_message)
 
 
-def from_param(namespace: str, param_name: str) -> tuple[str | None, str]:
-    """The text in a parameter, or None and what is wrong, which is logged."""
-    name = rosgraph.names.ns_join(namespace or "/", param_name)
+def spawn_param(kind: str, param_name: str, target: Target) -> tuple[bool, str]:
+    """Spawn a model from the text in parameter ``<namespace>/<param_name>``. See `spawn`."""
+    name = rosgraph.names.ns_join(target.namespace or "/", param_name)
     try:
-        return str(_params.get(name)), ""
+        xml = str(_params.get(name))
     except _master.MasterDown as fault:
-        return None, _failed(f"parameter {name}: {fault}")[1]
+        return _failed(f"parameter {name}: {fault}")
     except KeyError:
-        fault_text = f"parameter {name} is not set: load the robot's description first"
-        return None, _failed(fault_text)[1]
+        return _failed(f"parameter {name} is not set: load the robot's description first")
+    return spawn(kind, xml, target)
 
 
 def gazebo_delete_model(
@@ -102,5 +106,6 @@ def _appears(name: str, wanted: bool, timeout: float, gazebo_ns: str) -> bool:
 
 
 def _failed(text: str) -> tuple[bool, str]:
+    """What a spawn function answers when something is wrong; the text is logged."""
     _log.error(text)
     return False, text

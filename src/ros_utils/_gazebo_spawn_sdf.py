@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ros_utils import _log, _packages
-from ros_utils._gazebo_calls import GAZEBO, TIMEOUT, make_pose
-from ros_utils._gazebo_spawn import Model, from_param, spawn
+from ros_utils._gazebo_calls import GAZEBO, TIMEOUT
+from ros_utils._gazebo_spawn import Target, spawn, spawn_param
 
 
 def gazebo_spawn_sdf_path(
@@ -28,9 +28,9 @@ def gazebo_spawn_sdf_path(
     xml = _read(model_path)
     if xml is None:
         return False
-    pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    model = Model(xml, model_name, robot_namespace, pose, reference_frame)
-    return spawn("spawn_sdf_model", model, timeout, gazebo_ns, verify)[0]
+    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
+    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
+    return spawn("sdf", xml, place)[0]
 
 
 def gazebo_spawn_sdf_pkg(
@@ -61,9 +61,9 @@ def gazebo_spawn_sdf_pkg(
         return False
     if xml is None:
         return False
-    pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    model = Model(xml, model_name, robot_namespace, pose, reference_frame)
-    return spawn("spawn_sdf_model", model, timeout, gazebo_ns, verify)[0]
+    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
+    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
+    return spawn("sdf", xml, place)[0]
 
 
 def gazebo_spawn_sdf_string(
@@ -98,9 +98,9 @@ def gazebo_spawn_sdf_string(
     Returns:
         True if it was spawned; one value here, two for a URDF.
     """
-    pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    model = Model(model_string, model_name, robot_namespace, pose, reference_frame)
-    return spawn("spawn_sdf_model", model, timeout, gazebo_ns, verify)[0]
+    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
+    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
+    return spawn("sdf", model_string, place)[0]
 
 
 def gazebo_spawn_sdf_param(
@@ -122,12 +122,9 @@ def gazebo_spawn_sdf_param(
 ) -> bool:
     """Spawn the SDF text in parameter ``<robot_namespace>/<param_name>``. See
     `gazebo_spawn_sdf_string`."""
-    xml, _ = from_param(robot_namespace, param_name)
-    if xml is None:
-        return False
-    pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    model = Model(xml, model_name, robot_namespace, pose, reference_frame)
-    return spawn("spawn_sdf_model", model, timeout, gazebo_ns, verify)[0]
+    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
+    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
+    return spawn_param("sdf", param_name, place)[0]
 
 
 def _read(path: str) -> str | None:

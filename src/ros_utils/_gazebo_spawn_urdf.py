@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ros_utils import ros_urdf
-from ros_utils._gazebo_calls import GAZEBO, TIMEOUT, make_pose
-from ros_utils._gazebo_spawn import Model, from_param, spawn
+from ros_utils._gazebo_calls import GAZEBO, TIMEOUT
+from ros_utils._gazebo_spawn import Target, spawn, spawn_param
 
 
 def gazebo_spawn_urdf_path(
@@ -31,9 +31,9 @@ def gazebo_spawn_urdf_path(
     xml = ros_urdf.urdf_parse_from_path(model_path, args_xacro)
     if xml is None:
         return False, f"{model_path}: can't be read or expanded"
-    pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    model = Model(xml, model_name, robot_namespace, pose, reference_frame)
-    return spawn("spawn_urdf_model", model, timeout, gazebo_ns, verify)
+    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
+    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
+    return spawn("urdf", xml, place)
 
 
 def gazebo_spawn_urdf_pkg(
@@ -61,9 +61,9 @@ def gazebo_spawn_urdf_pkg(
     xml = ros_urdf.urdf_parse_from_pkg(pkg_name, file_name, file_folder, args_xacro)
     if xml is None:
         return False, f"{file_name} in package {pkg_name}: can't be found, read or expanded"
-    pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    model = Model(xml, model_name, robot_namespace, pose, reference_frame)
-    return spawn("spawn_urdf_model", model, timeout, gazebo_ns, verify)
+    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
+    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
+    return spawn("urdf", xml, place)
 
 
 def gazebo_spawn_urdf_string(
@@ -98,9 +98,9 @@ def gazebo_spawn_urdf_string(
     Returns:
         Whether it was spawned, and the simulator's text or what went wrong before.
     """
-    pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    model = Model(model_string, model_name, robot_namespace, pose, reference_frame)
-    return spawn("spawn_urdf_model", model, timeout, gazebo_ns, verify)
+    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
+    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
+    return spawn("urdf", model_string, place)
 
 
 def gazebo_spawn_urdf_param(
@@ -122,9 +122,6 @@ def gazebo_spawn_urdf_param(
 ) -> tuple[bool, str]:
     """Spawn the URDF text in parameter ``<robot_namespace>/<param_name>``. See
     `gazebo_spawn_urdf_string`."""
-    xml, fault = from_param(robot_namespace, param_name)
-    if xml is None:
-        return False, fault
-    pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    model = Model(xml, model_name, robot_namespace, pose, reference_frame)
-    return spawn("spawn_urdf_model", model, timeout, gazebo_ns, verify)
+    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
+    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
+    return spawn_param("urdf", param_name, place)

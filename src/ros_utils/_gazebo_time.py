@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import rospy
 
-from ros_utils import _log, _master
+from ros_utils import _log, _master, _nodes
 from ros_utils._gazebo_calls import GAZEBO, TIMEOUT, empty_call
 
 STEP = "gazeboWorld"  # XML-RPC method of the stand-in's node; Gazebo has no service for steps
@@ -65,7 +65,7 @@ def gazebo_step_physics(
         if steps < 1:
             raise ValueError(f"{steps} steps: at least 1")
         _master.require()
-        address = _master.node_uri(node)
+        address = _nodes.node_uri(node)
         if address is None:
             raise ValueError(f"no node {node}: is a simulator running?")
         for done in range(0, steps, CHUNK):

@@ -49,15 +49,24 @@ def processes() -> dict[int, Stat]:
 def has_mark(pid: int, token: str) -> bool:
     """True if the process was started with the token in its MARK variable (by us or by something we
     started)."""
+    return any(token in mark.split(":") for mark in _started_with(pid, "environ", f"{MARK}="))
+
+
+def master_uri(pid: int) -> str | None:
+    """The ROS master that a process was started with, or None if it wasn't, or is another user's."""
+    asked = _started_with(pid, "cmdline", "__master:=")
+    asked += _started_with(pid, "environ", "ROS_MASTER_URI=")
+    return asked[0] if asked else None
+
+
+def _started_with(pid: int, what: str, prefix: str) -> list[str]:
+    """The rests of those variables or arguments of a process that begin with `prefix`."""
     try:
-        with open(f"/proc/{pid}/environ", "rb") as file:
-            variables = file.read().split(b"\0")
+        with open(f"/proc/{pid}/{what}", "rb") as file:
+            texts = file.read().decode(errors="replace").split("\0")
     except OSError:  # gone, or another user's
-        return False
-    prefix = f"{MARK}=".encode()
-    return any(
-        v.startswith(prefix) and token.encode() in v[len(prefix) :].split(b":") for v in variables
-    )
+        return []
+    return [text.removeprefix(prefix) for text in texts if text.startswith(prefix)]
 
 
 def family(pid: int, start: int, token: str) -> dict[int, Stat]:

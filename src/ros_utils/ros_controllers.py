@@ -10,107 +10,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from controller_manager_msgs.srv import (
-    ListControllerTypes,
-    LoadController,
-    SwitchController,
-    UnloadController,
-)
+from controller_manager_msgs.srv import ListControllerTypes, SwitchController
 
 from ros_utils import _log, _services
-from ros_utils._controller_calls import ListResult, service_name
-from ros_utils._controller_calls import names as _names
-from ros_utils._controller_calls import states as _states
-from ros_utils._controller_calls import until_ok as _until_ok
+from ros_utils._controller_calls import names, service_name, states, until_ok
+from ros_utils._controller_loading import (
+    load_controller_list_srv,
+    load_controller_srv,
+    unload_controller_list_srv,
+    unload_controller_srv,
+)
 
-
-def load_controller_srv(
-    controller_name: str,
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = _services.TIMEOUT,
-) -> bool:
-    """Load a controller, with up to `max_retries` attempts.
-
-    Returns:
-        True once the manager has loaded it. False if it refuses (already loaded, no parameters,
-        unknown type or joint) or doesn't answer.
-    """
-    return _until_ok(
-        "load_controller",
-        LoadController,
-        (controller_name,),
-        controller_name,
-        ns,
-        max_retries,
-        service_timeout,
-    )
-
-
-def load_controller_list_srv(
-    controller_list: Sequence[str],
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = _services.TIMEOUT,
-) -> ListResult:
-    """Load several controllers; all are tried.
-
-    Returns:
-        True if every one was loaded; its `failed` names those that were not.
-    """
-    return ListResult(
-        [
-            name
-            for name in controller_list
-            if not load_controller_srv(name, ns, max_retries, service_timeout=service_timeout)
-        ]
-    )
-
-
-def unload_controller_srv(
-    controller_name: str,
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = _services.TIMEOUT,
-) -> bool:
-    """Unload a controller that doesn't run, with up to `max_retries` attempts.
-
-    Returns:
-        True once it is unloaded. False if it runs, is unknown, or the manager doesn't answer.
-    """
-    return _until_ok(
-        "unload_controller",
-        UnloadController,
-        (controller_name,),
-        controller_name,
-        ns,
-        max_retries,
-        service_timeout,
-    )
-
-
-def unload_controller_list_srv(
-    controller_list: Sequence[str],
-    ns: str | None = None,
-    max_retries: int = 5,
-    *,
-    service_timeout: float = _services.TIMEOUT,
-) -> ListResult:
-    """Unload several controllers; all are tried.
-
-    Returns:
-        True if every one was unloaded; its `failed` names those that were not.
-    """
-    return ListResult(
-        [
-            name
-            for name in controller_list
-            if not unload_controller_srv(name, ns, max_retries, service_timeout=service_timeout)
-        ]
-    )
+__all__ = [
+    "kill_controllers_srv",
+    "list_controller_types_srv",
+    "list_controllers_srv",
+    "load_controller_list_srv",
+    "load_controller_srv",
+    "reset_controllers_srv",
+    "spawn_controllers_srv",
+    "start_controllers_srv",
+    "stop_controllers_srv",
+    "switch_controllers_srv",
+    "unload_controller_list_srv",
+    "unload_controller_srv",
+]
 
 
 def switch_controllers_srv(
@@ -140,11 +64,9 @@ def switch_controllers_srv(
         True if the manager has switched. With BEST_EFFORT this doesn't say that each one runs.
     """
     request = (list(start_controllers), list(stop_controllers), strictness, start_asap, timeout)
-    what = f"start {_names(start_controllers)}, stop {_names(stop_controllers)}"
+    what = f"start {names(start_controllers)}, stop {names(stop_controllers)}"
     patience = max(service_timeout, timeout + 2.0)  # the manager gives up after timeout + 1 s
-    return _until_ok(
-        "switch_controller", SwitchController, request, what, ns, max_retries, patience
-    )
+    return until_ok("switch_controller", SwitchController, request, what, ns, max_retries, patience)
 
 
 def start_controllers_srv(
@@ -225,7 +147,7 @@ def spawn_controllers_srv(
         True if every one is loaded and the manager has started them. One that can't be loaded
         doesn't keep the others from starting.
     """
-    known = _states(ns, service_timeout)
+    known = states(ns, service_timeout)
     if known is None:
         return False
     missing = [name for name in spawn_controllers if name not in known]
@@ -267,7 +189,7 @@ def list_controllers_srv(
 ) -> dict[str, str] | None:
     """Name and state (initialized, running, stopped) of the loaded controllers, or None, with an
     error in the log, if the manager doesn't tell."""
-    return _states(ns, service_timeout)
+    return states(ns, service_timeout)
 
 
 def list_controller_types_srv(

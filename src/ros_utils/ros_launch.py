@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 
-from ros_utils import _log, _master, _packages, _processes, _target, _waiting
+from ros_utils import _log, _master, _nodes, _packages, _processes, _target, _waiting
 from ros_utils._started import Started
 from ros_utils._waiting import Outcome
 
@@ -209,6 +209,6 @@ def _warn(handle: _processes.Handle, text: str) -> None:
 def _own_nodes(handle: _processes.Handle) -> int:
     """How many registered nodes came from the launch."""
     nodes = [
-        address for name, address in _master.node_uris().items() if name not in _master.CORE_NODES
+        address for name, address in _nodes.node_uris().items() if name not in _nodes.CORE_NODES
     ]
-    return sum(handle.owns(_master.node_pid(address)) for address in nodes)
+    return sum(handle.owns(_nodes.node_pid(address)) for address in nodes)

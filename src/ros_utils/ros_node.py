@@ -10,7 +10,7 @@ import roslib.packages
 import rospkg
 import rospy
 
-from ros_utils import _log, _master, _packages, _processes, _target, _waiting
+from ros_utils import _log, _master, _nodes, _packages, _processes, _target, _waiting
 from ros_utils._started import Started
 from ros_utils._waiting import Outcome
 from ros_utils.ros_launch import check_master_possible
@@ -69,7 +69,7 @@ def ros_node_from_pkg(
             ):
                 return False
             _master.require()
-            before = set(_master.node_uris().values())
+            before = set(_nodes.node_uris().values())
             handle = _processes.start(
                 command,
                 "node",
@@ -101,11 +101,11 @@ def ros_kill_node(node_name: str) -> bool:
         True if no such node is registered afterwards.
     """
     full_name = rospy.resolve_name(node_name)
-    address = _master.node_uri(full_name)
+    address = _nodes.node_uri(full_name)
     if address is None:
         _log.warn(f"ros_kill_node: no node {full_name} at {_master.uri()}")
         return True
-    if _master.is_own(address):
+    if _nodes.is_own(address):
         _log.error(f"ros_kill_node: {full_name} is this process itself: use rospy.signal_shutdown")
         return False
     return _shut_down({full_name: address})
@@ -117,7 +117,7 @@ def ros_kill_all_nodes() -> bool:
     Returns:
         True if none is left.
     """
-    return _shut_down(_master.node_uris())
+    return _shut_down(_nodes.node_uris())
 
 
 def ros_kill_master() -> bool:
@@ -149,13 +149,13 @@ def ros_kill_all_processes() -> bool:
     Returns:
         True if nothing of it is left.
     """
-    nodes = _master.node_uris()  # asked first: our master may go with the processes
+    nodes = _nodes.node_uris()  # asked first: our master may go with the processes
     gone = _processes.end(_processes.started())
     return _shut_down(nodes) and gone
 
 
 def _shut_down(nodes: dict[str, str]) -> bool:
-    left = _master.shut_down_nodes(nodes)
+    left = _nodes.shut_down_nodes(nodes)
     if left:
         _log.warn(
             f"still registered at {_master.uri()}: {', '.join(left)}"
@@ -209,7 +209,7 @@ def _start_master(window: bool, timeout: float) -> bool:
     port = str(_master.host_and_port()[1])
     handle = _processes.start(["roscore", "-p", port], "master", "roscore", window=window)
     outcome = _waiting.until(
-        lambda: _master.is_up() and "/rosout" in _master.node_names(), handle, timeout
+        lambda: _master.is_up() and "/rosout" in _nodes.node_names(), handle, timeout
     )
     if outcome is Outcome.READY:
         return True
@@ -221,9 +221,9 @@ def _start_master(window: bool, timeout: float) -> bool:
 def _is_registered(handle: _processes.Handle, name: str | None, before: set[str]) -> bool:
     """True if a node of this process is registered; a node of the same name from before doesn't
     count."""
-    addresses = [_master.node_uri(name)] if name else list(_master.node_uris().values())
+    addresses = [_nodes.node_uri(name)] if name else list(_nodes.node_uris().values())
     new = [address for address in addresses if address and address not in before]
-    return any(handle.owns(_master.node_pid(address)) for address in new)
+    return any(handle.owns(_nodes.node_pid(address)) for address in new)
 
 
 def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> Started | bool:

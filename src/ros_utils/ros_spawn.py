@@ -108,7 +108,7 @@ def spawn_model_in_gazebo(
         return False
     if not init_robot_state_pub(ns, max_pub_freq, rob_st_term):
         return False
-    spawned, text = ros_gazebo.gazebo_spawn_urdf_param(
+    spawned, _ = ros_gazebo.gazebo_spawn_urdf_param(
         "robot_description",
         gazebo_name,
         ns,
@@ -125,7 +125,6 @@ def spawn_model_in_gazebo(
         verify=verify,
     )
     if not spawned:
-        _log.error(f"spawn_model_in_gazebo: {gazebo_name}: {text}")
         return False
     if controllers_file is None:
         return True

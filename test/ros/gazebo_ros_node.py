@@ -9,8 +9,10 @@ import time
 import unittest
 from pathlib import Path
 
+import rosnode
 import rospy
 import rostest
+from controller_manager_msgs.srv import LoadController, SwitchController
 from gazebo_msgs.srv import DeleteModel, GetJointProperties, GetModelState, GetWorldProperties
 from gazebo_ros import gazebo_interface
 from geometry_msgs.msg import Pose
@@ -68,6 +70,17 @@ LAUNCH = """<launch>
   <node name="controller_spawner" pkg="controller_manager" type="spawner"
         args="states elbow_position"/>
 </launch>"""
+ARM_SDF = """<sdf version="1.6"><model name="arm">{more}
+<link name="base">{inertial}</link><link name="upper"><pose>0 0 0.5 0 0 0</pose>{inertial}</link>
+<joint name="elbow" type="revolute"><parent>base</parent><child>upper</child><axis><xyz>0 0 1</xyz>
+<limit><lower>-2</lower><upper>2</upper></limit></axis></joint>
+<plugin name="c" filename="libgazebo_ros_control.so"/></model></sdf>"""
+SDF = ARM_SDF.format(more="<pose>0 0 2 0 0 0</pose>", inertial=(
+    "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
+))  # fmt: skip
+CRATE = """<sdf version="1.6"><model name="any"><static>true</static><link name="box"><collision name="c">
+<geometry><box><size>1 1 1</size></box></geometry></collision></link></model></sdf>"""
+CONFIG = "<model><name>crate</name><sdf version='1.6'>model.sdf</sdf></model>"
 PLUGINS = """
 import rospy
 from std_msgs.msg import Int32
@@ -110,7 +123,8 @@ def wait_until(condition):
 
 def write_package(folder):
     files = {"package.xml": PACKAGE, "urdf/arm.urdf": URDF, "config/control.yaml": YAML,
-             "launch/arm.launch": LAUNCH, "python/my_plugins.py": PLUGINS}  # fmt: skip
+             "launch/arm.launch": LAUNCH, "python/my_plugins.py": PLUGINS, "sdf/arm.sdf": SDF,
+             "models/crate/model.sdf": CRATE, "models/crate/model.config": CONFIG}  # fmt: skip
     for name, text in files.items():
         path = Path(folder, "my_arm", name)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -123,6 +137,7 @@ class GazeboRos(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         write_package(cls.folder.name)
         extra = {"ROS_PACKAGE_PATH": cls.folder.name,
+                 "GAZEBO_MODEL_PATH": f"{cls.folder.name}/my_arm/models",
                  "PYTHONPATH": f"{cls.folder.name}/my_arm/python"}  # fmt: skip
         cls.environment = os.environ | {
             name: f"{value}:{os.environ.get(name, '')}" for name, value in extra.items()
@@ -213,13 +228,54 @@ class GazeboRos(unittest.TestCase):
         before = sim_time()
         wait_until(lambda: sim_time() > before)
 
+    def test_4_spawn_model_from_sdf(self):
+        rospy.set_param("/sdf_arm/robot_description", URDF)
+        states = {"type": "joint_state_controller/JointStateController", "publish_rate": 50}
+        rospy.set_param("/sdf_arm/states", states)
+        self.spawn("-sdf", "-file", f"{self.folder.name}/my_arm/sdf/arm.sdf", "-model", "sdf_arm",
+                   "-robot_namespace", "/sdf_arm", "-x", "4", "-J", "elbow", "0.5")  # fmt: skip
+        position = call(
+            "/gazebo/get_joint_properties", GetJointProperties, "sdf_arm::elbow"
+        ).position
+        self.assertAlmostEqual(position[0], 0.5, places=2)
+        manager = "/sdf_arm/controller_manager"
+        self.assertTrue(call(f"{manager}/load_controller", LoadController, "states").ok)
+        self.assertTrue(
+            call(f"{manager}/switch_controller", SwitchController, ["states"], [], 2, False, 0.0).ok
+        )
+        state = rospy.wait_for_message("/sdf_arm/joint_states", JointState, BOUND)
+        self.assertEqual(state.name, ["elbow"])
+
+    def test_4_spawn_model_from_the_database_and_a_parameter(self):
+        self.spawn("-sdf", "-database", "crate", "-model", "crate_1", "-x", "8", "-z", "0.5")
+        place = call("/gazebo/get_model_state", GetModelState, "crate_1", "").pose.position
+        self.assertEqual((place.x, place.z), (8.0, 0.5))
+        text = self.spawn("-sdf", "-database", "nix", "-model", "crate_2", code=1)
+        self.assertIn("model://nix", text)
+        rospy.set_param("/a_crate", CRATE)
+        self.spawn("-sdf", "-param", "/a_crate", "-model", "crate_3", "-x", "8", "-z", "1",
+                   "-reference_frame", "crate_1", "-R", "1.5708")  # fmt: skip
+        pose = call("/gazebo/get_model_state", GetModelState, "crate_3", "").pose
+        self.assertEqual((pose.position.x, pose.position.z), (16.0, 1.5))
+        self.assertAlmostEqual(pose.orientation.x, 0.7071, places=3)
+
+    def test_4_spawn_model_that_is_interrupted(self):
+        for arguments in (("-wait", "nobody"), ("-gazebo_namespace", "/nowhere")):
+            waiting = self.start("rosrun", "gazebo_ros", "spawn_model", "-sdf", "-database", "crate",
+                                 "-model", "late", "__name:=waiting", *arguments,
+                                 stderr=subprocess.PIPE, text=True)  # fmt: skip
+            wait_until(lambda: "/waiting" in rosnode.get_node_names())
+            waiting.send_signal(signal.SIGINT)
+            self.assertIn("interrupted", waiting.communicate(timeout=BOUND)[1])
+            self.assertEqual(waiting.returncode, 1)
+            wait_until(lambda: "/waiting" not in rosnode.get_node_names())
+
     def test_5_bond(self):
         bond = self.start("rosrun", "gazebo_ros", "spawn_model", "-urdf", "-stdin", "-model", "bond",
                           "-robot_namespace", "/bond", "-b", stdin=subprocess.PIPE)  # fmt: skip
         bond.stdin.write(URDF.encode())
         bond.stdin.close()
         wait_until(lambda: "bond" in self.models())
-        time.sleep(1.0)  # rospy's handler of SIGINT may hang a node that is in the middle of a call
         bond.send_signal(signal.SIGINT)
         bond.wait(BOUND)
         wait_until(lambda: "bond" not in self.models())

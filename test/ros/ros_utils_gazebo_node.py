@@ -93,8 +93,8 @@ class Gazebo(unittest.TestCase):
 
     def wait_for_states(self, expected):
         deadline = time.monotonic() + 10.0
-        while ros_controllers._states("/", 5.0) != expected:
-            self.assertLess(time.monotonic(), deadline, ros_controllers._states("/", 5.0))
+        while ros_controllers.list_controllers_srv() != expected:
+            self.assertLess(time.monotonic(), deadline, ros_controllers.list_controllers_srv())
             time.sleep(0.05)
 
     def close(self):

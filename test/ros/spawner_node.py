@@ -13,6 +13,7 @@ import rostest
 from controller_manager_msgs.srv import ListControllers, SwitchController
 from gazebo_msgs.srv import DeleteModel, SpawnModel, SpawnModelRequest
 from std_msgs.msg import Bool
+from std_srvs.srv import Empty
 
 BOUND = 20.0  # [s of wall time]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"
@@ -107,6 +108,9 @@ class SpawnerTest(unittest.TestCase):
         self.assertIn("Failed to load nobody", self.interrupt(spawner))
 
     def test_without_a_manager_it_says_so_and_ends(self):
+        # As long as simulated time stands at zero it would wait for the simulator to begin.
+        call("/gazebo/unpause_physics", Empty)
+        self.addCleanup(call, "/gazebo/pause_physics", Empty)
         spawner = self.run_script("spawner", "--namespace", "/nowhere", "--timeout", "1", CART)
         output, _ = spawner.communicate(timeout=BOUND)
         self.assertEqual(spawner.returncode, 1)

@@ -1,12 +1,16 @@
 #!/usr/bin/env python3
 """A world from a file, and SDF models spawned into it, as a client sees them (gazebo_api.md 2.3 to 2.5)."""
 
+import os
+import tempfile
 import time
 import unittest
 
 import rospy
 import rostest
 from gazebo_msgs.srv import (
+    ApplyBodyWrench,
+    DeleteLight,
     DeleteModel,
     GetLinkState,
     GetModelProperties,
@@ -16,7 +20,7 @@ from gazebo_msgs.srv import (
     SpawnModel,
     SpawnModelRequest,
 )
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
 
 BOUND = 20.0  # [s of wall time]
 UNKNOWN = (
@@ -150,6 +154,38 @@ class Spawning(unittest.TestCase):
         found = call("/gazebo/get_model_properties", GetModelProperties, "urdf")
         self.assertEqual(found.geom_names, ["a_collision", "a_fixed_joint_lump__b_collision_1"])
 
+    def test_a_lumped_caster_slides(self):
+        """Pushed over the edge of sticking: with its own friction of 0 it goes off at once."""
+        ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+        moment = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        xml = (
+            f'<robot name="r"><link name="a"><inertial><mass value="1"/>{moment}</inertial><collision>'
+            '<geometry><box size="0.1 0.1 0.02"/></geometry></collision></link>'
+            f'<link name="c"><inertial><mass value="0.1"/>{moment}</inertial>{ball}</link>'
+            '<joint name="j" type="fixed"><parent link="a"/><child link="c"/></joint>'
+            '<gazebo reference="c"><mu1>0</mu1><mu2>0</mu2></gazebo></robot>'
+        )
+        self.spawned("puck", xml, initial_pose=at(0.0, 30.0, 0.1), service="urdf")
+        push = Wrench(force=Vector3(0.55, 0.0, 0.0))
+        always = rospy.Duration(-1)
+        call("/gazebo/apply_body_wrench", ApplyBodyWrench, "puck::a", "", Point(), push,
+             rospy.Time(), always)  # fmt: skip
+        deadline = time.monotonic() + BOUND
+        while position("puck").x < 0.2:
+            self.assertLess(time.monotonic(), deadline, "it sticks")
+            time.sleep(0.1)
+        found = call("/gazebo/get_model_properties", GetModelProperties, "puck")
+        self.assertEqual((found.body_names, found.joint_names), (["a"], []))
+
+    def test_thousands_of_faults_are_a_few_lines(self):
+        """Each would be a line in the log, and the spawn would take minutes."""
+        blocks = '<gazebo reference="gone"><mu1>1</mu1></gazebo>' * 100_000
+        plugins = '<gazebo><plugin filename="libnobody_has.so"/></gazebo>' * 50_000
+        start = time.monotonic()
+        xml = URDF.replace("</robot>", f"{blocks}{plugins}</robot>")
+        self.spawned("wordy", xml, initial_pose=at(0.0, -30.0, 1.0))
+        self.assertLess(time.monotonic() - start, 30.0)
+
     def test_static_models_can_be_deleted(self):
         spawn("block", BOX.format(more="<static>true</static>"), initial_pose=at(9.0))
         self.assertEqual(delete("block").status_message, "DeleteModel: successfully deleted model")
@@ -166,6 +202,9 @@ class Spawning(unittest.TestCase):
             (False, "SpawnModel: Failure - entity already exists."),
         )
         self.assertNotIn("torch", models())
+        self.assertTrue(spawn("box", xml).success)  # a model of that name is no hindrance
+        for name in ("torch", "box"):
+            self.assertTrue(call("/gazebo/delete_light", DeleteLight, name).success)
 
 
 class Refusals(unittest.TestCase):
@@ -210,6 +249,14 @@ class Refusals(unittest.TestCase):
         name = "n" * 100_000
         self.assertTrue(spawn(name, BOX.format(more=""), initial_pose=at(20.0)).success)
         self.assertTrue(delete(name).success)
+
+    def test_a_pipe_is_no_mesh(self):
+        """Opening it would wait for a writer, and all later spawns with it."""
+        with tempfile.TemporaryDirectory() as folder:
+            os.mkfifo(f"{folder}/pipe.stl")
+            mesh = f"<mesh><uri>{folder}/pipe.stl</uri></mesh>"
+            xml = BOX.replace("<box><size>0.2 0.2 0.2</size></box>", mesh).format(more="")
+            self.refused("it is not a file", "new", xml)
 
     def test_a_missing_mesh_is_named(self):
         mesh = "<mesh><uri>model://gone/x.dae</uri></mesh>"

@@ -10,7 +10,10 @@ import subprocess
 import pytest
 
 CATKIN_MAKE = ["/usr/bin/catkin_make", "-DPYTHON_EXECUTABLE=/usr/bin/python3"]
-MODULES = "import cartpole.srv, cartpole.task, gazebo_msgs.srv, ros_utils, bullet_gazebo.control"
+MODULES = (
+    "import cartpole.srv, cartpole.task, gazebo_msgs.srv, ros_utils, bullet_gazebo.control,"
+    " controller_manager.controller_manager_interface, controller_manager_msgs.utils"
+)
 
 
 def run(command, workspace, **environment):
@@ -64,8 +67,11 @@ def test_built_workspace(workspace, space):
 @pytest.mark.slow
 @pytest.mark.parametrize("space", ["devel", "install"])
 def test_scripts_have_the_builds_interpreter(workspace, space):
-    scripts = [path for path in (workspace / space / "lib").glob("*/*") if os.access(path, os.X_OK)]
-    scripts = [path for path in scripts if path.is_file()]
-    assert {"gzserver", "gzclient", "spawner", "unspawner"} <= {path.name for path in scripts}
+    folders = [*(workspace / space / "lib").glob("*"), workspace / space / "bin"]
+    found = [path for folder in folders for path in folder.glob("*")]
+    scripts = [path for path in found if path.is_file() and os.access(path, os.X_OK)]
+    ours = {"gz", "gzserver", "gzclient", "spawner", "unspawner"}
+    ours |= {"controller_manager", "controller_group"}
+    assert ours <= {each.name for each in scripts}
     for script in scripts:
         assert script.read_text().startswith("#!/usr/bin/python3\n"), script

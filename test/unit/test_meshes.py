@@ -1,6 +1,7 @@
 """Mesh files: found by every kind of URI, and really colliding."""
 
 import itertools
+import os
 import struct
 
 import pytest
@@ -62,6 +63,15 @@ def dae(unit="1", up="Z_UP"):
 """.encode()
 
 
+def library():
+    """A scene that shows a node of the library, which the engine doesn't look into."""
+    shown = '<instance_geometry url="#g"/>'
+    start, end = dae().decode().split(f'<node id="n">{shown}</node>')
+    nodes = f'<library_nodes><node id="l">{shown}</node></library_nodes>'
+    start = start.replace("<library_visual_scenes>", f"{nodes}<library_visual_scenes>")
+    return f'{start}<node id="n"><instance_node url="#l"/></node>{end}'.encode()
+
+
 def polylist():
     """The cube by its six squares, as Blender exports it."""
     squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -85,6 +95,9 @@ FILES = {
     "millimetres.dae": dae(unit="0.001"),
     "y_up.dae": dae(up="Y_UP"),
 }
+
+
+LIBRARY = library()
 
 
 @pytest.fixture
@@ -174,6 +187,7 @@ def test_a_static_mesh_is_hollow_where_it_is_hollow(tmp_path):
         ("broken.obj", b"no mesh at all", "no faces"),
         ("rubbish.dae", bytes(range(256)) * 10, "can't be read"),
         ("empty.dae", b"<COLLADA/>", "no triangles"),
+        ("library.dae", LIBRARY, "finds nothing to touch"),
     ],
 )
 def test_a_mesh_that_can_not_be_used_is_named(tmp_path, name, data, fault):
@@ -188,6 +202,13 @@ def test_a_mesh_that_can_not_be_used_is_named(tmp_path, name, data, fault):
     assert "\n" not in str(raised.value)
     assert world.models == {}
     world.close()
+
+
+def test_a_pipe_is_no_mesh(tmp_path):
+    """Opening it would wait for a writer for ever."""
+    os.mkfifo(tmp_path / "pipe.stl")
+    with pytest.raises(DescriptionError, match="pipe.stl': it is not a file"):
+        parse_urdf(urdf(tmp_path / "pipe.stl"))
 
 
 def test_a_missing_visual_is_only_a_warning():

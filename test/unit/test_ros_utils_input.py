@@ -1,6 +1,5 @@
-"""What ros_utils makes of its arguments: contract, bad files, and a master that is not there."""
+"""What ros_utils makes of its arguments: bad files, and a master that is not there."""
 
-import inspect
 import math
 import re
 import shlex
@@ -22,84 +21,6 @@ from ros_utils import (
     ros_spawn,
     ros_urdf,
 )
-
-POSE = "pos_x=0.0, pos_y=0.0, pos_z=0.0, ori_x=0.0, ori_y=0.0, ori_z=0.0, ori_w=1.0"
-TARGET = f"model_name='robot1', robot_namespace='/', reference_frame='world', {POSE}"
-SWITCH = "ns=None, strictness=1, start_asap=False, timeout=3.0"
-CONTRACT = {
-    ros_launch: """
-        ros_launch_from_pkg(pkg_name, launch_file, args=None, launch_new_term=True)
-        ros_launch_from_path(launch_file_path, args=None, launch_new_term=True)
-        ros_kill_launch_process()""",
-    ros_node: """
-        ros_node_from_pkg(pkg_name, node_name, launch_master=False, launch_master_term=True,
-            launch_new_term=True, name=None, ns='/', output='log', args=None)
-        ros_kill_node(node_name)
-        ros_kill_all_nodes()
-        ros_kill_master()
-        ros_kill_all_processes()""",
-    ros_params: """
-        ros_load_yaml_from_pkg(pkg_name, file_name, ns='/')
-        ros_load_yaml_from_path(file_path, ns='/')""",
-    ros_urdf: """
-        urdf_load_from_pkg(pkg_name, model_name, param_name, folder='/urdf', ns=None,
-            args_xacro=None)
-        urdf_load_from_path(model_path, param_name, ns=None, args_xacro=None)
-        urdf_parse_from_pkg(pkg_name, model_name, folder='/urdf', args_xacro=None)
-        urdf_parse_from_path(model_path, args_xacro=None)""",
-    ros_controllers: f"""
-        load_controller_srv(controller_name, ns=None, max_retries=5)
-        load_controller_list_srv(controller_list, ns=None, max_retries=5)
-        unload_controller_srv(controller_name, ns=None, max_retries=5)
-        unload_controller_list_srv(controller_list, ns=None, max_retries=5)
-        switch_controllers_srv(start_controllers, stop_controllers, {SWITCH}, max_retries=5)
-        start_controllers_srv(start_controllers, {SWITCH})
-        stop_controllers_srv(stop_controllers, {SWITCH})
-        reset_controllers_srv(reset_controllers, max_retries=10, {SWITCH})
-        spawn_controllers_srv(spawn_controllers, {SWITCH})
-        kill_controllers_srv(kill_controllers, {SWITCH})""",
-    ros_gazebo: f"""
-        launch_Gazebo(paused=False, use_sim_time=True, gui=True, recording=False, debug=False,
-            verbose=False, output='screen', custom_world_path=None, custom_world_pkg=None,
-            custom_world_name=None, respawn_gazebo=False, pub_clock_frequency=100,
-            server_required=False, gui_required=False, launch_new_term=True)
-        close_Gazebo()
-        gazebo_reset_sim(retries=5)
-        gazebo_reset_world(retries=5)
-        gazebo_pause_physics(retries=5)
-        gazebo_unpause_physics(retries=5)
-        gazebo_delete_model(model_name)
-        gazebo_spawn_urdf_path(model_path, {TARGET})
-        gazebo_spawn_urdf_pkg(pkg_name, file_name, file_folder='/urdf', {TARGET})
-        gazebo_spawn_urdf_string(model_string, {TARGET})
-        gazebo_spawn_urdf_param(param_name, {TARGET})
-        gazebo_get_model_state(model_name, relative_entity_name='world')""",
-    ros_spawn: """
-        init_robot_state_pub(namespace='/', max_pub_freq=None, launch_new_term=False)
-        spawn_model_in_gazebo(pkg_name, model_urdf_file, controllers_file, controllers_list=(),
-            model_urdf_folder='/urdf', ns='/', args_xacro=None, max_pub_freq=None,
-            rob_st_term=False, gazebo_name='robot1', gaz_ref_frame='world', pos_x=0.0, pos_y=0.0,
-            pos_z=0.0, ori_w=0.0, ori_x=0.0, ori_y=0.0, ori_z=0.0)""",
-}
-SIGNATURES = [
-    (module, " ".join(signature.split()))
-    for module, text in CONTRACT.items()
-    for signature in re.split(r"\n {8}(?=\w)", text)[1:]
-]
-
-
-@pytest.mark.parametrize(
-    ("module", "signature"), SIGNATURES, ids=[text.split("(")[0] for _, text in SIGNATURES]
-)
-def test_signature(module, signature):
-    name = signature.split("(")[0]
-    parameters = inspect.signature(getattr(module, name)).parameters.values()
-    positional = [
-        p.replace(annotation=inspect.Parameter.empty)
-        for p in parameters
-        if p.kind is not inspect.Parameter.KEYWORD_ONLY
-    ]
-    assert f"{name}{inspect.Signature(positional)}" == signature
 
 
 @pytest.fixture

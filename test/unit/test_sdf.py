@@ -41,6 +41,9 @@ def spawn(text, pose=ORIGIN, gravity=(0.0, 0.0, 0.0)):
     return world, world.spawn("m", description, pose)
 
 
+COLLIDE = "<self_collide>{}</self_collide>"
+
+
 def test_a_box_comes_to_rest_on_the_ground():
     world = World(BulletEngine())
     world.spawn("ground_plane", ground_plane(), Pose())
@@ -173,7 +176,7 @@ def test_limits_dynamics_defaults_and_surfaces_are_read():
     assert (one.damping, one.friction) == (0.5, 0.25)
     assert two.kind == "continuous"
     assert (model.links["b"].inertia.mass, model.links["b"].inertia.ixx) == (1.0, 1.0)
-    assert (model.links["c"].mu, model.links["c"].gravity) == (0.3, False)
+    assert (model.links["c"].collisions[0].mu, model.links["c"].gravity) == (0.3, False)
 
 
 def test_a_link_without_gravity_stays_where_it_is():
@@ -333,3 +336,37 @@ def test_a_fault_is_one_line_with_its_place(text, fault):
 def test_no_text_is_anything_but_a_model_or_a_fault(text):
     with pytest.raises(DescriptionError):
         parse_sdf(text)
+
+
+def pair(a="", b="", of_model=""):
+    """Two heavy balls on arms that a joint each lets fall, side by side and overlapping."""
+    ball = (
+        '<collision name="c"><geometry><sphere><radius>0.3</radius></sphere></geometry></collision>'
+    )
+    arms = "".join(
+        f'<link name="{name}"><pose>{x} 0 1 0 0 0</pose>{ball}{more}</link><joint name="j{name}" '
+        f'type="prismatic"><parent>base</parent><child>{name}</child><axis><xyz>1 0 0</xyz></axis></joint>'
+        for name, x, more in (("a", -0.2, a), ("b", 0.2, b))
+    )
+    return f'<sdf version="1.6"><model name="m">{of_model}<link name="base"/>{arms}</model></sdf>'
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "of_model", "meet"),
+    [
+        ("", "", "", False),
+        (COLLIDE.format(1), "", "", True),
+        ("", COLLIDE.format(1), "", True),
+        ("", "", COLLIDE.format("true"), True),
+        (COLLIDE.format(0), COLLIDE.format(0), COLLIDE.format("true"), False),
+    ],
+)
+def test_two_links_of_a_model_meet_if_either_wants_it(a, b, of_model, meet):
+    world = World(BulletEngine(), gravity=(0.0, 0.0, 0.0))
+    model = world.spawn("m", parse_sdf(pair(a, b, of_model)), Pose())
+    for _ in range(500):
+        world.step()
+    apart = model.joint_state("jb")[0] - model.joint_state("ja")[0]
+    assert (apart > 0.15) == meet
+    assert apart > -1e-9
+    world.close()

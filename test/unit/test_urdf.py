@@ -291,7 +291,7 @@ def test_gazebo_blocks_set_friction_and_gravity():
         '<gazebo reference="nobody"><mu1>1</mu1></gazebo>'
     )
     model = parse_urdf(robot(link("base"), extra))
-    assert (model.links["base"].mu, model.links["base"].gravity) == (0.3, False)
+    assert not model.links["base"].gravity
     assert model.warnings == ["<gazebo reference='nobody'> refers to no link or joint"]
 
 
@@ -311,6 +311,58 @@ def test_friction_decides_whether_a_box_slides():
         world.close()
     sliding = 0.5 * 9.8 * (math.sin(math.radians(20)) - 0.2 * math.cos(math.radians(20)))
     assert ways == pytest.approx([sliding, 0.0], abs=0.05)
+
+
+def test_a_lumped_caster_keeps_its_own_friction():
+    """A sledge that rests on two runners, one of them without friction: a push of g/4 meets mu N/2."""
+    sphere = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    plate = '<collision><geometry><box size="0.1 1 0.1"/></geometry></collision>'
+    text = robot(
+        link("base", more='<collision><geometry><box size="1 1 0.02"/></geometry></collision>'),
+        link("runner", mass=0.001, inertia=1e-6, more=plate),
+        link("caster", mass=0.001, inertia=1e-6, more=sphere),
+        joint("r", "fixed", "base", "runner", "-0.4 0 -0.1"),
+        joint("c", "fixed", "base", "caster", "0.4 0 -0.05"),
+        '<gazebo reference="runner"><mu1>0.2</mu1></gazebo>'
+        '<gazebo reference="caster"><mu1>0</mu1><mu2>0</mu2></gazebo>',
+    )  # fmt: skip
+    world = World(BulletEngine(), gravity=(0.0, 2.45, -9.8))
+    world.spawn("ground_plane", ground_plane(), Pose())
+    model = world.spawn("r", parse_urdf(text), Pose((0.0, 0.0, 0.15)))
+    assert model.link_names == ["base"]
+    assert model.geom_names == [
+        "base_collision", "base_fixed_joint_lump__caster_collision_1",
+        "base_fixed_joint_lump__runner_collision_2",
+    ]  # fmt: skip
+    shapes = model.description.links["base"].collisions
+    assert [shape.mu for shape in shapes] == [1.0, 0.0, 0.2]
+    for _ in range(200):
+        world.step()
+    # The runner at one end brakes half the weight, so the centre of mass feels 2.45 - 0.2 * 9.8 / 2.
+    assert model.state()[1][0][1] == pytest.approx(0.2 * (2.45 - 0.98), abs=0.06)
+    world.close()
+
+
+def test_a_wheel_stands_still_and_rolls():
+    """A roller that a torque of 0.5 N m on its axis would drive by T r / (m r² + J)."""
+    shape = (
+        '<collision><origin rpy="1.5707963267948966 0 0"/><geometry>'
+        '<cylinder radius="0.1" length="0.5"/></geometry></collision>'
+    )
+    world = World(BulletEngine())
+    world.spawn("ground_plane", ground_plane(), Pose())
+    text = robot(link("a", mass=2.0, inertia=0.01, more=shape))
+    model = world.spawn("r", parse_urdf(text), Pose((0.0, 0.0, 0.1)))
+    for _ in range(1000):
+        world.step()
+    assert model.state()[0].position == pytest.approx((0.0, 0.0, 0.1), abs=2e-3)
+    for _ in range(1000):
+        model.body.add_wrench("a", (0.0, 0.0, 0.0), (0.0, 0.5, 0.0))
+        world.step()
+    linear, angular = model.state()[1]
+    assert linear[0] == pytest.approx(0.5 * 0.1 / (2.0 * 0.01 + 0.01), rel=0.1)
+    assert angular[1] * 0.1 == pytest.approx(linear[0], rel=0.02)
+    world.close()
 
 
 def test_sensors_are_left_out_and_named():

@@ -7,6 +7,7 @@ from pathlib import Path
 import pybullet
 
 from bullet_gazebo.physics.bullet_body import BASE, BulletBody, is_plane
+from bullet_gazebo.physics.bullet_contacts import collides_with_itself
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.engine import Body, Engine
 from bullet_gazebo.physics.engine_form import at_joints, parents_first
@@ -34,7 +35,7 @@ class BulletEngine(Engine):
             return self._load_plane(description, pose)
         engine_form, offsets = at_joints(description)
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_MAINTAIN_LINK_ORDER
-        if description.self_collide:
+        if collides_with_itself(description):
             flags |= (
                 pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
             )
@@ -50,7 +51,11 @@ class BulletEngine(Engine):
                 raise DescriptionError(
                     f"the physics engine can't load the model: {error}"
                 ) from error
-        return BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
+        try:
+            return BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
+        except DescriptionError:
+            pybullet.removeBody(body, physicsClientId=self._client)
+            raise
 
     def _load_plane(self, description: ModelDescription, pose: Pose) -> BulletBody:
         shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)

@@ -5,7 +5,12 @@ from functools import partial
 
 import pybullet
 
-from bullet_gazebo.physics.description import Inertia, Link, ModelDescription
+from bullet_gazebo.physics.bullet_contacts import (
+    check_meshes,
+    choose_self_collisions,
+    set_friction,
+)
+from bullet_gazebo.physics.description import Inertia, ModelDescription
 from bullet_gazebo.physics.engine import Body, Twist
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
 
@@ -38,9 +43,14 @@ class BulletBody(Body):
         self._links = {description.root: BASE} | {
             joint.child: joints[name] for name, joint in description.joints.items()
         }
-        self.link_names = tuple(name for name in description.links if name in self._links)
+        self.link_names = tuple(
+            name
+            for name, link in description.links.items()
+            if name in self._links and not link.part_of
+        )
         self._fixed = description.fixed_base
         dynamics = pybullet.getDynamicsInfo(body, BASE, client)
+        check_meshes(client, body, self._links, description)
         self._com = Pose(dynamics[3], dynamics[4])  # the engine turns it onto the principal axes
         if is_plane(description):
             self._com = description.links[description.root].collisions[0].pose
@@ -78,12 +88,10 @@ class BulletBody(Body):
                 physicsClientId=self._client,
             )  # fmt: skip
 
+        set_friction(self._client, self.id, self._links, description)
+        choose_self_collisions(self._client, self.id, self._links, description)
         for name in self.link_names:
             link = description.links[name]
-            pybullet.changeDynamics(
-                self.id, self._links[name], lateralFriction=_friction(link, description),
-                physicsClientId=self._client,
-            )  # fmt: skip
             self.set_link_gravity(name, link.gravity)
             if link.inertia is not None and not description.static:
                 self._keep_moments(self._links[name], link.inertia)
@@ -201,14 +209,6 @@ class BulletBody(Body):
         linear, angular = pybullet.getBaseVelocity(self.id, self._client)
         pose = com.compose(self._com.inverse())
         return pose, (add(linear, cross(angular, subtract(pose.position, com.position))), angular)
-
-
-def _friction(link: Link, description: ModelDescription) -> float:
-    """PyBullet multiplies the coefficients of two bodies where ODE takes the smaller one.
-
-    What stands still counts as 1 at most, so that a box on a ground of 100 keeps its own coefficient.
-    """
-    return min(link.mu, 1.0) if description.static else link.mu
 
 
 def _moments(inertia: Inertia) -> Vector:

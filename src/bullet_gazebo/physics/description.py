@@ -36,6 +36,7 @@ class Shape:
     mesh: str = ""
     rgba: tuple[float, float, float, float] | None = None
     name: str = ""
+    mu: float = 1.0  # coefficient of friction; Gazebo's default
 
 
 @dataclass
@@ -44,8 +45,9 @@ class Link:
     inertia: Inertia | None = None
     collisions: list[Shape] = field(default_factory=list)
     visuals: list[Shape] = field(default_factory=list)
-    mu: float = 1.0  # coefficient of friction; Gazebo's default
     gravity: bool = True  # whether gravity acts on it
+    self_collide: bool = False  # also with links of its own model that it isn't joined to
+    part_of: str = ""  # of an engine's helper link: the link that it is a piece of
 
 
 @dataclass
@@ -131,7 +133,6 @@ class ModelDescription:
     islands: dict[str, Pose] = field(default_factory=dict)
     initial_pose: Pose = Pose()
     static: bool = False
-    self_collide: bool = False
 
     @property
     def fixed_base(self) -> bool:

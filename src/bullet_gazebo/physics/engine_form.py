@@ -3,8 +3,8 @@
 from collections import defaultdict
 from dataclasses import replace
 
-from bullet_gazebo.physics.bounds import check_bounds
-from bullet_gazebo.physics.description import Joint, Link, ModelDescription
+from bullet_gazebo.physics.bounds import MOST_JOINTS, check_bounds
+from bullet_gazebo.physics.description import Joint, Link, ModelDescription, Shape
 from bullet_gazebo.physics.pose import Pose
 
 
@@ -24,11 +24,47 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
         for joint in model.joints.values()
         if joint.anchor != Pose()
     }
+    model = one_friction_each(model)
     if not offsets:
         return model, offsets
     links = {name: _moved(link, offsets.get(name)) for name, link in model.links.items()}
     joints = {name: _joined(joint, offsets) for name, joint in model.joints.items()}
     return replace(model, links=links, joints=joints), offsets
+
+
+def one_friction_each(model: ModelDescription) -> ModelDescription:
+    """Returns the model with each link's collisions alike in friction: the engine has one figure for a
+    link. Other ones, a caster's under a base, go to massless links that are fixed to it.
+
+    Beyond what the engine takes, a link keeps its first collision's.
+    """
+    pieces = [piece for link in model.links.values() for piece in _pieces(link)]
+    if len(model.joints) + len(pieces) > MOST_JOINTS:
+        return model
+    links, joints = dict(model.links), dict(model.joints)
+    for piece in pieces:
+        whole = links[piece.part_of]
+        kept = [shape for shape in whole.collisions if shape not in piece.collisions]
+        links[piece.part_of] = replace(whole, collisions=kept)
+        links[piece.name] = piece
+        joints[piece.name] = Joint(piece.name, "fixed", piece.part_of, piece.name)
+    return replace(model, links=links, joints=joints)
+
+
+def _pieces(link: Link) -> list[Link]:
+    """One link for each friction of `link` but the first."""
+    groups: dict[float, list[Shape]] = defaultdict(list)
+    for shape in link.collisions:
+        groups[shape.mu].append(shape)
+    return [
+        Link(
+            f"{link.name}::friction_{count}",
+            collisions=shapes,
+            self_collide=link.self_collide,
+            part_of=link.name,
+        )
+        for count, shapes in enumerate(list(groups.values())[1:], 1)
+    ]
 
 
 def parents_first(model: ModelDescription) -> ModelDescription:

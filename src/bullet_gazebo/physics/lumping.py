@@ -59,9 +59,8 @@ def detach_from_world(model: ModelDescription) -> None:
 def _lump(model: ModelDescription, name: str) -> None:
     joint = model.joints.pop(name)
     parent, child = model.links[joint.parent], model.links.pop(joint.child)
-    if not parent.collisions:
-        parent.mu = child.mu  # of what there is to touch
     parent.gravity = parent.gravity and child.gravity
+    parent.self_collide = parent.self_collide or child.self_collide
     parent.inertia = combine(parent.inertia, _moved(child.inertia, joint.pose))
     parent.collisions += [_lumped(shape, joint.pose, child.name) for shape in child.collisions]
     parent.visuals += [_lumped(shape, joint.pose, child.name) for shape in child.visuals]

@@ -3,6 +3,7 @@
 PyBullet reads OBJ, binary STL, and COLLADA of triangles. Other STL and COLLADA is rewritten for it.
 """
 
+import math
 import os
 import struct
 from collections.abc import Callable, Iterable
@@ -15,6 +16,7 @@ from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.elements import place
 
 SUFFIXES = (".stl", ".dae", ".obj")
+SIDES = 128  # of what stands for a cylinder
 STL_HEADER, STL_FACET = 84, 50  # [bytes]
 
 
@@ -96,6 +98,8 @@ def check_mesh(path: Path) -> Path:
     """Returns `path` if the engine can make a mesh of it. Errors: DescriptionError."""
     if path.suffix.lower() not in SUFFIXES:
         raise DescriptionError(f"mesh '{path}': only {', '.join(SUFFIXES)} files are read")
+    if not path.is_file():  # reading a pipe would wait for ever
+        raise DescriptionError(f"mesh '{path}': it is not a file")
     try:
         with path.open("rb") as file:
             head = file.read(STL_HEADER)
@@ -128,6 +132,18 @@ def engine_mesh(path: Path, folder: Path) -> Path:
     written = folder / f"{len(list(folder.iterdir()))}{path.suffix.lower()}"
     written.write_bytes(data)
     return written
+
+
+def drum(folder: Path) -> Path:
+    """Returns a file in `folder`: a cylinder of radius 1 and length 1 about z. It rests on a flat side."""
+    path = folder / "drum.obj"
+    if not path.exists():
+        angles = [2.0 * math.pi * (side + 0.5) / SIDES for side in range(SIDES)]
+        rims = [f"v {math.cos(a)!r} {math.sin(a)!r} {z}" for z in (-0.5, 0.5) for a in angles]
+        sides = [(i, i % SIDES + 1) for i in range(1, SIDES + 1)]
+        faces = [f"f {i} {j} {j + SIDES}\nf {i} {j + SIDES} {i + SIDES}" for i, j in sides]
+        path.write_text("\n".join([*rims, *faces, ""]))
+    return path
 
 
 def _rewritten(path: Path) -> bytes | None:

@@ -100,6 +100,13 @@ class Model:
             self.body.reset_joint(self._joints[name], self.clamped(name, positions[name]))
             self._rest(self._below(joint.child))
 
+    def set_joint_velocities(self, velocities: Mapping[str, float]) -> None:
+        """Lets joints move at `velocities` [rad/s, m/s] from where they are; unknown names are ignored."""
+        states = self.body.joint_states()
+        for name in sorted(set(velocities) & set(self._joints)):
+            index = self._joints[name]
+            self.body.reset_joint(index, states[index][0], velocities[name])
+
     def clamped(self, name: str, position: float) -> float:
         """Returns `position` [rad, m] within the stops of joint `name`."""
         joint = self.description.joints[name]

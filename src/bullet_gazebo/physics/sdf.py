@@ -22,7 +22,7 @@ from bullet_gazebo.physics.lumping import detach_from_world
 from bullet_gazebo.physics.meshes import MeshFinder, Resources
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.sdf_frames import Frames, read_pose
-from bullet_gazebo.physics.sdf_geometry import ShapeReader, read_inertia, value
+from bullet_gazebo.physics.sdf_geometry import ShapeReader, read_inertia
 from bullet_gazebo.physics.sdf_include import Origin, open_include
 from bullet_gazebo.physics.sdf_joint import WORLD, JointReader, ends
 from bullet_gazebo.physics.tree import find_roots, unique
@@ -43,7 +43,6 @@ class _Parts:
     plugins: list[Plugin] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
-    self_collide: bool = False
 
 
 def parse_sdf(
@@ -114,7 +113,7 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
     model = ModelDescription(name, links, joints, roots[0], poses[roots[0]])
     model.islands = {root: poses[root].relative_to(poses[roots[0]]) for root in roots[1:]}
     model.plugins, model.warnings, model.left_out = parts.plugins, parts.warnings, parts.left_out
-    model.static, model.self_collide = static, parts.self_collide
+    model.static = static
     detach_from_world(model)
     return model
 
@@ -130,15 +129,17 @@ def _read_parts(model: Element, origin: Origin, static: bool, depth: int) -> _Pa
         frames.add(name, *read_pose(element, f"model '{name}'"))
         for link, pose in inner.poses.items():
             frames.add(f"{name}::{link}", pose, name)
+    collide = truth(model.findtext("self_collide"))
     for element in model.findall("link"):
-        parts.links.append(_read_link(element, origin, frames, parts, static))
+        read = _read_link(element, origin, frames, parts, static)
+        read.self_collide = truth(element.findtext("self_collide"), default=collide)
+        parts.links.append(read)
     for name, _, inner in nested:
         _take_over(parts, inner, name)
     parts.poses = {link.name: frames.resolve(link.name) for link in parts.links}
     joints = JointReader(frames, origin.version, parts.warnings)
     parts.joints += [joints.read(element) for element in model.findall("joint")]
     parts.plugins += [read_plugin(element) for element in model.findall("plugin")]
-    parts.self_collide = parts.self_collide or truth(model.findtext("self_collide"))
     return parts
 
 
@@ -172,7 +173,6 @@ def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
     parts.plugins += inner.plugins
     parts.warnings += inner.warnings
     parts.left_out += inner.left_out
-    parts.self_collide = parts.self_collide or inner.self_collide
 
 
 def _name_frames(model: Element, frames: Frames) -> None:
@@ -201,9 +201,6 @@ def _read_link(
     link.visuals = list(shapes.read(element, "visual", where))
     if not static and any(shape.kind == "plane" for shape in link.collisions):
         raise DescriptionError(f"{where}: a plane can only be part of a static model")
-    for collision in element.findall("collision")[:1]:  # the engine has one coefficient for a link
-        link.mu = value(collision, "surface/friction/ode/mu", f"{where}, collision", 1.0)
     link.gravity = truth(element.findtext("gravity"), default=True)
-    parts.self_collide = parts.self_collide or truth(element.findtext("self_collide"))
     parts.left_out += [name_sensor(sensor, where) for sensor in element.findall("sensor")]
     return link

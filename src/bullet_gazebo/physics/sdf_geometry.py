@@ -1,7 +1,7 @@
 """Inertia and shapes of an SDF link (sdformat.org, specification 1.4 to 1.7)."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import Color, DescriptionError, Inertia, Shape
@@ -75,8 +75,15 @@ class ShapeReader:
             pose = pose.compose(Pose(orientation=_onto_normal(solid, where)))
         else:
             positive(size, f"{where}, {solid.tag}")
-        name = element.get("name", "")
-        return Shape(solid.tag, size, pose, mesh, _color(element, where), name)
+        shape = Shape(solid.tag, size, pose, mesh, _color(element, where), element.get("name", ""))
+        return replace(shape, mu=_friction(element, where)) if collides else shape
+
+
+def _friction(collision: Element, where: str) -> float:
+    mu = value(collision, "surface/friction/ode/mu", where, 1.0)
+    if mu < 0.0:
+        raise DescriptionError(f"{where}: a friction of {mu} is negative")
+    return mu
 
 
 def _size(solid: Element, where: str) -> tuple[float, ...]:

@@ -44,6 +44,8 @@ def included_name(include: Element) -> str:
 def _open(uri: str, origin: Origin) -> tuple[Element, Origin]:
     found = origin.resources.find(uri, origin.folder)
     path = _model_file(found) if found.is_dir() else found
+    if path.exists() and not path.is_file():  # reading a pipe would wait for ever
+        raise DescriptionError(f"{path} is not a file")
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

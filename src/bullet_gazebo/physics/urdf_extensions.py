@@ -3,6 +3,7 @@
 Contract: gazebo_api.md section 2.4. Sensors are out of scope: they are listed in `left_out`.
 """
 
+from dataclasses import replace
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import (
@@ -49,21 +50,23 @@ def _apply_to_model(model: ModelDescription, block: Element) -> None:
     for element in block:
         if element.tag == "static":
             model.static = model.static or truth(element.text)
-        elif element.tag == "self_collide":
-            model.self_collide = model.self_collide or truth(element.text)
+        elif element.tag == "self_collide" and truth(element.text):
+            for link in model.links.values():
+                link.self_collide = True
 
 
 def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
     for element in block:
         place = f"<gazebo reference='{link.name}'>, <{element.tag}>"
         if element.tag == "mu1":
-            link.mu = _not_negative(element.text or "", place)
+            mu = _not_negative(element.text or "", place)
+            link.collisions = [replace(shape, mu=mu) for shape in link.collisions]
         elif element.tag == "turnGravityOff":
             link.gravity = not truth(element.text)
         elif element.tag == "gravity":
             link.gravity = truth(element.text, default=True)
         elif element.tag == "selfCollide":
-            model.self_collide = model.self_collide or truth(element.text)
+            link.self_collide = truth(element.text)
         elif element.tag == "sensor":
             model.left_out.append(name_sensor(element, f"link '{link.name}'"))
         elif element.tag == "plugin":

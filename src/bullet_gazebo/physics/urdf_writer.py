@@ -1,5 +1,6 @@
 """Writes a ModelDescription as the URDF that the engine reads: lumped, without Gazebo's extensions."""
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -11,7 +12,7 @@ from bullet_gazebo.physics.description import (
     ModelDescription,
     Shape,
 )
-from bullet_gazebo.physics.meshes import engine_mesh
+from bullet_gazebo.physics.meshes import drum, engine_mesh
 from bullet_gazebo.physics.pose import Pose, to_rpy
 
 
@@ -35,7 +36,8 @@ def _write_link(robot: Element, link: Link, static: bool, folder: Path | None) -
     # Without an inertial the engine would assume 1 kg; only the immovable link `world` has none.
     _write_inertia(element, link.inertia or Inertia(mass=0.0))
     for tag, shapes in (("visual", link.visuals), ("collision", link.collisions)):
-        for shape in shapes:
+        for given in shapes:
+            shape = _finer(given, folder) if tag == "collision" else given
             mesh = _mesh_file(shape, folder, needed=tag == "collision")
             if mesh is None:
                 continue
@@ -43,6 +45,14 @@ def _write_link(robot: Element, link: Link, static: bool, folder: Path | None) -
             if static and shape.kind == "mesh" and tag == "collision":
                 written.set("concave", "yes")  # what moves collides by its convex hull
             _write_shape(written, shape, mesh)
+
+
+def _finer(shape: Shape, folder: Path | None) -> Shape:
+    """The engine's own cylinder has 32 sides: a wheel rocks on them, and each one brakes it."""
+    if shape.kind != "cylinder" or folder is None:
+        return shape
+    radius, length = shape.size
+    return replace(shape, kind="mesh", size=(radius, radius, length), mesh=str(drum(folder)))
 
 
 def _mesh_file(shape: Shape, folder: Path | None, needed: bool) -> str | None:

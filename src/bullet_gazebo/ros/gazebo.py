@@ -10,14 +10,21 @@ from bullet_gazebo.ros import gzserver
 
 CLIENT = "import sys; from bullet_gazebo.ros.gzclient import main; sys.exit(main())"
 NAME = "gazebo_gui"
+INTERRUPTED = 130
 PATIENCE = 5.0  # [s] for the window to close
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the server in this process and the window in one of its own; returns the server's code."""
     command_line = list(sys.argv if argv is None else argv)
-    with _window(command_line[1:]):
-        return gzserver.main(command_line)
+    # Until the server listens to them, both lead to the end of the block, and of the window.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
+    try:
+        with _window(command_line[1:]):
+            return gzserver.main(command_line)
+    except KeyboardInterrupt:
+        return INTERRUPTED
 
 
 @contextlib.contextmanager

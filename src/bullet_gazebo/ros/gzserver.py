@@ -1,6 +1,7 @@
 """The node `gazebo`: what `rosrun gazebo_ros gzserver` runs."""
 
 import argparse
+import sys
 import threading
 import traceback
 
@@ -8,13 +9,14 @@ import rospy
 
 from bullet_gazebo.physics.bullet import BulletEngine
 from bullet_gazebo.physics.world import World
+from bullet_gazebo.ros.connections import guard_connections
 from bullet_gazebo.ros.control_plugin import FILENAME as CONTROL_PLUGIN
 from bullet_gazebo.ros.control_plugin import ControlPlugin
 from bullet_gazebo.ros.joint_state_plugin import FILENAME as JOINT_STATE_PLUGIN
 from bullet_gazebo.ros.joint_state_plugin import JointStatePlugin
 from bullet_gazebo.ros.plugins import PluginRegistry
 from bullet_gazebo.ros.server_args import parse_args, seed_random_numbers
-from bullet_gazebo.ros.signals import Ending
+from bullet_gazebo.ros.signals import Ending, init_node
 from bullet_gazebo.ros.spawn_services import SpawnServices
 from bullet_gazebo.ros.state_topics import advertise_states
 from bullet_gazebo.ros.step_service import StepService
@@ -45,6 +47,7 @@ class GazeboNode:
 
     def _advertise(self, network: bool) -> None:
         WorldControl(self.sim).offer()
+        guard_connections()
         advertise_states(self.sim, _clock_frequency(), network)
         plugins = PluginRegistry(
             self.sim,
@@ -100,7 +103,7 @@ def _clock_frequency() -> float:
 def main(argv: list[str] | None = None) -> int:
     """Runs the node; returns its exit code."""
     args = parse_args(rospy.myargv(argv)[1:])
-    rospy.init_node("gazebo", disable_signals=True)
+    init_node("gazebo", sys.argv if argv is None else argv, anonymous=False)
     ending = Ending()  # not before: while there is no master, a signal ends the process as such
     if args.physics not in ENGINES:
         rospy.logwarn("Physics engine '%s' is not known; PyBullet is used", args.physics)

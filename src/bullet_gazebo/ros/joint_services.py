@@ -20,6 +20,7 @@ from bullet_gazebo.ros.checks import bad_number
 from bullet_gazebo.simulator import Simulator
 
 LONGEST_NAME = 80  # of a joint that is told in the log
+MOST_NAMES = 10  # told there
 INFINITE = 1.7e308  # ODE's users write stops that are none as 1e16 and beyond
 
 
@@ -91,9 +92,7 @@ class JointServices:
                 return _not_configured(f"joint positions must be finite, not {list(positions)}")
             plain = [name.removeprefix(f"{model.name}::") for name in names]
             self._sim.set_joint_positions(model, dict(zip(plain, positions, strict=True)))
-        unknown = sorted(name[:LONGEST_NAME] for name in set(plain) - set(model.joint_names))
-        if unknown:  # Gazebo ignores them without a word
-            rospy.logwarn("SetModelConfiguration: model '%s' has no joint %s", model.name, unknown)
+        _warn_of(set(plain) - set(model.joint_names), model.name)
         return SetModelConfigurationResponse(True, "SetModelConfiguration: success")
 
 
@@ -103,3 +102,11 @@ def _not_set(fault: str) -> SetJointPropertiesResponse:
 
 def _not_configured(fault: str) -> SetModelConfigurationResponse:
     return SetModelConfigurationResponse(False, f"SetModelConfiguration: {fault}")
+
+
+def _warn_of(unknown: set[str], model: str) -> None:
+    """Gazebo ignores joints that the model lacks without a word."""
+    if unknown:
+        names = [name[:LONGEST_NAME] for name in sorted(unknown)[:MOST_NAMES]]
+        more = f" and {len(unknown) - MOST_NAMES} more" if len(unknown) > MOST_NAMES else ""
+        rospy.logwarn("SetModelConfiguration: model '%s' has no joint %s%s", model, names, more)

@@ -1,10 +1,5 @@
-"""What spawner and unspawner need of a controller manager, with a time limit on each call.
+"""What spawner and unspawner need of a controller manager, with a time limit on each call."""
 
-The executables outlive the simulator for a moment when everything is shut down, so that no call may
-wait for an answer that never comes.
-"""
-
-import threading
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -18,20 +13,20 @@ from controller_manager_msgs.srv import (
     UnloadController,
 )
 
+from bullet_gazebo.ros.limited_call import call_limited
+
 BEST_EFFORT = SwitchControllerRequest.BEST_EFFORT
 STRICT = SwitchControllerRequest.STRICT
 
 POLL = 0.1  # [s] between two looks for a service
 
 
-class CallFailed(Exception):
-    """The manager is gone, gives no answer in time, or the call fails; the text says which."""
-
-
 class ManagerClient:
     """The services of the controller manager in one namespace."""
 
-    def __init__(self, namespace: str = "") -> None:
+    def __init__(self, namespace: str = "", user: str = "Controller Spawner") -> None:
+        """`user` is who waits, as the log says."""
+        self._user = user
         self._prefix = (
             f"{namespace.rstrip('/')}/controller_manager" if namespace else "controller_manager"
         )
@@ -48,7 +43,7 @@ class ManagerClient:
         """
         for service in services:
             name = rospy.resolve_name(f"{self._prefix}/{service}")
-            rospy.loginfo("Controller Spawner: Waiting for service %s", name)
+            rospy.loginfo("%s: Waiting for service %s/%s", self._user, self._prefix, service)
             deadline = None if timeout is None else time.monotonic() + timeout
             while not _is_offered(name):
                 if deadline is not None and time.monotonic() > deadline:
@@ -78,28 +73,7 @@ class ManagerClient:
         return [each.name for each in answer.controller if each.state == "running"]
 
     def _call(self, service: str, kind: Any, *request: Any, timeout: float | None) -> Any:
-        """Calls a service in a thread: rospy's own call has no time limit.
-
-        Args:
-            timeout: bound of the wait for the answer [s]; None waits until the node is shut down.
-
-        Raises:
-            CallFailed: no answer.
-        """
-        outcome: list[Any] = []
-        proxy = rospy.ServiceProxy(f"{self._prefix}/{service}", kind)
-        worker = threading.Thread(target=_call_into, args=(outcome, proxy, request), daemon=True)
-        worker.start()
-        deadline = None if timeout is None else time.monotonic() + timeout
-        while worker.is_alive() and not (deadline is None and rospy.is_shutdown()):
-            if deadline is not None and time.monotonic() > deadline:
-                break
-            worker.join(POLL)
-        if not outcome:
-            raise CallFailed(f"{service}: no answer")
-        if isinstance(outcome[0], Exception):
-            raise CallFailed(f"{service}: {outcome[0]}") from outcome[0]
-        return outcome[0]
+        return call_limited(f"{self._prefix}/{service}", kind, *request, timeout=timeout)
 
 
 def _is_offered(name: str) -> bool:
@@ -110,10 +84,3 @@ def _is_offered(name: str) -> bool:
     except rospy.ROSException:
         return False
     return True
-
-
-def _call_into(outcome: list[Any], proxy: Any, request: tuple[Any, ...]) -> None:
-    try:
-        outcome.append(proxy(*request))
-    except Exception as fault:  # noqa: BLE001, passed on to the caller's thread, whatever it is
-        outcome.append(fault)

@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+import genpy
 import rospy
 from gazebo_msgs.srv import (
     GetModelProperties,
@@ -77,7 +78,7 @@ class ModelServices:
             self._calls[request.model_name] += 1
             response.header = Header(
                 self._calls[request.model_name],
-                to_time(self._sim.now),
+                self._stamp(),
                 request.relative_entity_name,
             )
             frame = self._sim.world.frame(request.relative_entity_name)
@@ -92,6 +93,11 @@ class ModelServices:
         response.success = True
         response.status_message = "GetModelState: got properties"
         return response
+
+    def _stamp(self) -> genpy.Time:
+        """The node's own time, as Gazebo stamps it: the wall's with use_sim_time:=false."""
+        # rospy's simulated time may lag behind where /clock is thinned.
+        return rospy.get_rostime() if rospy.rostime.is_wallclock() else to_time(self._sim.now)
 
 
 def seen_from(state: tuple[Pose, Twist], frame: tuple[Pose, Twist]) -> tuple[Pose, Twist]:

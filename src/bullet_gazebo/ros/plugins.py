@@ -90,8 +90,9 @@ class PluginRegistry:
         """Starts the plugins of `model`. One that is unknown or fails is a message, and left out
         (gazebo_api.md section 2.4)."""
         loaded = self._loaded.setdefault(model, [])
+        places = _registered() if model.description.plugins else {}
         for plugin in model.description.plugins:
-            factory = self._find(plugin, model)
+            factory = self._find(plugin, model, places)
             if factory is None:
                 continue
             default = robot_namespace or model.name
@@ -113,12 +114,12 @@ class PluginRegistry:
             except Exception:  # noqa: BLE001 - a user's code must not keep a model from going
                 context._report("raised when it was ended")
 
-    def _find(self, plugin: Plugin, model: Model) -> Factory | None:
+    def _find(self, plugin: Plugin, model: Model, places: dict[str, object]) -> Factory | None:
         """Returns the plugin's factory; None if there is none."""
         library = os.path.basename(plugin.filename)
         if library in self._factories:
             return self._factories[library]
-        place = _registered().get(library)
+        place = places.get(library)
         if place is None:
             # One warning will name it together with the sensors (spawn_services.warn).
             unknown = f"plugin {plugin.filename or 'without a filename'}"
@@ -135,7 +136,7 @@ class PluginRegistry:
 
 
 def _registered() -> dict[str, object]:
-    """Read at each look-up, so that a plugin can be added while the simulator runs."""
+    """Read for each model, so that a plugin can be added while the simulator runs."""
     places = rospy.get_param(PARAMETER, {})
     return places if isinstance(places, dict) else {}
 

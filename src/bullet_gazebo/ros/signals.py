@@ -4,29 +4,114 @@ Those shut the node down from within the handler, in the middle of whatever the 
 it advertises a service it holds a lock that the shutdown needs too, and the process hangs for ever.
 """
 
+import queue
 import signal
+import sys
 import threading
+import time
+import xmlrpc.client
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from http.client import HTTPException
 from types import FrameType
+from xml.parsers.expat import ExpatError
 
+import rosgraph
 import rospy
 
-POLL = 0.1  # [s]
+DONE = "done"
+POLL = 0.1  # [s] between two looks whether the node was shut down otherwise
+SHUTDOWN = 14.0  # [s] at most; roslaunch sends SIGTERM after 15 s
+GRACE = 2.0  # [s] for interrupted work to notice that the node is down
 
 
 class Ending:
-    """Notes a signal, and shuts the node down where that is safe."""
+    """Notes a signal, and shuts the node down where that is safe.
+
+    For the main thread; the node is to be initialised with ``disable_signals=True``.
+    """
 
     def __init__(self) -> None:
-        """For the main thread, once the node is initialised, with ``disable_signals=True``."""
-        self._asked = threading.Event()
+        # Its put() may interrupt its own get(); an event's set() in a handler may wait for ever.
+        self._news: queue.SimpleQueue[str] = queue.SimpleQueue()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._note)
 
     def _note(self, _number: int, _frame: FrameType | None) -> None:
-        self._asked.set()
+        self._news.put("signal")
 
-    def wait(self) -> None:
-        """Returns once a signal came, or the node was shut down otherwise, and the node is down."""
-        while not self._asked.wait(POLL) and not rospy.is_shutdown():
-            pass
-        rospy.signal_shutdown("signal")
+    def wait(self) -> bool:
+        """Returns once a signal came, or the node was shut down otherwise, and the node is down.
+
+        Returns:
+            False if it was the work of `run` that came to its end.
+        """
+        reason = "shut down"
+        while not rospy.is_shutdown():
+            try:
+                reason = self._news.get(timeout=POLL)
+                break
+            except queue.Empty:
+                continue
+        # In a thread, because rospy's shutdown waits for ever for a registration at a dead master.
+        closing = threading.Thread(target=rospy.signal_shutdown, args=(reason,), daemon=True)
+        closing.start()
+        closing.join(SHUTDOWN)
+        return reason != DONE
+
+    def run(self, work: Callable[[], int], interrupted: int) -> int:
+        """Runs a program in a thread of its own, so that a signal finds the main thread free.
+
+        Args:
+            work: the program, from ``init_node`` on; what it raises, this raises.
+            interrupted: the exit code of a program that was ended before it was done.
+
+        Returns:
+            The exit code.
+        """
+        outcome: Future[int] = Future()
+
+        def carry_out() -> None:
+            try:
+                outcome.set_result(work())
+            except BaseException as fault:  # noqa: BLE001 - raised again in the main thread
+                outcome.set_exception(fault)
+            self._news.put(DONE)
+
+        threading.Thread(target=carry_out, name="work", daemon=True).start()
+        ended = self.wait()
+        try:
+            return outcome.result(GRACE)
+        except (TimeoutError, rospy.ROSException):  # also from an init_node that was cut short
+            if not ended:
+                raise
+            return interrupted
+
+
+def init_node(name: str, command_line: Sequence[str], anonymous: bool = True) -> None:
+    """Initialises a node without rospy's handlers, once there is a master.
+
+    rospy itself would wait for the master as well, but in a way that can't be interrupted.
+
+    Raises:
+        rospy.ROSInterruptException: a signal came while there was none.
+    """
+    told = False
+    while not _master_answers(name):
+        if rospy.is_shutdown():
+            raise rospy.ROSInterruptException("shut down while waiting for a master")
+        if not told:
+            print(f"{name}: no ROS master at {rosgraph.get_master_uri()} yet; waiting for it",
+                  file=sys.stderr, flush=True)  # fmt: skip
+        told = True
+        time.sleep(POLL)
+    rospy.init_node(name, anonymous=anonymous, argv=list(command_line), disable_signals=True)
+
+
+def _master_answers(name: str) -> bool:
+    """rosgraph's own function for this also takes a Ctrl-C for no answer."""
+    try:
+        rosgraph.Master(f"/{name}").getPid()
+    except (OSError, HTTPException, xmlrpc.client.Error, ExpatError, rosgraph.MasterException):
+        return False
+    return True

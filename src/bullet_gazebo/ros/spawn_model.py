@@ -1,8 +1,10 @@
 """Executable `spawn_model` of package gazebo_ros (contract: gazebo_api.md section 4.3)."""
 
 import argparse
+import contextlib
 import math
 import sys
+import threading
 from collections.abc import Sequence
 from typing import Any
 from xml.etree import ElementTree
@@ -13,9 +15,13 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import Empty
 
 from bullet_gazebo.ros import gazebo_interface
+from bullet_gazebo.ros.limited_call import CallFailed, call_limited
+from bullet_gazebo.ros.signals import Ending, init_node
 
 POLL = 0.1  # [s of wall time]
 REMIND = 10.0  # [s of wall time]
+FAREWELL = 3.0  # [s] for what has to be done during shutdown
+INTERRUPTED = -1
 INCLUDE = '<sdf version="1.6"><world name="default"><include><uri>model://{}</uri></include></world></sdf>'
 
 
@@ -27,15 +33,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Spawns one model; returns the exit code: 0, 1 if that failed, 2 for a wrong command line."""
     command_line = list(sys.argv if argv is None else argv)
     options = parse(rospy.myargv(command_line)[1:])
-    rospy.init_node("spawn_model", anonymous=True, argv=command_line)
-    try:
-        return _run(options)
-    except CannotSpawn as fault:
-        rospy.logerr("spawn_model: %s", fault)
+    # Here, because a thread that waits for standard input can't be ended.
+    piped = sys.stdin.read() if options.stdin else ""
+
+    def work() -> int:
+        init_node("spawn_model", command_line)
+        try:
+            return _run(options, piped)
+        except CannotSpawn as fault:
+            if rospy.is_shutdown():  # then every call fails
+                return INTERRUPTED
+            rospy.logerr("spawn_model: %s", fault)
+            return 1
+
+    code = Ending().run(work, interrupted=INTERRUPTED)
+    if code == INTERRUPTED:
+        print("spawn_model: interrupted before it was done", file=sys.stderr)
         return 1
-    except rospy.ROSInterruptException:
-        print("spawn_model: interrupted before the model was spawned", file=sys.stderr)
-        return 1
+    return code
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
@@ -87,11 +102,24 @@ def _position(parser: argparse.ArgumentParser, text: str) -> float:
         parser.error(f"argument -J: {text!r} is no number")
 
 
-def _run(options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace, piped: str) -> int:
     gazebo = options.gazebo_namespace.rstrip("/")
     if options.wait:
         _wait_for_model(gazebo, options.wait)
-    xml = _prepared(_read(options), options.package_to_model)
+    xml = _prepared(_read(options, piped), options.package_to_model)
+    gazebo_interface.wait_for_service(f"{gazebo}/spawn_{'urdf' if options.urdf else 'sdf'}_model")
+    with _Bond(gazebo, options.model) if options.bond else contextlib.nullcontext():
+        _spawn(options, xml, gazebo)
+    placed = _place_joints(options, gazebo)
+    if options.unpause:
+        _call(f"{gazebo}/unpause_physics", Empty)
+    if options.bond:
+        rospy.loginfo("spawn_model: '%s' stays until this node is shut down", options.model)
+        rospy.spin()
+    return 0 if placed else 1
+
+
+def _spawn(options: argparse.Namespace, xml: str, gazebo: str) -> None:
     spawn = (
         gazebo_interface.spawn_urdf_model_client
         if options.urdf
@@ -102,14 +130,34 @@ def _run(options: argparse.Namespace) -> int:
         namespace = rospy.get_namespace()
     if not spawn(options.model, xml, namespace, _pose(options), options.reference_frame, gazebo):
         raise CannotSpawn(f"'{options.model}' was not spawned")
-    placed = _place_joints(options, gazebo)
-    if options.unpause:
-        _call(f"{gazebo}/unpause_physics", Empty)
-    if options.bond:
-        rospy.on_shutdown(lambda: _delete(gazebo, options.model))
-        rospy.loginfo("spawn_model: '%s' stays until this node is shut down", options.model)
-        rospy.spin()
-    return 0 if placed else 1
+
+
+class _Bond:
+    """Deletes the model when the node is shut down, also in the middle of the spawning.
+
+    The block of its ``with`` statement is the spawning.
+    """
+
+    def __init__(self, gazebo: str, model: str) -> None:
+        self._service, self._model = f"{gazebo}/delete_model", model
+        self._spawned = False
+        self._over = threading.Event()
+        rospy.on_shutdown(self._release)
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._spawned = kind is None
+        self._over.set()
+
+    def _release(self) -> None:
+        if not self._over.wait(FAREWELL) or not self._spawned:
+            return
+        try:
+            call_limited(self._service, DeleteModel, self._model, timeout=FAREWELL)
+        except CallFailed as fault:
+            print(f"spawn_model: '{self._model}' was not deleted: {fault}", file=sys.stderr)
 
 
 def _place_joints(options: argparse.Namespace, gazebo: str) -> bool:
@@ -145,9 +193,9 @@ def _call(service: str, kind: type) -> Any:
         raise CannotSpawn(f"{service}: {fault}") from fault
 
 
-def _read(options: argparse.Namespace) -> str:
+def _read(options: argparse.Namespace, piped: str) -> str:
     if options.stdin:
-        text, origin = sys.stdin.read(), "standard input"
+        text, origin = piped, "standard input"
     elif options.file is not None:
         text, origin = _read_file(options.file), options.file
     elif options.param is not None:
@@ -201,10 +249,3 @@ def _pose(options: argparse.Namespace) -> Pose:
         w=cr * cp * cy + sr * sp * sy,
     )
     return Pose(Point(options.x, options.y, options.z), turn)
-
-
-def _delete(gazebo: str, name: str) -> None:
-    try:
-        rospy.ServiceProxy(f"{gazebo}/delete_model", DeleteModel)(name)
-    except rospy.ServiceException as fault:
-        print(f"spawn_model: '{name}' was not deleted: {fault}", file=sys.stderr)

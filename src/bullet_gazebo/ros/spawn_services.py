@@ -31,6 +31,7 @@ UNKNOWN_FORMAT = (
     "or cannot be converted to Gazebo compatible format."
 )
 TAKEN = "SpawnModel: Failure - entity already exists."
+MOST_WARNINGS = 20  # of one model
 FURTHEST = 1e6  # [m] from the origin; the engine holds some figures as 32-bit floats
 
 
@@ -91,8 +92,6 @@ class SpawnServices:
                     "reference reference_frame not found, "
                     "did you forget to scope the link by model name?"
                 )
-            if name in self._sim.world.models:
-                raise NameTaken(name)
         pose = frame[0].compose(pose)
         if not is_finite(pose) or max(map(abs, pose.position)) > FURTHEST:
             raise DescriptionError(
@@ -138,13 +137,19 @@ def entity_pose(entity: ModelDescription | Light) -> Pose:
 
 def warn(name: str, description: ModelDescription) -> None:
     """Logs what a model's file asked for in vain."""
-    for warning in description.warnings:
+    for warning in at_most(description.warnings):
         rospy.logwarn("Model '%s': %s", shown(name), warning)
     if description.left_out:
         rospy.logwarn(
             "Model '%s': not simulated here, so left out: %s",
-            shown(name), ", ".join(description.left_out),
+            shown(name), ", ".join(at_most(description.left_out)),
         )  # fmt: skip
+
+
+def at_most(texts: list[str]) -> list[str]:
+    """Returns the first of `texts`: a file may hold any number of the same fault."""
+    rest = len(texts) - MOST_WARNINGS
+    return texts if rest <= 0 else [*texts[:MOST_WARNINGS], f"and {rest} more of the kind"]
 
 
 def without_comments(text: str) -> str:

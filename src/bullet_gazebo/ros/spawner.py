@@ -5,16 +5,20 @@ It stays until it is shut down, and then stops and unloads its controllers (ros_
 """
 
 import argparse
+import functools
 import os
+import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import rosparam
 import rospy
 import yaml
 from std_msgs.msg import Bool
 
-from bullet_gazebo.ros.manager_client import STRICT, CallFailed, ManagerClient
+from bullet_gazebo.ros.limited_call import CallFailed
+from bullet_gazebo.ros.manager_client import STRICT, ManagerClient
+from bullet_gazebo.ros.signals import Ending, init_node
 
 SERVICES = ("load_controller", "switch_controller", "unload_controller")
 FAREWELL = 3.0  # [s] for each call during shutdown; the simulator may have gone before us
@@ -26,28 +30,48 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, or 1 if no controller manager was found or a file can't be read.
     """
-    options = _parse(rospy.myargv(argv)[1:])
-    rospy.init_node("spawner", anonymous=True, argv=None if argv is None else list(argv))
-    manager = ManagerClient(options.namespace)
-    try:
-        if options.wait_for:
-            _wait_for_topic(options.wait_for, options.timeout)
-        missing = manager.wait(SERVICES, options.timeout)
-        if missing:
-            rospy.logwarn(
-                "Controller Spawner couldn't find the expected controller_manager ROS interface:"
-                " no service %s",
-                missing,
-            )
+    command_line = list(sys.argv if argv is None else argv)
+    options = _parse(rospy.myargv(command_line)[1:])
+
+    def work() -> int:
+        init_node("spawner", command_line)
+        try:
+            return _work(ManagerClient(options.namespace), options)
+        except (ValueError, OSError) as fault:
+            rospy.logerr("Controller Spawner: %s", fault)
             return 1
-        names = [name for each in options.controllers for name in _names(each, options.namespace)]
-        _run(manager, names, options.stopped)
-    except (ValueError, OSError) as fault:
-        rospy.logerr("Controller Spawner: %s", fault)
+
+    return Ending().run(work, interrupted=0)
+
+
+def _work(manager: ManagerClient, options: argparse.Namespace) -> int:
+    if options.wait_for:
+        _wait_for_topic(options.wait_for, options.timeout)
+    missing = _find(manager, options.timeout)
+    if missing:
+        rospy.logwarn(
+            "Controller Spawner couldn't find the expected controller_manager ROS interface:"
+            " no service %s",
+            missing,
+        )
         return 1
-    except rospy.ROSInterruptException:
-        pass  # shut down while it waited
+    names = [name for each in options.controllers for name in _names(each, options.namespace)]
+    _Spawner(manager).run(names, options.stopped)
     return 0
+
+
+def _find(manager: ManagerClient, timeout: float | None) -> str | None:
+    """Waits for the manager; returns the service that is missing after the time limit.
+
+    While simulated time stands at zero the simulator isn't ready yet, and the wait begins anew.
+    """
+    while missing := manager.wait(SERVICES, timeout):
+        if not rospy.get_param("/use_sim_time", False) or rospy.get_rostime():
+            return missing
+        rospy.logwarn(
+            "Controller Spawner: still waiting for %s, as simulated time hasn't begun", missing
+        )
+    return None
 
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
@@ -59,7 +83,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--no-timeout", action="store_true", help="wait for ever")
     parser.add_argument("--shutdown-timeout", type=float, help="ignored")
     parser.add_argument("controllers", nargs="+", help="names, or YAML files of controllers")
-    options = parser.parse_args(arguments)
+    options = parser.parse_intermixed_args(arguments)
     if options.no_timeout or options.timeout <= 0:
         options.timeout = None
     return options
@@ -108,50 +132,78 @@ def _names(argument: str, namespace: str) -> list[str]:
     return [str(name) for parameters, _ in documents for name in parameters]
 
 
-def _run(manager: ManagerClient, names: Sequence[str], stopped: bool) -> None:
-    loaded: list[str] = []
-    # First of all: a shutdown in the middle of the loading unloads what has been loaded by then.
-    rospy.on_shutdown(lambda: _leave(manager, loaded))
-    for name in names:
-        _load(manager, name, loaded)
-    rospy.loginfo("Controller Spawner: Loaded controllers: %s", ", ".join(loaded))
-    if not stopped:
-        _start(manager, loaded)
-    rospy.spin()
+class _Spawner:
+    """Loads and starts controllers, and takes them away when the node is shut down."""
 
+    def __init__(self, manager: ManagerClient) -> None:
+        self._manager = manager
+        self._loaded: list[str] = []
+        self._leaving = False
+        self._turn = threading.Lock()  # held while the manager does something for us
 
-def _load(manager: ManagerClient, name: str, loaded: list[str]) -> None:
-    rospy.loginfo("Loading controller: %s", name)
-    try:
-        if manager.load(name):
-            loaded.append(name)
+    def run(self, names: Sequence[str], stopped: bool) -> None:
+        """Returns when the node is shut down."""
+        # First of all: a shutdown in the middle of the loading unloads what has been loaded by then.
+        rospy.on_shutdown(self._leave)
+        for name in names:
+            self._in_turn(functools.partial(self._load, name))
+        rospy.loginfo("Controller Spawner: Loaded controllers: %s", ", ".join(self._loaded))
+        if not stopped:
+            self._in_turn(self._start)
+        rospy.spin()
+
+    def _in_turn(self, action: Callable[[], None]) -> None:
+        with self._turn:
+            if self._leaving:
+                raise rospy.ROSInterruptException("shut down")
+            action()
+
+    def _load(self, name: str) -> None:
+        rospy.loginfo("Loading controller: %s", name)
+        try:
+            if self._manager.load(name):
+                self._loaded.append(name)
+            else:
+                rospy.logerr("Failed to load %s", name)
+        except CallFailed as fault:
+            rospy.logerr("Failed to load %s: %s", name, fault)
+
+    def _start(self) -> None:
+        names = ", ".join(self._loaded)
+        try:
+            if self._manager.switch(self._loaded, [], STRICT):
+                rospy.loginfo("Started controllers: %s", names)
+            else:
+                rospy.logerr("Failed to start controllers: %s", names)
+        except CallFailed as fault:
+            rospy.logerr("Failed to start controllers: %s: %s", names, fault)
+
+    def _leave(self) -> None:
+        """Stops the running ones of our controllers and unloads all, last one first."""
+        self._leaving = True
+        # A call that is under way may load one more. It isn't waited for for ever.
+        if self._turn.acquire(timeout=FAREWELL):
+            self._turn.release()
+        if not self._loaded:
+            return
+        rospy.loginfo("Shutting down spawner. Stopping and unloading controllers...")
+        try:
+            self._stop()
+            rospy.loginfo("Unloading all loaded controllers...")
+            for name in reversed(self._loaded):
+                self._unload(name)
+        except CallFailed as fault:
+            rospy.logwarn("Controller Spawner error while taking down controllers: %s", fault)
+
+    def _stop(self) -> None:
+        rospy.loginfo("Stopping all controllers...")
+        # Somebody else may have stopped one: asking to stop that too would leave the others on.
+        running = [name for name in self._manager.running(FAREWELL) if name in self._loaded]
+        self._manager.switch([], running, STRICT, FAREWELL)
+
+    def _unload(self, name: str) -> None:
+        rospy.loginfo("Trying to unload %s", name)
+        if self._manager.unload(name, FAREWELL):
+            rospy.loginfo("Succeeded in unloading %s", name)
         else:
-            rospy.logerr("Failed to load %s", name)
-    except CallFailed as fault:
-        rospy.logerr("Failed to load %s: %s", name, fault)
-
-
-def _start(manager: ManagerClient, loaded: Sequence[str]) -> None:
-    try:
-        if manager.switch(loaded, [], STRICT):
-            rospy.loginfo("Started controllers: %s", ", ".join(loaded))
-        else:
-            rospy.logerr("Failed to start controllers: %s", ", ".join(loaded))
-    except CallFailed as fault:
-        rospy.logerr("Failed to start controllers: %s: %s", ", ".join(loaded), fault)
-
-
-def _leave(manager: ManagerClient, loaded: Sequence[str]) -> None:
-    """Stops the running ones of our controllers and unloads all, last one first."""
-    if not loaded:
-        return
-    rospy.loginfo("Shutting down spawner. Stopping and unloading controllers...")
-    try:
-        # Somebody else may have stopped one: asking to stop that too would leave all the others on.
-        running = [name for name in manager.running(FAREWELL) if name in loaded]
-        manager.switch([], running, STRICT, FAREWELL)
-        for name in reversed(loaded):
-            manager.unload(name, FAREWELL)
-            rospy.loginfo("Unloaded %s", name)
-    except CallFailed as fault:
-        rospy.loginfo("Controller Spawner: left as they are: %s", fault)
+            rospy.logerr("Failed to unload %s", name)

@@ -66,7 +66,11 @@ class ClockTopic:
         self._sender = threading.Thread(target=self._send_newest, name="clock", daemon=True)
         self._sender.start()
         rospy.on_shutdown(self._stop)
-        _stop_listening_to_clock()
+        # With use_sim_time:=false this node, like all others, goes by the wall clock.
+        self._sets_own_time = bool(rospy.get_param("/use_sim_time", True))
+        if self._sets_own_time:
+            _stop_listening_to_clock()
+            rospy.rostime._set_rostime(to_time(sim.now))
 
     def __call__(self, now: int) -> None:
         if self._period and 0 <= now - self._last < self._period:  # negative after a reset: publish
@@ -96,7 +100,8 @@ class ClockTopic:
 
     def _publish(self, now: int) -> None:
         time = to_time(now)
-        rospy.rostime._set_rostime(time)
+        if self._sets_own_time:
+            rospy.rostime._set_rostime(time)
         self._publisher.publish(Clock(time))
 
 

@@ -5,12 +5,15 @@ stopped when it is shut down (ros_control.md section 2).
 """
 
 import argparse
+import sys
 import threading
 from collections.abc import Sequence
 
 import rospy
 
-from bullet_gazebo.ros.manager_client import BEST_EFFORT, CallFailed, ManagerClient
+from bullet_gazebo.ros.limited_call import CallFailed
+from bullet_gazebo.ros.manager_client import BEST_EFFORT, ManagerClient
+from bullet_gazebo.ros.signals import Ending, init_node
 
 PERIOD = 3.0  # [s], wall-clock: a simulated time that jumps back must not silence it
 PATIENCE = 30.0  # [s] for the services to come up
@@ -26,34 +29,45 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(prog="unspawner", description="Keep controllers stopped")
     parser.add_argument("controllers", nargs="+", help="their names")
-    controllers = parser.parse_args(rospy.myargv(argv)[1:]).controllers
-    rospy.init_node("unspawner", anonymous=True, argv=None if argv is None else list(argv))
-    manager = ManagerClient()
-    try:
+    command_line = list(sys.argv if argv is None else argv)
+    controllers = parser.parse_args(rospy.myargv(command_line)[1:]).controllers
+
+    def work() -> int:
+        init_node("unspawner", command_line)
+        manager = ManagerClient(user="Unspawner")
         missing = manager.wait(("switch_controller", "list_controllers"), PATIENCE)
-    except rospy.ROSInterruptException:
+        if missing:
+            rospy.logwarn("Unspawner couldn't find the controller manager: no service %s", missing)
+            return 1
+        _inhibit(manager, controllers)
         return 0
-    if missing:
-        rospy.logwarn("Unspawner couldn't find the controller manager: no service %s", missing)
-        return 1
-    _inhibit(manager, controllers)
-    return 0
+
+    return Ending().run(work, interrupted=0)
 
 
 def _inhibit(manager: ManagerClient, controllers: Sequence[str]) -> None:
     stopped: list[str] = []
     leaving = threading.Event()
+    turn = threading.Lock()  # held while the manager does something for us
 
     def leave() -> None:
         leaving.set()
+        # A call that is under way may stop one more. It isn't waited for for ever.
+        if turn.acquire(timeout=FAREWELL):
+            turn.release()
         _release(manager, stopped)
 
     rospy.on_shutdown(leave)
-    while not leaving.is_set():
-        for name in _stop_running(manager, controllers):
-            if name not in stopped:
-                stopped.append(name)
+    while True:
+        with turn:
+            if leaving.is_set():
+                break
+            for name in _stop_running(manager, controllers):
+                if name not in stopped:
+                    stopped.append(name)
         leaving.wait(PERIOD)
+    # A shutdown that `rosnode kill` asks for runs leave() beside us: the process must outlive it.
+    rospy.spin()
 
 
 def _stop_running(manager: ManagerClient, controllers: Sequence[str]) -> list[str]:

@@ -8,7 +8,7 @@ from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.world_file import WorldDescription, empty_world, load_world
 from bullet_gazebo.ros.plugins import PluginRegistry
 from bullet_gazebo.ros.resource_paths import find_world, resources
-from bullet_gazebo.ros.spawn_services import warn
+from bullet_gazebo.ros.spawn_services import at_most, warn
 from bullet_gazebo.simulator import Simulator
 
 
@@ -25,10 +25,12 @@ def read_world(name: str) -> WorldDescription:
     except DescriptionError as error:
         rospy.logerr("%s. The world is empty but for a ground plane", error)
         return empty_world()
-    for warning in world.warnings:
+    for warning in at_most(world.warnings):
         rospy.logwarn("World '%s': %s", path, warning)
     if world.left_out:
-        rospy.logwarn("World '%s': not simulated here: %s", path, ", ".join(world.left_out))
+        rospy.logwarn(
+            "World '%s': not simulated here: %s", path, ", ".join(at_most(world.left_out))
+        )
     return world
 
 

@@ -1,0 +1,66 @@
+"""How the links of a body touch in PyBullet: friction, and which links of a body meet each other."""
+
+from collections.abc import Mapping
+from itertools import combinations
+
+import pybullet
+
+from bullet_gazebo.physics.description import DescriptionError, ModelDescription, Shape
+
+
+def set_friction(
+    client: int, body: int, links: Mapping[str, int], description: ModelDescription
+) -> None:
+    """Hands friction to the engine, which has one figure for a link (engine_form.py)."""
+    for name, link in description.links.items():
+        if name in links and link.collisions:
+            friction = _friction(link.collisions[0], description.static)
+            pybullet.changeDynamics(
+                body, links[name], lateralFriction=friction, physicsClientId=client
+            )
+
+
+def choose_self_collisions(
+    client: int, body: int, links: Mapping[str, int], description: ModelDescription
+) -> None:
+    """Lets two links of the model meet if either of them wants it, and no joint connects them (SDF's rule).
+
+    The engine, asked for self-collision at all, lets all of them meet but parent and child.
+    """
+    if not collides_with_itself(description):
+        return
+    joined = {frozenset((joint.parent, joint.child)) for joint in description.joints.values()}
+    solid = [link for name, link in description.links.items() if name in links and link.collisions]
+    for a, b in combinations(solid, 2):
+        owners = frozenset(link.part_of or link.name for link in (a, b))
+        meet = (a.self_collide or b.self_collide) and len(owners) == 2 and owners not in joined
+        pybullet.setCollisionFilterPair(
+            body, body, links[a.name], links[b.name], int(meet), physicsClientId=client
+        )
+
+
+def collides_with_itself(description: ModelDescription) -> bool:
+    """Returns whether any two links of the model could meet."""
+    return any(link.self_collide for link in description.links.values())
+
+
+def check_meshes(
+    client: int, body: int, links: Mapping[str, int], description: ModelDescription
+) -> None:
+    """Errors: DescriptionError for a link whose meshes the engine has made nothing of, without a word."""
+    for name, link in description.links.items():
+        meshes = [shape.mesh for shape in link.collisions if shape.mesh]
+        if name not in links or not meshes or len(meshes) < len(link.collisions):
+            continue
+        if not pybullet.getCollisionShapeData(body, links[name], client):
+            raise DescriptionError(
+                f"link '{name}': the physics engine finds nothing to touch in mesh '{meshes[0]}'"
+            )
+
+
+def _friction(shape: Shape, static: bool) -> float:
+    """PyBullet multiplies the coefficients of two bodies where ODE takes the smaller one.
+
+    What stands still counts as 1 at most, so that a box on a ground of 100 keeps its own coefficient.
+    """
+    return min(shape.mu, 1.0) if static else shape.mu

@@ -1,0 +1,125 @@
+#!/usr/bin/env python3
+"""Services that tell, change and place joints, and the resets: over real ROS."""
+
+import threading
+
+import rospy
+import rostest
+from gazebo_msgs.msg import LinkState, LinkStates, ModelState, ODEJointProperties
+from gazebo_world import BOUND, BOX, INF, NAN, GazeboTest, call, now, run, wait_until
+from geometry_msgs.msg import Point, Pose, Twist, Vector3
+from rosgraph_msgs.msg import Clock
+
+
+class JointsTest(GazeboTest):
+    def test_set_joint_properties(self):
+        text = "SetJointProperties: properties set"
+        stops = ODEJointProperties(loStop=[-0.1], hiStop=[0.1, 7.0], erp=[0.3], fudge_factor=[1.0])
+        self.succeeds(text, "set_joint_properties", "cartpole::stand_cart", stops)
+        call("set_model_configuration", "cartpole", "", ["stand_cart"], [0.4])
+        self.assertEqual(self.joint("stand_cart")[0], 0.1)
+        self.succeeds(
+            text, "set_joint_properties", "cart_pole", ODEJointProperties(damping=[100.0])
+        )
+        call("set_model_configuration", "cartpole", "", ["cart_pole"], [0.3])
+        run(0.1)
+        self.assertLess(abs(self.joint("cart_pole")[1]), 0.5)
+        self.succeeds(text, "set_joint_properties", "grounding", ODEJointProperties(damping=[1.0]))
+        found = call("get_joint_properties", "cart_pole")
+        self.assertEqual((found.type, list(found.damping)), (0, []))
+
+    def test_set_joint_properties_failures(self):
+        text = "SetJointProperties: joint not found"
+        for name in ("elbow", "", "cart"):
+            self.fails(text, "set_joint_properties", name, ODEJointProperties())
+        for config in (ODEJointProperties(damping=[NAN]), ODEJointProperties(hiStop=[0.1, INF]),
+                       ODEJointProperties(damping=[-1.0]), ODEJointProperties(fmax=[-1.0])):  # fmt: skip
+            self.refuses("SetJointProperties: .*(damping|hiStop|fmax)",
+                         "set_joint_properties", "cart_pole", config)  # fmt: skip
+
+    def test_a_fixed_joint_stands_at_zero(self):
+        self.assertEqual(self.joint("cartpole::grounding"), (0.0, 0.0))
+
+    # set_model_configuration
+
+    def test_configuration_takes_scoped_names_and_the_last_of_two(self):
+        self.succeeds("SetModelConfiguration: success", "set_model_configuration", "cartpole", "",
+                      ["cartpole::stand_cart", "cart_pole", "cart_pole"], [0.3, 0.1, 0.2])  # fmt: skip
+        self.assertEqual((self.joint("stand_cart")[0], self.joint("cart_pole")[0]), (0.3, 0.2))
+
+    def test_configuration_stops_what_the_joint_carries_and_nothing_else(self):
+        twist = Twist(Vector3(0.5, 0, 0), Vector3(0, 1.0, 0))
+        call("set_link_state", LinkState("pole", Pose(position=Point(0, 0, 0.18)), twist, ""))
+        self.assertNotEqual(self.joint("cart_pole")[1], 0.0)
+        call("set_model_configuration", "cartpole", "", ["cart_pole"], [0.1])
+        self.close([(self.joint("cart_pole")[1], 0.0), (self.joint("stand_cart")[1], 0.5)])
+        call("set_model_configuration", "cartpole", "", ["stand_cart"], [0.1])
+        self.close([(self.joint("stand_cart")[1], 0.0)])
+
+    def test_services_that_place_leave_a_running_world_running(self):
+        call("unpause_physics")
+        call("set_model_configuration", "cartpole", "", ["cart_pole"], [0.1])
+        call("set_model_state", ModelState(model_name="box"))
+        call("reset_world")
+        call("reset_simulation")
+        before = now()
+        self.assertTrue(wait_until(lambda: now() > before))
+
+    # resets
+
+    def moved(self):
+        call("set_model_state", ModelState("box", Pose(position=Point(7, 7, 7)), Twist(), ""))
+        call("set_model_configuration", "cartpole", "", ["cart_pole"], [0.4])
+        run(0.05)
+
+    def check_reset(self):
+        """The box is where it was spawned, at rest; everything spawned is there, and still paused."""
+        found = self.box()
+        self.assertEqual(found.pose.position, Point(3.0, 0.0, 20.0))
+        self.assertEqual(found.twist, Twist())
+        names = call("get_world_properties").model_names
+        self.assertEqual(names, ["ground_plane", "cartpole", "box"])
+        self.assertTrue(call("get_physics_properties").pause)
+
+    def test_reset_world(self):
+        self.add("short-lived", BOX, (9.0, 0.0, 20.0))
+        call("delete_model", "short-lived")
+        self.moved()
+        time, (angle, rate) = now(), self.joint("cart_pole")
+        self.assertNotEqual(rate, 0.0)
+        call("reset_world")
+        self.check_reset()
+        self.assertEqual((now(), self.joint("cart_pole")), (time, (angle, 0.0)))
+
+    def test_reset_simulation(self):
+        self.moved()
+        call("reset_simulation")
+        self.check_reset()
+        self.assertEqual((now(), self.joint("cart_pole")), (0.0, (0.0, 0.0)))
+
+    def test_states_are_those_before_the_step_and_the_clock_is_after_it(self):
+        call("reset_simulation")
+        first, seen = {}, threading.Event()
+
+        def keep(message):
+            if first.setdefault(type(message), message) is message and len(first) == 2:
+                seen.set()
+
+        topics = [rospy.Subscriber("/clock", Clock, keep),
+                  rospy.Subscriber("/gazebo/link_states", LinkStates, keep)]  # fmt: skip
+        self.assertTrue(wait_until(lambda: all(topic.get_num_connections() for topic in topics)))
+        call("unpause_physics")
+        self.assertTrue(seen.wait(BOUND))
+        call("pause_physics")
+        for topic in topics:
+            topic.unregister()
+        self.assertEqual(first[Clock].clock.to_nsec(), 1_000_000)
+        states = first[LinkStates]
+        self.assertEqual(len(states.name), len(states.pose))
+        box = states.name.index("box::body")
+        self.assertEqual((states.pose[box].position.z, states.twist[box].linear.z), (20.0, 0.0))
+
+
+if __name__ == "__main__":
+    rospy.init_node("gazebo_joints_test")
+    rostest.rosrun("cartpole", "gazebo_joints", JointsTest)

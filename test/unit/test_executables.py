@@ -1,0 +1,71 @@
+"""The executables that launch files start, where there is no master to talk to."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+
+import pytest
+
+BOUND = 15.0  # [s]
+MAIN = "import sys; from bullet_gazebo.ros.{0} import main; sys.exit(main())"
+PROGRAMS = {  # name: arguments, exit code after Ctrl-C
+    "spawner": (["a_controller"], 0),
+    "unspawner": (["a_controller"], 0),
+    "spawn_model": (["-urdf", "-file", "/dev/null", "-model", "m", "-b"], 1),
+    "gzclient": ([], 0),
+    "gazebo": ([], 130),
+}
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Starts a program whose master is at a port; ends it at the end."""
+    programs = []
+
+    def start(name, port):
+        arguments, _ = PROGRAMS[name]
+        environment = os.environ | {
+            "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
+            "ROS_HOME": str(tmp_path),
+            "ROS_LOG_DIR": str(tmp_path),
+        }
+        program = subprocess.Popen(
+            [sys.executable, "-c", MAIN.format(name), *arguments], env=environment,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        )  # fmt: skip
+        programs.append(program)
+        return program
+
+    yield start
+    for program in programs:
+        program.kill()
+        program.communicate()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_signal_in_the_middle_of_a_registration_ends_it(start, name, number):
+    with socket.create_server(("127.0.0.1", 0)) as mute_master:
+        mute_master.settimeout(BOUND)
+        program = start(name, mute_master.getsockname()[1])
+        with mute_master.accept()[0]:
+            program.send_signal(number)
+            output, _ = program.communicate(timeout=BOUND)
+    assert program.returncode == PROGRAMS[name][1]
+    assert "Traceback" not in output
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_without_a_master_it_says_so_until_it_is_interrupted(start, name):
+    with socket.socket() as reserved:  # bound, and nobody listens: connections are refused
+        reserved.bind(("127.0.0.1", 0))
+        program = start(name, reserved.getsockname()[1])
+        for line in program.stdout:
+            if "no ROS master at" in line:
+                break
+        program.send_signal(signal.SIGINT)
+        output, _ = program.communicate(timeout=BOUND)
+    assert program.returncode == PROGRAMS[name][1]
+    assert "Traceback" not in output
