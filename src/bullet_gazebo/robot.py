@@ -7,15 +7,33 @@ from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.physics.model import Model
 
+NANOSECONDS = 1_000_000_000
+STRONGEST = 1e9  # [N m, N]; of a motor without a limit: the engine's solver wants a number
+
 
 class Robot:
-    """Reads joint states into handles and writes their commands as efforts, in place, once a tick."""
+    """Reads joint states into handles and writes what controllers command, in place, once a tick."""
 
-    def __init__(self, model: Model, hardware: RobotHardware, manager: ControllerManager) -> None:
-        """Errors: ControlError if the model lacks a joint that a transmission names."""
+    def __init__(
+        self,
+        model: Model,
+        hardware: RobotHardware,
+        manager: ControllerManager,
+        control_period: float = 0.0,
+        namespace: str = "/",
+    ) -> None:
+        """Controllers are updated every `control_period` [s], or with each step if that is longer.
+
+        `namespace` is the manager's, for those who look a controller up by its full name.
+
+        Errors: ControlError if the model lacks a joint that a transmission names.
+        """
         self.model = model
         self.hardware = hardware
         self.manager = manager
+        self.namespace = namespace
+        self._control_period = round(control_period * NANOSECONDS)
+        self._waited: int | None = None  # [ns] since the last control tick; None: the next step is one
         indices = {name: index for index, name in enumerate(model.joint_names)}
         missing = sorted(set(hardware.joints) - set(indices))
         if missing:
@@ -23,8 +41,11 @@ class Robot:
                 f"model '{model.name}' has no joint {missing}, which a transmission names"
             )
         self._joints = [(joint, indices[name]) for name, joint in hardware.joints.items()]
+        self._effort_joints = [(joint, indices[joint.name]) for joint in hardware.effort_joints]
+        self._drives = [(drive, indices[drive.joint.name]) for drive in hardware.drives]
         self._efforts = [0.0] * len(indices)
         self.read()
+        hardware.relatch()
 
     def read(self) -> None:
         """Copies positions and velocities from the engine."""
@@ -34,21 +55,61 @@ class Robot:
             joint.position = state[0]
             joint.velocity = state[1]
 
-    def write(self) -> None:
-        """Clips the commands to the joints' limits and applies them for the next step."""
-        self.hardware.enforce_limits()
+    def update(self, now: int, dt: float) -> None:
+        """Reads, and updates the controllers if it is their turn; `now` [ns], `dt` [s] is the step."""
+        self.read()
+        if self._control_period:
+            self._update_in_time(now, round(dt * NANOSECONDS))
+        else:
+            self.manager.update(now, dt)
+
+    def _update_in_time(self, now: int, step: int) -> None:
+        """The control period is a whole number of steps, and always the nominal one."""
+        period = max(1, math.ceil(self._control_period / step)) * step
+        self._waited = period if self._waited is None else self._waited + step
+        if self._waited >= period:
+            self._waited = 0
+            self.manager.update(now, period / NANOSECONDS)
+
+    def write(self, dt: float) -> None:
+        """Clips the commands to the joints' limits and applies them for the next step of `dt` [s]."""
+        hardware = self.hardware
+        hardware.enforce_limits(dt)
         efforts = self._efforts
-        for joint, index in self._joints:
+        for joint, index in self._effort_joints:
             # A controller may command NaN; the engine would carry it into every state of the world.
             effort = joint.command if math.isfinite(joint.command) else 0.0
             joint.effort = effort
             efforts[index] = effort
+        if hardware.halted:
+            for joint, index in self._effort_joints:
+                joint.effort = efforts[index] = 0.0
+        if self._drives:
+            self._drive(dt)
         self.model.body.apply_efforts(efforts)
+
+    def _drive(self, dt: float) -> None:
+        """Moves the joints with position and velocity interfaces."""
+        for drive, index in self._drives:
+            if drive.pid is not None:
+                drive.joint.effort = self._efforts[index] = drive.effort(dt)
+            else:
+                speed, most = drive.motor(dt)
+                self.model.body.set_motor(index, speed, min(most, STRONGEST))
 
     def joints_moved(self, now: int, relatch: bool) -> None:
         """Takes over a state that something other than time has changed."""
         self.read()
+        self._waited = None
         if relatch:
             for joint, _ in self._joints:
                 joint.effort = 0.0
         self.manager.joints_moved(now, relatch)
+
+    def emergency_stop(self, on: bool) -> None:
+        """Lets go of all joints, positions held, until it is taken back; then controllers begin anew."""
+        if on:
+            self.hardware.halt()
+        elif self.hardware.halted:
+            self.hardware.resume()
+            self.manager.restart()

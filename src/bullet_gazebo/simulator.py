@@ -154,6 +154,18 @@ class Simulator:
         model.set_joint_positions(positions)
         self._joints_moved(model)
 
+    def set_joint_states(
+        self, model: Model, positions: Mapping[str, float], velocities: Mapping[str, float]
+    ) -> None:
+        """Puts joints of `model` at `positions` [rad, m], moving at `velocities` [rad/s, m/s], for the begin
+        of an episode; the caller holds the lock.
+
+        What the joints carry rests, but for those that `velocities` names.
+        """
+        model.set_joint_positions(positions)
+        model.set_joint_velocities(velocities)
+        self._joints_moved(model)
+
     def place_model(self, model: Model, pose: Pose, twist: Twist) -> None:
         """Moves `model` rigidly, its joints at rest as in Gazebo; the caller holds the lock."""
         before = model.joint_states()
@@ -182,13 +194,12 @@ class Simulator:
     def reset_world(self) -> None:
         """Returns models to their initial poses, at rest; time and joint positions stay."""
         with self.lock:
-            self._reset(joints=False)
+            self.reset(everything=False)
 
     def reset_simulation(self) -> None:
         """As reset_world, and time and joint positions return to zero."""
         with self.lock:
-            self.now = 0
-            self._reset(joints=True)
+            self.reset(everything=True)
 
     def reset_time(self) -> None:
         """Sets the time to zero; models and controllers go on from where they are."""
@@ -202,8 +213,11 @@ class Simulator:
             if robot.model is model:
                 robot.joints_moved(self.now, self.relatch)
 
-    def _reset(self, joints: bool) -> None:
-        self.world.reset(joints)
+    def reset(self, everything: bool) -> None:
+        """Resets the world, or the simulation with `everything`; the caller holds the lock."""
+        if everything:
+            self.now = 0
+        self.world.reset(joints=everything)
         for robot in self.robots:
             robot.joints_moved(self.now, self.relatch)
 
@@ -221,10 +235,9 @@ class Simulator:
         if jobs.efforts or jobs.wrenches:
             jobs.apply(now)
         for robot in self.robots:
-            robot.read()
-            robot.manager.update(now, dt)
+            robot.update(now, dt)
         for listener in self.listeners:
             listener(now)
         for robot in self.robots:
-            robot.write()
+            robot.write(dt)
         self.world.step()

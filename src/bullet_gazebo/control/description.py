@@ -11,6 +11,12 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
 
 PREFIX = "hardware_interface/"
+OVERRIDES = {  # what: field of the limits, and its parameter
+    "position": {"lower": "min_position", "upper": "max_position"},
+    "velocity": {"velocity": "max_velocity"},
+    "acceleration": {"acceleration": "max_acceleration"},
+    "effort": {"effort": "max_effort"},
+}
 INTERFACES = ("EffortJointInterface", "PositionJointInterface", "VelocityJointInterface")
 
 
@@ -33,13 +39,14 @@ class RobotDescription:
     def limited_by(self, params: object) -> "RobotDescription":
         """Returns the description with limits overridden from the tree `<ns>/joint_limits`."""
         tree = params if isinstance(params, Mapping) else {}
-        joints = {
-            name: JointHandle(
-                name, joint.kind, _overridden(joint.limits, tree.get(name), joint.kind)
-            )
-            for name, joint in self.joints.items()
-        }
-        return replace(self, joints=joints)
+        warnings = list(self.warnings)
+        joints = {}
+        for name, joint in self.joints.items():
+            limits = joint.limits
+            if isinstance(tree.get(name), Mapping):
+                limits = _overridden(joint, tree[name], warnings)
+            joints[name] = JointHandle(name, joint.kind, limits)
+        return replace(self, joints=joints, warnings=warnings)
 
 
 def read_description(text: str) -> RobotDescription:
@@ -136,25 +143,31 @@ def _text(element: Element) -> str:
     return (element.text or "").strip()
 
 
-def _overridden(limits: JointLimits, params: object, kind: str) -> JointLimits:
+def _overridden(joint: JointHandle, params: Mapping, warnings: list[str]) -> JointLimits:
     """`has_X_limits` switches X on (with its values) or off; what isn't named stays as in the URDF."""
-    if not isinstance(params, Mapping):
-        return limits
-    if kind in ("revolute", "prismatic"):
-        limits = _override(
-            limits, params, "position", {"lower": "min_position", "upper": "max_position"}
-        )
-    limits = _override(limits, params, "velocity", {"velocity": "max_velocity"})
-    return _override(limits, params, "effort", {"effort": "max_effort"})
-
-
-def _override(
-    limits: JointLimits, params: Mapping, what: str, fields: dict[str, str]
-) -> JointLimits:
-    switch = params.get(f"has_{what}_limits")
-    if switch is False:
-        return replace(limits, **dict.fromkeys(fields))
-    if switch and all(isinstance(params.get(key), (int, float)) for key in fields.values()):
-        values: dict[str, Any] = {field: float(params[key]) for field, key in fields.items()}
-        return replace(limits, **values)
+    limits = joint.limits
+    for what, fields in OVERRIDES.items():
+        if what == "position" and joint.kind not in ("revolute", "prismatic"):
+            continue
+        switch = params.get(f"has_{what}_limits")
+        wraps = what == "position" and params.get("angle_wraparound") is True
+        if switch is False or wraps:
+            limits = replace(limits, **dict.fromkeys(fields))
+        elif switch is True:
+            wrong = [key for key in fields.values() if not is_number(params.get(key))]
+            if wrong:
+                warnings.append(
+                    f"joint_limits/{joint.name}: has_{what}_limits is set, but {', '.join(wrong)} is "
+                    "missing or no number; it is ignored."
+                )
+                continue
+            values: dict[str, Any] = {field: float(params[key]) for field, key in fields.items()}
+            limits = replace(limits, **values)
     return limits
+
+
+def is_number(value: object) -> bool:
+    """Returns whether a parameter is a finite number; a bool is none."""
+    return (
+        isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    )

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field
 
+from bullet_gazebo.control.angles import shortest_distance, shortest_distance_within
+
 
 @dataclass(frozen=True)
 class SoftLimits:
@@ -15,21 +17,23 @@ class SoftLimits:
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Limits of a joint; None where there is none. [rad, m], [rad/s, m/s], [N m, N]."""
+    """Limits of a joint; None where there is none. [rad, m] and their derivatives, [N m, N]."""
 
     lower: float | None = None
     upper: float | None = None
     velocity: float | None = None
     effort: float | None = None
     soft: SoftLimits | None = None
+    acceleration: float | None = None
 
 
 @dataclass(slots=True)
 class JointHandle:
     """One joint of the robot's hardware. `kind` is revolute, continuous or prismatic.
 
-    `effort` is the effort [N m, N] applied in the last step; `command` is kept until it is replaced,
-    also when its controller stops (ros_control.md section 1.6).
+    `command` is a position, a velocity or an effort, as the joint's hardware interface has it. It is
+    kept until it is replaced, also when its controller stops (ros_control.md section 1.6).
+    `effort` is the effort [N m, N] applied in the last step.
     """
 
     name: str
@@ -48,3 +52,15 @@ class JointHandle:
         if position < limits.lower:
             return limits.lower
         return min(position, limits.upper)
+
+    def way_to(self, position: float) -> float:
+        """Returns the way from here to `position` [rad, m] (ros_control.md section 3.2).
+
+        For an angle it is the shortest turn, within the limits of a revolute joint.
+        """
+        if self.kind == "prismatic":
+            return position - self.position
+        limits = self.limits
+        if self.kind == "revolute" and limits.lower is not None and limits.upper is not None:
+            return shortest_distance_within(self.position, position, limits.lower, limits.upper)
+        return shortest_distance(self.position, position)

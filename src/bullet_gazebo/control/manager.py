@@ -1,6 +1,6 @@
 """The controller manager: loads, switches and updates controllers (ros_control.md section 1)."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from bullet_gazebo.control.controllers import BUILT_IN
@@ -32,7 +32,8 @@ class Listed(NamedTuple):
 class ControllerManager:
     """Controllers of one robot, in load order. Not thread-safe: called between two ticks only.
 
-    A refused request raises ControlError with the reason and changes nothing.
+    A refused request raises ControlError with the reason and changes nothing. A controller that
+    raises anything else is stopped and told to `on_fault`; the others go on.
     """
 
     def __init__(self, hardware: RobotHardware) -> None:
@@ -41,12 +42,21 @@ class ControllerManager:
         self._controllers: dict[str, Controller] = {}
         self._running: list[Controller] = []
         self._now = 0
+        self.on_fault: Callable[[Controller, Exception], None] = _ignore
 
     def update(self, now: int, dt: float) -> None:
         """Updates the running controllers; `now` [ns], `dt` [s]."""
         self._now = now
         for controller in self._running:
-            controller.update(now, dt)
+            try:
+                controller.update(now, dt)
+            except Exception as error:  # noqa: BLE001 - a user's code must not stop the world
+                self._fail(controller, error)
+
+    @property
+    def loaded(self) -> list[Controller]:
+        """The loaded controllers, in load order."""
+        return list(self._controllers.values())
 
     def get(self, name: str) -> Controller:
         """Returns controller `name`; ControlError if it isn't loaded."""
@@ -73,8 +83,9 @@ class ControllerManager:
             )
         try:
             controller = self.types[kind].create(name, params, self.hardware)
-        except ControlError as error:
-            raise ControlError(f"Initializing controller '{name}' failed: {error}") from error
+        except Exception as error:
+            reason = error if isinstance(error, ControlError) else repr(error)
+            raise ControlError(f"Initializing controller '{name}' failed: {reason}") from error
         self._controllers[name] = controller
         return controller
 
@@ -102,12 +113,16 @@ class ControllerManager:
         kept = [c for c in self._running if c not in stopping and c not in starting]
         _check_conflicts(kept + starting)
         for controller in stopping:
-            controller.stopping()
-            controller.state = STOPPED
-        for controller in starting:
-            controller.starting(self._now)
-            controller.state = RUNNING
+            self._stop(controller)
+        failed = [c.name for c in starting if not self._start(c)]
         self._running = [c for c in self._controllers.values() if c.state == RUNNING]
+        if failed:
+            raise ControlError(f"Could not start {failed}: see the error above.")
+
+    def restart(self) -> None:
+        """Stops and starts whatever runs, as the end of an emergency stop does."""
+        names = [c.name for c in self._running]
+        self.switch(names, names)
 
     def listed(self) -> list[Listed]:
         """Returns the loaded controllers in load order."""
@@ -118,7 +133,7 @@ class ControllerManager:
                 c.type_name,
                 (Claim(f"hardware_interface::{c.interface}", c.claimed),),
             )
-            for c in self._controllers.values()
+            for c in self.loaded
         ]
 
     def unload_all(self) -> list[Controller]:
@@ -135,11 +150,39 @@ class ControllerManager:
         """
         self._now = now
         if relatch:
-            self.hardware.clear_commands()
+            self.hardware.relatch()
             for controller in self._running:
-                controller.starting(now)
+                self._start(controller)
+        self._running = [c for c in self._controllers.values() if c.state == RUNNING]
         for controller in self._running:
-            controller.joints_moved(now)
+            try:
+                controller.joints_moved(now)
+            except Exception as error:  # noqa: BLE001 - a user's code must not stop the world
+                self._fail(controller, error)
+
+    def _start(self, controller: Controller) -> bool:
+        try:
+            controller.starting(self._now)
+        except Exception as error:  # noqa: BLE001 - a user's code must not stop the world
+            self._fail(controller, error)
+            return False
+        controller.state = RUNNING
+        return True
+
+    def _stop(self, controller: Controller) -> None:
+        controller.state = STOPPED
+        try:
+            controller.stopping()
+        except Exception as error:  # noqa: BLE001 - a user's code must not stop the world
+            self._fail(controller, error)
+
+    def _fail(self, controller: Controller, error: Exception) -> None:
+        """Stops a controller that raised, and lets go of its joints."""
+        controller.state = STOPPED
+        # A new list: the old one may be in use by the update that is going on.
+        self._running = [c for c in self._running if c is not controller]
+        self.hardware.relatch(controller.claimed)
+        self.on_fault(controller, error)
 
     def _known(self, names: Iterable[str], strict: bool) -> list[Controller]:
         found: dict[str, Controller] = {}
@@ -149,6 +192,10 @@ class ControllerManager:
             elif strict:
                 raise ControlError(f"Could not switch: no controller named '{name}' is loaded.")
         return list(found.values())
+
+
+def _ignore(controller: Controller, error: Exception) -> None:
+    """For a manager that nobody listens to."""
 
 
 def _check_strict(starting: list[Controller], stopping: list[Controller]) -> None:

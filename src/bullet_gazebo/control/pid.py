@@ -1,10 +1,11 @@
 """The PID of control_toolbox, to the letter of ros_control.md section 4."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.samples import PidSample
 
 
 @dataclass(frozen=True)
@@ -45,22 +46,27 @@ def _number(params: Mapping, key: str, default: float, place: str) -> float:
 
 
 class Pid:
-    """Gains and the state that they act on. One instance a controlled joint."""
+    """Gains and the state that they act on. One instance a controlled joint.
 
-    __slots__ = ("_gains", "d_error", "i_error", "last_error", "output", "p_error", "seeded")
+    With `publish_state` each computation is reported to `sink`, once somebody has set it.
+    """
 
-    def __init__(self, gains: Gains) -> None:
-        self._gains = gains
+    __slots__ = ("d_error", "gains", "i_error", "last_error", "output", "p_error", "publish_state",
+                 "seeded", "sink")  # fmt: skip
+
+    def __init__(self, gains: Gains, publish_state: bool = False) -> None:
+        self.gains = gains
+        self.publish_state = publish_state
+        self.sink: Callable[[PidSample], None] | None = None
         self.clear()
         self.seeded = False
 
-    @property
-    def gains(self) -> Gains:
-        return self._gains
-
-    @gains.setter
-    def gains(self, gains: Gains) -> None:
-        self._gains = gains
+    @classmethod
+    def from_params(cls, params: object, place: str) -> "Pid":
+        """Makes a PID from a parameter tree; errors as Gains.from_params."""
+        gains = Gains.from_params(params, place)
+        assert isinstance(params, Mapping)
+        return cls(gains, params.get("publish_state", False) is True)
 
     def clear(self) -> None:
         """Forgets the past. The last error counts as a known 0, so the next step has a derivative."""
@@ -87,7 +93,7 @@ class Pid:
         return self._respond(error, rate, dt)
 
     def _respond(self, error: float, rate: float, dt: float) -> float:
-        gains = self._gains
+        gains = self.gains
         self.p_error = error
         self.d_error = rate
         self.i_error += dt * error
@@ -98,4 +104,13 @@ class Pid:
         if not gains.antiwindup:
             i_term = max(gains.i_min, min(gains.i_max, i_term))
         self.output = gains.p * error + i_term + gains.d * rate
+        if self.sink is not None:
+            self.sink(self._sample(i_term, dt))
         return self.output
+
+    def _sample(self, i_term: float, dt: float) -> PidSample:
+        gains = self.gains
+        return PidSample(
+            dt, self.p_error, self.d_error, self.p_error, self.i_error, self.d_error,
+            gains.p * self.p_error, i_term, gains.d * self.d_error, gains.i_max, gains.i_min, self.output,
+        )  # fmt: skip

@@ -28,3 +28,20 @@ class JointControllerSample(NamedTuple):
     d: float
     i_clamp: float
     antiwindup: bool
+
+
+class PidSample(NamedTuple):
+    """control_msgs/PidState, without its header."""
+
+    timestep: float  # [s]
+    error: float
+    error_dot: float
+    p_error: float
+    i_error: float
+    d_error: float
+    p_term: float
+    i_term: float
+    d_term: float
+    i_max: float
+    i_min: float
+    output: float

@@ -4,18 +4,21 @@ import threading
 
 import rosgraph
 import rospy
+from std_msgs.msg import Bool
 
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.hardware import GAINS, RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.robot import Robot
 from bullet_gazebo.ros.controller_services import ControllerServices
+from bullet_gazebo.ros.pid_ports import PidPorts
 from bullet_gazebo.ros.plugins import PluginContext
 
 FILENAME = "libgazebo_ros_control.so"
 POLL = 0.1  # [s]
 REMIND = 10.0  # [s]
+SLOWEST = 3600.0  # [s]; the longest control period
 
 
 class ControlPlugin:
@@ -29,6 +32,8 @@ class ControlPlugin:
         self._lock = threading.Lock()
         self._robot: Robot | None = None
         self._services: ControllerServices | None = None
+        self._pids: list[PidPorts] = []
+        self._emergency_stop: rospy.Subscriber | None = None
         if not self._try_start():
             threading.Thread(
                 target=self._wait_and_start, name="robot_description", daemon=True
@@ -39,6 +44,10 @@ class ControlPlugin:
         with self._lock:
             if self._services is not None:
                 self._services.shutdown()
+            if self._emergency_stop is not None:
+                self._emergency_stop.unregister()
+            for pid in self._pids:
+                pid.shutdown()
             if self._robot is not None:
                 with self._sim.lock:
                     self._sim.remove_robot(self._robot)
@@ -82,15 +91,52 @@ class ControlPlugin:
         description = read_description(text).limited_by(limits)
         for warning in description.warnings:
             rospy.logwarn("gazebo_ros_control: %s", warning)
-        hardware = RobotHardware(description)
+        gains = rospy.get_param(rospy.names.ns_join(self._namespace, GAINS), {})
+        hardware = RobotHardware(description, gains if isinstance(gains, dict) else {})
         manager = ControllerManager(hardware)
         with self._sim.lock:
-            robot = Robot(self._context.model, hardware, manager)
+            robot = Robot(
+                self._context.model, hardware, manager, self._control_period(), self._namespace
+            )
         self._services = self._offer(manager)
+        self._pids = [
+            PidPorts(self._sim, pid, rospy.names.ns_join(self._namespace, place))
+            for place, pid in hardware.pids.items()
+        ]
         with self._sim.lock:
             self._sim.add_robot(robot)
+        self._listen_to_emergency_stop(robot)
         self._robot = robot  # shutdown() waits for us, and takes it away before the model goes
         rospy.loginfo("Loaded gazebo_ros_control for model '%s'.", self._context.model.name)
+
+    def _control_period(self) -> float:
+        """Returns `<controlPeriod>` [s]; 0, which is each step, if there is none."""
+        text = self._context.text("controlPeriod", "0")
+        try:
+            period = float(text)
+        except ValueError as error:
+            raise ControlError(f"<controlPeriod> '{text}' is not a number") from error
+        if not 0.0 <= period <= SLOWEST:
+            raise ControlError(f"<controlPeriod> {text} is not within 0 and {SLOWEST:g} s")
+        if 0.0 < period < self._sim.world.time_step:
+            rospy.logerr(
+                "The control period %g s is shorter than the step of %g s, which is used.",
+                period, self._sim.world.time_step,
+            )  # fmt: skip
+        return period
+
+    def _listen_to_emergency_stop(self, robot: Robot) -> None:
+        """`<eStopTopic>` (gazebo_api.md section 6.7)."""
+        topic = self._context.text("eStopTopic", "")
+        if not topic:
+            return
+
+        def receive(message: Bool) -> None:
+            with self._sim.lock:
+                robot.emergency_stop(message.data)
+
+        full = rospy.names.ns_join(self._namespace, topic)
+        self._emergency_stop = rospy.Subscriber(full, Bool, receive, queue_size=1)
 
     def _offer(self, manager: ControllerManager) -> ControllerServices:
         try:

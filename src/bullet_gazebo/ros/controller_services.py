@@ -1,6 +1,7 @@
 """The six services of a controller manager (contract: ros_control.md sections 1.2 to 1.7)."""
 
 import threading
+import traceback
 from collections.abc import Callable
 
 import rosgraph
@@ -23,8 +24,10 @@ from controller_manager_msgs.srv import (
     UnloadControllerRequest,
 )
 
+from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.manager import ControllerManager, Listed
+from bullet_gazebo.control.user_types import find_type
 from bullet_gazebo.ros.controller_ports import ControllerPorts
 from bullet_gazebo.simulator import Simulator
 
@@ -40,6 +43,8 @@ class ControllerServices:
         self._namespace = namespace
         self._ports: dict[str, ControllerPorts] = {}
         self._one_at_a_time = threading.Lock()
+        self._gone = False
+        manager.on_fault = _report_fault
         self._services = [
             self._advertise("list_controllers", ListControllers, self._list),
             self._advertise("list_controller_types", ListControllerTypes, self._list_types),
@@ -54,11 +59,14 @@ class ControllerServices:
         for service in self._services:
             service.shutdown("the model was deleted")
         with self._one_at_a_time:
+            self._gone = True
             self._close_all()
 
     def _advertise(self, name: str, kind: type, handler: Callable) -> rospy.Service:
         def handle(request: object) -> object:
             with self._one_at_a_time:
+                if self._gone:  # rospy keeps persistent connections to a service that is shut down
+                    raise rospy.ServiceException("the model was deleted")
                 return handler(request)
 
         full = rospy.names.ns_join(self._namespace, f"controller_manager/{name}")
@@ -79,12 +87,29 @@ class ControllerServices:
             return _refused(ControlError(f"'{request.name}' is not a legal name of a controller"))
         params = rospy.get_param(rospy.names.ns_join(self._namespace, request.name), None)
         try:
+            self._know_type(params)
             with self._sim.lock:
                 controller = self._manager.load(request.name, params)
+            self._ports[request.name] = self._open(controller)
         except ControlError as error:
             return _refused(error)
-        self._ports[request.name] = ControllerPorts(controller, self._namespace)
         return True
+
+    def _know_type(self, params: object) -> None:
+        """Imports a user's own type; not under the simulator's lock, for it takes a while."""
+        kind = params.get("type") if isinstance(params, dict) else None
+        if isinstance(kind, str) and kind not in self._manager.types:
+            found = find_type(kind)
+            if found is not None:
+                self._manager.types[kind] = found
+
+    def _open(self, controller: Controller) -> ControllerPorts:
+        try:
+            return ControllerPorts(self._sim, controller, self._namespace)
+        except (rospy.ROSException, KeyError, TypeError, ValueError) as error:
+            with self._sim.lock:
+                self._manager.unload(controller.name)
+            raise ControlError(f"the topics of '{controller.name}': {error!r}") from error
 
     def _unload(self, request: UnloadControllerRequest) -> bool:
         try:
@@ -129,6 +154,13 @@ def _refused(error: ControlError) -> bool:
     """A refused request is ok=false, and its reason stands in the log (ros_control.md section 1.3)."""
     rospy.logerr("Controller manager: %s", error)
     return False
+
+
+def _report_fault(controller: Controller, error: Exception) -> None:
+    rospy.logerr(
+        "Controller '%s' (%s) is stopped, because it raised:\n%s",
+        controller.name, controller.type_name, "".join(traceback.format_exception(error)),
+    )  # fmt: skip
 
 
 def _state(entry: Listed) -> ControllerState:

@@ -57,7 +57,7 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     return args
 
 
-def seed_random_numbers(seed: int | None) -> None:
+def seed_random_numbers(seed: int | None, tell: bool = True) -> None:
     """Has plugins and whatever else runs in the simulator draw the same numbers every time.
 
     The physics itself draws none.
@@ -66,4 +66,5 @@ def seed_random_numbers(seed: int | None) -> None:
         return
     random.seed(seed)
     np.random.seed(seed % 2**32)
-    rospy.loginfo("Random numbers start from seed %d", seed)
+    if tell:
+        rospy.loginfo("Random numbers start from seed %d", seed)

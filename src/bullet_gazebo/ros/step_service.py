@@ -1,25 +1,23 @@
-"""step_world: moves a world in lock-step, and answers with the state (srv/StepWorld.srv)."""
+"""step_world: resets, commands and moves a world in lock-step, and answers with its state."""
 
-import math
 import threading
 
 import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.manager import RUNNING
-from bullet_gazebo.ros.conversions import to_time
+from bullet_gazebo.ros.conversions import to_pose_msg, to_time, to_twist_msg
+from bullet_gazebo.ros.server_args import seed_random_numbers
+from bullet_gazebo.ros.step_requests import StepPlan
 from bullet_gazebo.simulator import Simulator
 from cartpole.srv import StepWorld, StepWorldRequest, StepWorldResponse
 
-MAX_TICKS = 1_000_000  # a request beyond this is a mistake, and would take minutes
 SLICE = 500  # ticks between which other services get their turn
 
 
 class StepService:
-    """One call: commands in, exactly n ticks, joint states out. Offered in lock-step only."""
+    """One call: reset, commands, exactly n ticks, state (srv/StepWorld.srv). Offered in lock-step only."""
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
@@ -27,57 +25,60 @@ class StepService:
         self._service = rospy.Service("~step_world", StepWorld, self._step)
 
     def _step(self, request: StepWorldRequest) -> StepWorldResponse:
-        with self._one_at_a_time:
-            return self._step_alone(request)
-
-    def _step_alone(self, request: StepWorldRequest) -> StepWorldResponse:
-        sim, left = self._sim, request.ticks
-        with sim.lock:
+        with self._one_at_a_time, self._sim.lock:
             try:
-                self._command(request)  # everything is checked before the first tick
+                plan = StepPlan(self._sim, request)  # everything is checked before anything is done
             except ControlError as error:
-                return StepWorldResponse(False, f"StepWorld: {error}", sim.sim_time, self._state())
-            while left > SLICE:
-                sim.advance(SLICE)
-                left -= SLICE
-                sim.lock.yield_turn()
-            sim.advance(left)
-            return StepWorldResponse(True, "", sim.sim_time, self._state())
+                return self._answer(request, f"StepWorld: {error}")
+            self._begin(request, plan)
+            self._advance(request.ticks)
+            return self._answer(request)
 
-    def _command(self, request: StepWorldRequest) -> None:
-        if not 1 <= request.ticks <= MAX_TICKS:
-            raise ControlError(
-                f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call"
-            )
-        if len(request.controllers) != len(request.commands):
-            raise ControlError(
-                f"{len(request.controllers)} controllers but {len(request.commands)} commands"
-            )
-        controllers = [self._controller(name) for name in request.controllers]
-        for controller, value in zip(controllers, request.commands, strict=True):
-            if not math.isfinite(value):
-                raise ControlError(f"the command {value} for '{controller.name}' is not finite")
-            if controller.state != RUNNING:
-                raise ControlError(
-                    f"controller '{controller.name}' is {controller.state}, not running"
-                )
-        for controller, value in zip(controllers, request.commands, strict=True):
-            controller.command(value)
+    def _begin(self, request: StepWorldRequest, plan: StepPlan) -> None:
+        sim = self._sim
+        if request.reset != StepWorldRequest.NONE:
+            if request.seed:
+                seed_random_numbers(request.seed, tell=False)
+            sim.reset(everything=request.reset == StepWorldRequest.SIMULATION)
+        for model, (positions, velocities) in plan.placed.items():
+            sim.set_joint_states(model, positions, velocities)
+        for command in plan.commands:
+            command()
 
-    def _controller(self, name: str) -> Controller:
-        for robot in self._sim.robots:
-            try:
-                return robot.manager.get(name)
-            except ControlError:
-                continue
-        raise ControlError(f"no controller named '{name}' is loaded")
+    def _advance(self, ticks: int) -> None:
+        while ticks > SLICE:
+            self._sim.advance(SLICE)
+            ticks -= SLICE
+            self._sim.lock.yield_turn()
+        if ticks:
+            self._sim.advance(ticks)
 
-    def _state(self) -> JointState:
-        joints = [joint for robot in self._sim.robots for joint in robot.hardware.joints.values()]
+    def _answer(self, request: StepWorldRequest, fault: str = "") -> StepWorldResponse:
+        response = StepWorldResponse(
+            success=not fault,
+            status_message=fault,
+            sim_time=self._sim.sim_time,
+            joint_states=self._joint_states(),
+        )
+        if request.model_states and not fault:
+            self._add_models(response)
+        return response
+
+    def _joint_states(self) -> JointState:
+        robots = self._sim.robots
+        scoped = len(robots) > 1
+        joints = [(robot, joint) for robot in robots for joint in robot.hardware.joints.values()]
         return JointState(
             header=Header(stamp=to_time(self._sim.now)),
-            name=[joint.name for joint in joints],
-            position=[joint.position for joint in joints],
-            velocity=[joint.velocity for joint in joints],
-            effort=[joint.effort for joint in joints],
+            name=[f"{r.model.name}::{j.name}" if scoped else j.name for r, j in joints],
+            position=[joint.position for _, joint in joints],
+            velocity=[joint.velocity for _, joint in joints],
+            effort=[joint.effort for _, joint in joints],
         )
+
+    def _add_models(self, response: StepWorldResponse) -> None:
+        for name, model in self._sim.world.models.items():
+            pose, twist = model.state()
+            response.model_names.append(name)
+            response.model_poses.append(to_pose_msg(pose))
+            response.model_twists.append(to_twist_msg(twist))

@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Sequence
 
+import genpy
 import rospy
 from gazebo_msgs.srv import SetModelConfiguration
 from sensor_msgs.msg import JointState
@@ -69,17 +70,19 @@ class LockstepPlant:
     """One service call for each action: command, advance, read; time stands still between."""
 
     def __init__(self) -> None:
-        from cartpole.srv import StepWorld
+        from cartpole.srv import StepWorld, StepWorldRequest
 
-        self._reset = _Resetter()
         self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True)
-        self._ticks = ticks_per_action()
-        self._controllers = [CONTROLLER]
+        self._begin = StepWorldRequest(
+            reset=StepWorldRequest.WORLD, joints=[CART_JOINT, POLE_JOINT]
+        )
+        self._advance = StepWorldRequest(ticks=ticks_per_action(), controllers=[CONTROLLER])
 
     def reset(self, state: CartPoleState) -> CartPoleState:
         """See `Plant.reset`; the state asked for is the state reached, exactly."""
-        self._reset(state)
-        return state._replace(cart_velocity=0.0, pole_velocity=0.0)
+        self._begin.positions = [state.cart_position, state.pole_angle]
+        self._begin.velocities = [state.cart_velocity, state.pole_velocity]
+        return self._call(self._begin)
 
     def act(self, set_point: float) -> CartPoleState:
         """See `Plant.act`.
@@ -87,7 +90,11 @@ class LockstepPlant:
         Raises:
             SimulatorError: if the step is refused or the simulator doesn't answer.
         """
-        answer = self._step(self._ticks, self._controllers, [set_point])
+        self._advance.commands = [set_point]
+        return self._call(self._advance)
+
+    def _call(self, request: genpy.Message) -> CartPoleState:
+        answer = self._step(request)
         if not answer.success:
             raise SimulatorError(f"{STEP_SERVICE}: {answer.status_message}")
         return read_state(answer.joint_states)

@@ -1,10 +1,43 @@
 """The controllers, by the type name that a parameter file gives them."""
 
 from bullet_gazebo.control.controllers.base import Controller
-from bullet_gazebo.control.controllers.joint_position import JointPositionController
+from bullet_gazebo.control.controllers.forward import (
+    EffortGroup,
+    EffortJoint,
+    PositionGroup,
+    PositionJoint,
+    VelocityGroup,
+    VelocityJoint,
+)
+from bullet_gazebo.control.controllers.group_position import EffortGroupPosition
+from bullet_gazebo.control.controllers.joint_position import (
+    EffortJointPosition,
+    VelocityJointPosition,
+)
 from bullet_gazebo.control.controllers.joint_state import JointStateController
+from bullet_gazebo.control.controllers.joint_trajectory import (
+    EffortTrajectory,
+    PositionTrajectory,
+    VelocityTrajectory,
+)
+from bullet_gazebo.control.controllers.joint_velocity import EffortJointVelocity
 
 BUILT_IN: dict[str, type[Controller]] = {
     controller.type_name: controller
-    for controller in (JointStateController, JointPositionController)
+    for controller in (
+        JointStateController,
+        EffortJoint,
+        EffortJointPosition,
+        EffortJointVelocity,
+        EffortGroup,
+        EffortGroupPosition,
+        EffortTrajectory,
+        PositionJoint,
+        PositionGroup,
+        PositionTrajectory,
+        VelocityJoint,
+        VelocityJointPosition,
+        VelocityGroup,
+        VelocityTrajectory,
+    )
 }

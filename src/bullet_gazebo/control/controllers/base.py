@@ -3,40 +3,51 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.joint import JointHandle
+from bullet_gazebo.control.pid import Pid
 
 
 class Output:
     """A topic that a controller writes to. `sink` is set by whoever listens, else records are not made.
 
-    `topic` is relative to the controller's namespace, or to the manager's if `shared`.
+    `topic` is relative to the controller's namespace, or to the manager's if `shared`. `kind` names a
+    record of control/samples.py, or is a ROS message type whose messages are then published as they are.
     """
 
     __slots__ = ("kind", "shared", "sink", "topic")
 
-    def __init__(self, topic: str, kind: str, shared: bool = False) -> None:
+    def __init__(self, topic: str, kind: str | type, shared: bool = False) -> None:
         self.topic = topic
         self.kind = kind
         self.shared = shared
-        self.sink: Callable[[tuple], None] | None = None
+        self.sink: Callable[[Any], None] | None = None
 
 
 class Input:
-    """A topic that a controller reads, from load on. `receive` may be called from any thread."""
+    """A topic that a controller reads, from load on.
+
+    `kind` is Float64 (`receive` gets a number), Float64MultiArray (a sequence of numbers), or a ROS
+    message type (the message). `receive` is called between two ticks; if it raises ControlError, that
+    is told in the log.
+    """
 
     __slots__ = ("kind", "receive", "topic")
 
-    def __init__(self, topic: str, kind: str, receive: Callable[[float], None]) -> None:
+    def __init__(self, topic: str, kind: str | type, receive: Callable[[Any], None]) -> None:
         self.topic = topic
         self.kind = kind
         self.receive = receive
 
 
 class Controller(ABC):
-    """One controller (contract: ros_control.md sections 1 and 3). Times are in [ns], periods in [s]."""
+    """One controller (contract: ros_control.md sections 1 and 3). Times are in [ns], periods in [s].
+
+    How to write one's own: docs/controllers.md.
+    """
 
     type_name: ClassVar[str]
     interface: ClassVar[str]
@@ -47,6 +58,7 @@ class Controller(ABC):
         self.claimed: tuple[str, ...] = ()  # joint names, alphabetical
         self.inputs: list[Input] = []
         self.outputs: list[Output] = []
+        self.pids: dict[str, Pid] = {}  # by namespace below the controller's; tunable while it runs
 
     @classmethod
     @abstractmethod
@@ -69,13 +81,6 @@ class Controller(ABC):
     def joints_moved(self, now: int) -> None:
         """Called when something other than time changed the joints' state."""
 
-    def command(self, value: float) -> None:
-        """Takes a new command, as its command topic would.
-
-        Errors: ControlError if this controller takes no single number.
-        """
-        raise ControlError(f"controller '{self.name}' ({self.type_name}) takes no single command")
-
 
 def text_param(params: Mapping, key: str, place: str) -> str:
     """Returns the string parameter `key`; ControlError if it is missing or no string."""
@@ -93,3 +98,23 @@ def number_param(params: Mapping, key: str, place: str) -> float:
             f"parameter {place}/{key} is missing or is not a finite number: {value!r}"
         )
     return float(value)
+
+
+def joint_param(params: Mapping, name: str, interface: str, hardware: RobotHardware) -> JointHandle:
+    """Returns the joint that the parameter `joint` of controller `name` names; ControlError if none."""
+    return hardware.joint(interface, text_param(params, "joint", name))
+
+
+def joints_param(
+    params: Mapping, name: str, interface: str, hardware: RobotHardware
+) -> list[JointHandle]:
+    """Returns the joints that the parameter `joints` of controller `name` lists.
+
+    Errors: ControlError if it is no list of joints of that interface, is empty, or repeats itself.
+    """
+    names = params.get("joints")
+    if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
+        raise ControlError(f"parameter {name}/joints must be a list of joint names: {names!r}")
+    if len(set(names)) < len(names):
+        raise ControlError(f"parameter {name}/joints names a joint twice: {names!r}")
+    return [hardware.joint(interface, joint) for joint in names]

@@ -1,0 +1,128 @@
+#!/usr/bin/env python3
+"""What a tick of the simulator costs, against the engine's bare step of the same model.
+
+    ./ws python3 benchmark/ticks.py [--out FOLDER] [--ticks 20000] [--rounds 9]
+
+All figures of a round are taken one after the other, so that ratios are of one run; the table shows the
+median round. Prints a table and writes ticks.json.
+"""
+
+import argparse
+import datetime
+import json
+import platform
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from bullet_gazebo.control.controllers.base import Controller
+from bullet_gazebo.control.description import read_description
+from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.manager import STRICT, ControllerManager
+from bullet_gazebo.physics.bullet import BulletEngine
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.urdf import parse_urdf
+from bullet_gazebo.physics.world import World
+from bullet_gazebo.robot import Robot
+from bullet_gazebo.simulator import Simulator
+from ros_utils import ros_urdf
+
+GAINS = {"p": 100.0, "i": 0.01, "d": 10.0}
+STATES = {"type": "joint_state_controller/JointStateController", "publish_rate": 120}
+CART = {"type": "effort_controllers/JointPositionController", "joint": "stand_cart", "pid": GAINS}
+TARGETS = {"tick with two controllers": 10.0, "JointPositionController update": 3.0}  # [us]
+SHARE = 0.5  # of bare steps, in ticks with two controllers
+
+
+def make_world(urdf: str, controllers: dict[str, dict]) -> Simulator:
+    """The cart-pole in a lock-step world, its controllers running and listened to."""
+    sim = Simulator(World(BulletEngine()), lockstep=True)
+    model = sim.world.spawn("cartpole", parse_urdf(urdf), Pose())
+    if controllers:
+        hardware = RobotHardware(read_description(urdf))
+        manager = ControllerManager(hardware)
+        sim.add_robot(Robot(model, hardware, manager))
+        for name, params in controllers.items():
+            for output in manager.load(name, params).outputs:
+                output.sink = _drop
+        manager.switch(list(controllers), [], STRICT)
+    return sim
+
+
+def _drop(sample: tuple) -> None:
+    """Stands for a listener."""
+
+
+def per_call(action: Callable[[int], None], count: int) -> float:
+    """Duration of one of `count` calls' work [us]."""
+    begin = time.perf_counter()
+    action(count)
+    return 1e6 * (time.perf_counter() - begin) / count
+
+
+def steps(sim: Simulator) -> Callable[[int], None]:
+    def run(count: int) -> None:
+        for _ in range(count):
+            sim.world.step()
+
+    return run
+
+
+def ticks(sim: Simulator) -> Callable[[int], None]:
+    def run(count: int) -> None:
+        with sim.lock:
+            sim.advance(count)
+
+    return run
+
+
+def updates(controller: Controller) -> Callable[[int], None]:
+    def run(count: int) -> None:
+        for now in range(count):
+            controller.update(now * 1_000_000, 0.001)
+
+    return run
+
+
+def measure(urdf: str, count: int, rounds: int) -> dict[str, float]:
+    """Median costs [us] by what is measured."""
+    both = make_world(urdf, {"states": STATES, "cart": CART})
+    parts = {
+        "bare step": steps(make_world(urdf, {})),
+        "tick without a robot": ticks(make_world(urdf, {})),
+        "tick with joint states": ticks(make_world(urdf, {"states": STATES})),
+        "tick with two controllers": ticks(both),
+        "JointPositionController update": updates(both.robots[0].manager.get("cart")),
+        "JointStateController update": updates(both.robots[0].manager.get("states")),
+    }
+    taken: dict[str, list[float]] = {name: [] for name in parts}
+    for _ in range(rounds):
+        for name, action in parts.items():
+            taken[name].append(per_call(action, count))
+    return {name: statistics.median(values) for name, values in taken.items()}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--out", type=Path, default=Path("runs"), help="folder for ticks.json")
+    parser.add_argument("--ticks", type=int, default=20_000)
+    parser.add_argument("--rounds", type=int, default=9)
+    options = parser.parse_args()
+    urdf = ros_urdf.urdf_parse_from_pkg("cartpole_gazebo", "cartpole_v1.urdf", "/robots") or ""
+    costs = measure(urdf, options.ticks, options.rounds)
+    bare = costs["bare step"]
+    print(f"{'':34} {'us':>8} {'of bare':>8} {'target':>8}")
+    for name, cost in costs.items():
+        print(f"{name:34} {cost:8.2f} {bare / cost:8.0%} {TARGETS.get(name, ''):>8}")
+    share = bare / costs["tick with two controllers"]
+    print(f"ticks a second with two controllers: {1e6 / costs['tick with two controllers']:,.0f}, "
+          f"{share:.0%} of bare steps (target {SHARE:.0%})")  # fmt: skip
+    options.out.mkdir(parents=True, exist_ok=True)
+    record = {"date": datetime.date.today().isoformat(), "machine": platform.platform(),
+              "python": platform.python_version(), "microseconds": costs, "share": share}  # fmt: skip
+    (options.out / "ticks.json").write_text(json.dumps(record, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

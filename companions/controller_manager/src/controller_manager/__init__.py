@@ -1,0 +1,1 @@
+"""Python names of ros_control's package controller_manager."""

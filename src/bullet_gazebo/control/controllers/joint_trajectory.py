@@ -1,0 +1,202 @@
+"""The JointTrajectoryController of effort, position and velocity interfaces (ros_control.md section 3.5)."""
+
+from collections.abc import Mapping
+from typing import Self
+
+from bullet_gazebo.control.controllers.base import Controller, Output, joints_param
+from bullet_gazebo.control.controllers.trajectory_params import Settings, read_axes, read_settings
+from bullet_gazebo.control.hardware import EFFORT, POSITION, VELOCITY, RobotHardware
+from bullet_gazebo.control.trajectory.axis import Axis
+from bullet_gazebo.control.trajectory.goal import (
+    CANCELED,
+    Goal,
+    GoalListener,
+    GoalRequest,
+    Outcome,
+    TrajectorySample,
+    check_tolerances,
+    watch,
+)
+from bullet_gazebo.control.trajectory.plan import (
+    INVALID_GOAL,
+    Plan,
+    TrajectoryRefused,
+    check_joints,
+    check_points,
+    dropped_points,
+)
+from bullet_gazebo.control.trajectory.segment import NANOSECONDS, State
+
+
+class JointTrajectoryController(Controller):
+    """Leads joints along trajectories; without one it holds them.
+
+    Its time is uptime [ns], the sum of its periods since it was started, so the clock may jump.
+    """
+
+    def __init__(self, name: str, axes: list[Axis], settings: Settings) -> None:
+        super().__init__(name)
+        self.joint_names = tuple(axis.joint.name for axis in axes)
+        self.claimed = tuple(sorted(self.joint_names))
+        self.pids = {f"gains/{axis.joint.name}": axis.pid for axis in axes if axis.pid is not None}
+        self._state = Output("state", "TrajectorySample")
+        self.outputs = [self._state]
+        self._axes = axes
+        self._settings = settings
+        self._goal: Goal | None = None
+        self._now = self._uptime = self._period = 0
+        self._next_state = self._next_report = 0
+
+    @classmethod
+    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> Self:
+        joints = joints_param(params, name, cls.interface, hardware)
+        settings = read_settings(params, joints, name)
+        if cls.interface == POSITION:
+            return cls(name, [Axis(joint) for joint in joints], settings)
+        return cls(name, read_axes(params, joints, name), settings)
+
+    def starting(self, now: int) -> None:
+        self._end_goal("the controller began anew: a restart, or the joints were put elsewhere")
+        self._now = now
+        self._uptime = 0
+        self._next_state = 0
+        for axis in self._axes:
+            axis.begin(self._settings.stop_duration)
+
+    def stopping(self) -> None:
+        self._end_goal("the controller was stopped")
+
+    def joints_moved(self, now: int) -> None:
+        self._now = now  # stamps are counted from here, also after the clock went back
+
+    def update(self, now: int, dt: float) -> None:
+        self._now = now
+        self._period = round(dt * NANOSECONDS)
+        self._uptime = uptime = self._uptime + self._period
+        for axis in self._axes:
+            axis.update(uptime, dt)
+        if self._goal is not None:
+            self._watch(self._goal)
+        if self._settings.state_period and uptime >= self._next_state:
+            self._next_state = max(self._next_state + self._settings.state_period, uptime)
+            if self._state.sink is not None:
+                self._state.sink(self.sample())
+
+    def sample(self) -> TrajectorySample:
+        """Returns where the joints are wanted and where they are, as of the last tick."""
+        axes = self._axes
+        positions, velocities, accelerations = zip(*(axis.desired for axis in axes), strict=True)
+        return TrajectorySample(
+            self._now,
+            self.joint_names,
+            (positions, velocities, accelerations),
+            (tuple(a.joint.position for a in axes), tuple(a.joint.velocity for a in axes)),
+            (tuple(a.off for a in axes), tuple(a.rate_off for a in axes)),
+        )
+
+    def follow(self, plan: Plan) -> str:
+        """Takes a trajectory as the topic `command` would; one without points holds the joints.
+
+        Returns a warning for the log, mostly empty.
+        Errors: TrajectoryRefused if it can't be followed; then nothing changes.
+        """
+        self._check_running("take a trajectory")
+        if plan.points:
+            check_joints(plan.names, self.joint_names, self._settings.partial)
+        _, warning = self._lead(plan)
+        self._end_goal("a trajectory came by the command topic")
+        return warning
+
+    def pursue(self, key: str, request: GoalRequest, listener: GoalListener) -> str:
+        """Takes a goal of follow_joint_trajectory; returns and raises as follow()."""
+        self._check_running("take a goal")
+        check_joints(request.plan.names, self.joint_names, self._settings.partial)
+        check_tolerances(request)
+        start, warning = self._lead(request.plan)
+        self._end_goal("another goal came")
+        watched, late = watch(request, self._axes, self._settings.constraints)
+        self._goal = Goal(key, listener, watched, start, late)
+        self._next_report = self._uptime + self._settings.monitor_period
+        return warning
+
+    def cancel(self, key: str) -> None:
+        """Holds the joints if `key` is the active goal, as its client wishes."""
+        if self._goal is not None and self._goal.key == key:
+            self._hold()
+            self._end_goal("canceled by its client")
+
+    def query(self, time: int) -> list[State]:
+        """Returns what is wanted of the joints at `time` [ns] of the clock, in order of joint_names.
+
+        Errors: TrajectoryRefused if the controller isn't running.
+        """
+        self._check_running("sample its trajectory")
+        uptime = self._uptime + time - self._now
+        return [axis.track.at(uptime) for axis in self._axes]
+
+    def _check_running(self, what: str) -> None:
+        if self.state != "running":
+            raise TrajectoryRefused(
+                INVALID_GOAL, f"Controller '{self.name}' can't {what}: it is not running"
+            )
+
+    def _lead(self, plan: Plan) -> tuple[int, str]:
+        """Puts the joints on the plan; returns the uptime at which it begins [ns], and a warning."""
+        tick = self._uptime + self._period  # before the first tick its period isn't known: 0
+        if not plan.points:
+            self._hold()
+            return tick, ""
+        check_points(plan)
+        begins = self._uptime + plan.stamp - self._now if plan.stamp else tick
+        dropped, warning = dropped_points(plan, tick - begins)
+        start = max(tick, begins)
+        for index, name in enumerate(plan.names):
+            way = [(begins + point.time, point.waypoint(index)) for point in plan.points[dropped:]]
+            self._axes[self.joint_names.index(name)].follow(tick, start, way)
+        return start, warning
+
+    def _hold(self) -> None:
+        for axis in self._axes:
+            axis.hold(self._uptime + self._period, self._settings.stop_duration)
+
+    def _watch(self, goal: Goal) -> None:
+        """Aborts at once; tells of progress and success at the monitor's rate."""
+        if goal.outcome is None:
+            goal.outcome = goal.verdict(self._uptime)
+            if goal.outcome is not None and goal.outcome.code:
+                self._end_goal("")
+                return
+        if self._uptime < self._next_report:
+            return
+        self._next_report = max(self._next_report + self._settings.monitor_period, self._uptime)
+        if goal.outcome is None:
+            goal.listener.feedback(self.sample())
+        else:
+            self._end_goal("")
+
+    def _end_goal(self, reason: str) -> None:
+        """Tells the outcome of the active goal: what was found, else that it is canceled for `reason`."""
+        goal, self._goal = self._goal, None
+        if goal is not None:
+            goal.listener.finished(goal.outcome or Outcome(CANCELED, text=reason))
+
+
+class EffortTrajectory(JointTrajectoryController):
+    """A PID from the errors of position and velocity to an effort."""
+
+    type_name = "effort_controllers/JointTrajectoryController"
+    interface = EFFORT
+
+
+class PositionTrajectory(JointTrajectoryController):
+    """Positions, as they are wanted."""
+
+    type_name = "position_controllers/JointTrajectoryController"
+    interface = POSITION
+
+
+class VelocityTrajectory(JointTrajectoryController):
+    """A PID from the errors of position and velocity to a velocity."""
+
+    type_name = "velocity_controllers/JointTrajectoryController"
+    interface = VELOCITY

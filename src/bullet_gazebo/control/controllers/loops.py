@@ -1,0 +1,61 @@
+"""What the controllers with a PID share: a loop around a joint, and reports of its state."""
+
+from bullet_gazebo.control.controllers.base import Output
+from bullet_gazebo.control.joint import JointHandle
+from bullet_gazebo.control.pid import Pid
+from bullet_gazebo.control.samples import JointControllerSample
+
+REPORT_EVERY = 10  # updates
+
+
+class PositionLoop:
+    """Holds a joint at its set-point [rad, m] (ros_control.md section 3.2)."""
+
+    __slots__ = ("joint", "pid", "set_point")
+
+    def __init__(self, joint: JointHandle, pid: Pid) -> None:
+        self.joint = joint
+        self.pid = pid
+        self.set_point = 0.0
+
+    def hold(self) -> None:
+        """Makes the joint's present position the set-point."""
+        self.set_point = self.joint.clamped(self.joint.position)
+        self.pid.clear()
+
+    def update(self, dt: float) -> tuple[float, float]:
+        """Commands the joint; returns the clamped set-point and the error [rad, m]."""
+        joint = self.joint
+        target = joint.clamped(self.set_point)
+        error = joint.way_to(target)
+        joint.command = self.pid.compute(error, dt)
+        return target, error
+
+
+class StateReport:
+    """The topic `state` of a controller with one joint: on every tenth update since it was loaded."""
+
+    __slots__ = ("_joint", "_pid", "_updates", "output")
+
+    def __init__(self, joint: JointHandle, pid: Pid) -> None:
+        self.output = Output("state", "JointControllerState")
+        self._joint = joint
+        self._pid = pid
+        self._updates = 0
+
+    def due(self) -> bool:
+        """Counts an update; returns whether it is one to report, and somebody listens."""
+        count = self._updates
+        self._updates = count + 1
+        return count % REPORT_EVERY == 0 and self.output.sink is not None
+
+    def send(self, now: int, dt: float, set_point: float, value: float, rate: float, error: float) -> None:
+        """Reports process `value` and its `rate`; `now` [ns], `dt` [s]."""
+        gains, sink = self._pid.gains, self.output.sink
+        if sink is not None:
+            sink(
+                JointControllerSample(
+                    now, set_point, value, rate, error, dt, self._joint.command,
+                    gains.p, gains.i, gains.d, gains.i_max, gains.antiwindup,
+                )
+            )  # fmt: skip

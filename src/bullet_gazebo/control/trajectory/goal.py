@@ -1,0 +1,122 @@
+"""A goal of follow_joint_trajectory: whether it is reached, missed or still on its way."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+from bullet_gazebo.control.trajectory.axis import Axis
+from bullet_gazebo.control.trajectory.plan import (
+    GOAL_TOLERANCE_VIOLATED,
+    INVALID_GOAL,
+    PATH_TOLERANCE_VIOLATED,
+    SUCCESSFUL,
+    Plan,
+    TrajectoryRefused,
+)
+from bullet_gazebo.control.trajectory.tolerances import Constraints, Tolerance
+
+SUCCEEDED, ABORTED, CANCELED = "succeeded", "aborted", "canceled"
+
+
+class Outcome(NamedTuple):
+    """How a goal ended; `code` is FollowJointTrajectory's error code."""
+
+    kind: str
+    code: int = SUCCESSFUL
+    text: str = ""
+
+
+class TrajectorySample(NamedTuple):
+    """control_msgs/JointTrajectoryControllerState; values in the order of `names`. [rad, m, 1/s, 1/s²]"""
+
+    stamp: int  # [ns]
+    names: tuple[str, ...]
+    desired: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+    actual: tuple[tuple[float, ...], tuple[float, ...]]
+    error: tuple[tuple[float, ...], tuple[float, ...]]
+
+
+class GoalListener(Protocol):
+    """Hears of a goal from within a control tick, so it must not wait for anything."""
+
+    def feedback(self, sample: TrajectorySample) -> None:
+        """Where the joints are; at action_monitor_rate."""
+
+    def finished(self, outcome: Outcome) -> None:
+        """The end; nothing comes after it."""
+
+
+class GoalRequest(NamedTuple):
+    """A goal as the client sent it; tolerances by joint, `goal_time` [ns]."""
+
+    plan: Plan
+    path: Mapping[str, Tolerance] = {}
+    goal: Mapping[str, Tolerance] = {}
+    goal_time: int = 0
+
+
+class Watched(NamedTuple):
+    """A joint of a goal, and its tolerances on the way and at the end."""
+
+    axis: Axis
+    path: Tolerance
+    goal: Tolerance
+
+
+class Goal:
+    """An accepted goal. `key` identifies it; `outcome` is a success that wasn't told yet."""
+
+    def __init__(
+        self, key: str, listener: GoalListener, watched: list[Watched], start: int, late: int
+    ) -> None:
+        """It begins at uptime `start` [ns], and may end `late` [ns] after its last point."""
+        self.key = key
+        self.listener = listener
+        self.outcome: Outcome | None = None
+        self._watched = watched
+        self._start = start
+        self._late = late
+
+    def verdict(self, uptime: int) -> Outcome | None:
+        """Returns the outcome, None while the joints are on their way."""
+        reached = True
+        for axis, path, goal in self._watched:
+            if uptime < axis.track.end:
+                reached = False
+                fault = path.violation(axis.off, axis.rate_off) if uptime >= self._start else ""
+                if fault:
+                    return _aborted(PATH_TOLERANCE_VIOLATED, axis, "path", fault)
+            elif fault := goal.violation(axis.off, axis.rate_off):
+                reached = False
+                if uptime >= axis.track.end + self._late:
+                    return _aborted(GOAL_TOLERANCE_VIOLATED, axis, "goal", fault)
+        return Outcome(SUCCEEDED) if reached else None
+
+
+def check_tolerances(request: GoalRequest) -> None:
+    """Raises TrajectoryRefused for a tolerance that is no number, which no error would ever exceed."""
+    for joint, tolerance in (*request.path.items(), *request.goal.items()):
+        if any(math.isnan(value) for value in tolerance):
+            raise TrajectoryRefused(INVALID_GOAL, f"A tolerance of joint '{joint}' is not a number")
+
+
+def watch(
+    request: GoalRequest, axes: Sequence[Axis], constraints: Constraints
+) -> tuple[list[Watched], int]:
+    """Returns the goal's joints with their tolerances, and how late [ns] they may come."""
+    wanted = request.plan.names
+    watched = [
+        Watched(
+            axis,
+            path.changed(request.path.get(axis.joint.name)),
+            goal.changed(request.goal.get(axis.joint.name)),
+        )
+        for axis, path, goal in zip(axes, constraints.path, constraints.goal, strict=True)
+        if axis.joint.name in wanted
+    ]
+    late = max(0, request.goal_time) if request.goal_time else constraints.goal_time
+    return watched, late
+
+
+def _aborted(code: int, axis: Axis, where: str, fault: str) -> Outcome:
+    return Outcome(ABORTED, code, f"{axis.joint.name} {where} error {axis.off:f} ({fault})")

@@ -1,0 +1,109 @@
+"""What a client wants of the joints, and what of it can't be done (ros_control.md section 3.5)."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.trajectory.segment import NANOSECONDS, Waypoint
+
+SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS = 0, -1, -2  # control_msgs/FollowJointTrajectoryResult
+PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
+LARGEST = 1e12  # of a position and its derivatives; beyond it a spline's figures would overflow
+
+
+class TrajectoryRefused(ControlError):
+    """A trajectory that can't be followed. `code` is FollowJointTrajectory's error code."""
+
+    def __init__(self, code: int, text: str) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+class PlanPoint(NamedTuple):
+    """trajectory_msgs/JointTrajectoryPoint: `time` is time_from_start [ns]; values in order of joints."""
+
+    time: int
+    positions: Sequence[float]
+    velocities: Sequence[float] = ()
+    accelerations: Sequence[float] = ()
+
+    def waypoint(self, index: int) -> Waypoint:
+        """Returns the point of the joint with that place in the plan."""
+        return Waypoint(
+            self.positions[index],
+            self.velocities[index] if self.velocities else None,
+            self.accelerations[index] if self.accelerations else None,
+        )
+
+
+class Plan(NamedTuple):
+    """trajectory_msgs/JointTrajectory; it begins at `stamp` [ns], or with the next tick if that is 0."""
+
+    names: Sequence[str]
+    points: Sequence[PlanPoint]
+    stamp: int = 0
+
+
+def check_joints(names: Sequence[str], joints: Sequence[str], partial: bool) -> None:
+    """Raises TrajectoryRefused unless `names` are `joints` in any order, or with `partial` some of them."""
+    unknown = [name for name in names if name not in joints]
+    missing = [joint for joint in joints if joint not in names]
+    fault = ""
+    if unknown:
+        fault = f"the controller has no joint {unknown}; it has {list(joints)}"
+    elif len(set(names)) < len(names):
+        fault = f"a joint is named twice: {list(names)}"
+    elif not names:
+        fault = "it names no joint"
+    elif missing and not partial:
+        fault = f"it lacks {missing}, and allow_partial_joints_goal is not set"
+    if fault:
+        raise TrajectoryRefused(INVALID_JOINTS, f"The trajectory's joints don't match: {fault}")
+
+
+def check_points(plan: Plan) -> None:
+    """Raises TrajectoryRefused unless all points are whole, finite, and later than the one before."""
+    before = -1
+    for number, point in enumerate(plan.points):
+        fault = _fault(point, len(plan.names))
+        if not fault and point.time <= before:
+            fault = (
+                f"time_from_start is {point.time / NANOSECONDS} s: it must be more than "
+                f"{'the one before' if number else 'or equal to 0'}"
+            )
+        if fault:
+            raise TrajectoryRefused(INVALID_GOAL, f"Point {number} of the trajectory: {fault}")
+        before = point.time
+
+
+def dropped_points(plan: Plan, elapsed: int) -> tuple[int, str]:
+    """Returns how many points come too late, `elapsed` [ns] after the plan begins, and a warning.
+
+    Errors: TrajectoryRefused if all of them do.
+    """
+    points = plan.points
+    dropped = sum(point.time <= elapsed for point in points)
+    if dropped == len(points):
+        late = (elapsed - points[-1].time) / NANOSECONDS
+        raise TrajectoryRefused(
+            INVALID_GOAL,
+            f"All {dropped} points of the trajectory lie in the past, the last one by {late:f} s",
+        )
+    # Most clients begin with a point "now", so it is no news that it is over.
+    if not dropped or (dropped == 1 and not plan.stamp and not points[0].time):
+        return dropped, ""
+    return dropped, f"The first {dropped} of {len(points)} points lie in the past: left out"
+
+
+def _fault(point: PlanPoint, joints: int) -> str:
+    """Returns what is wrong with the point, or nothing."""
+    if not point.positions:
+        return "it has no positions"
+    for what, values in zip(point._fields[1:], point[1:], strict=True):
+        if values and len(values) != joints:
+            return f"it has {len(values)} {what} for {joints} joints"
+        bad = [value for value in values if not (math.isfinite(value) and abs(value) <= LARGEST)]
+        if bad:
+            return f"its {what} must be finite and within {LARGEST:g}: {bad[0]}"
+    return ""

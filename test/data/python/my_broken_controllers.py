@@ -1,0 +1,1 @@
+raise RuntimeError("it has a fault at import")

@@ -1,0 +1,67 @@
+"""Controllers of a user's own package, named in YAML as `my_controllers/Spring` (docs/controllers.md)."""
+
+from geometry_msgs.msg import Vector3
+
+from bullet_gazebo.control.controllers.base import (
+    Controller,
+    Input,
+    Output,
+    joint_param,
+    number_param,
+)
+
+
+class Spring(Controller):
+    """Pulls a joint to the set-point of the topic `command` (Float64) with `stiffness` [N/m]."""
+
+    type_name = "my_controllers/Spring"
+    interface = "EffortJointInterface"
+
+    def __init__(self, name, joint, stiffness):
+        super().__init__(name)
+        self.joint = joint
+        self.stiffness = stiffness
+        self.set_point = 0.0
+        self.claimed = (joint.name,)
+        self.stretch = Output("stretch", Vector3)  # a ROS message type: published as it is
+        self.inputs = [Input("command", "Float64", self.command)]
+        self.outputs = [self.stretch]
+
+    @classmethod
+    def create(cls, name, params, hardware):
+        joint = joint_param(params, name, cls.interface, hardware)
+        return cls(name, joint, number_param(params, "stiffness", name))
+
+    def command(self, value):
+        self.set_point = value
+
+    def starting(self, now):
+        self.set_point = self.joint.position
+
+    def update(self, now, dt):
+        stretch = self.set_point - self.joint.position
+        self.joint.command = self.stiffness * stretch
+        if self.stretch.sink is not None:
+            self.stretch.sink(Vector3(x=stretch))
+
+
+class Raises(Controller):
+    """A controller with a fault."""
+
+    type_name = "my_controllers/Raises"
+    interface = "EffortJointInterface"
+
+    def __init__(self, name, joint):
+        super().__init__(name)
+        self.joint = joint
+        self.claimed = (joint.name,)
+
+    @classmethod
+    def create(cls, name, params, hardware):
+        return cls(name, joint_param(params, name, cls.interface, hardware))
+
+    def starting(self, now):
+        self.joint.command = 5.0
+
+    def update(self, now, dt):
+        raise ZeroDivisionError("a user's mistake")

@@ -1,0 +1,118 @@
+"""What the tests of the controller manager share: a client of one manager, and robots to spawn."""
+
+import re
+import threading
+
+import rospy
+from controller_manager_msgs.srv import (
+    ListControllers,
+    ListControllerTypes,
+    LoadController,
+    ReloadControllerLibraries,
+    SwitchController,
+    UnloadController,
+)
+from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SpawnModel, SpawnModelRequest
+
+BOUND = 20.0  # [s of wall time]
+BEST_EFFORT, STRICT = 1, 2
+POSITION = "effort_controllers/JointPositionController"
+WEAK = {"p": 1e-6}  # so weak that the cart stays where it is
+CONTROLLERS = {
+    "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 100.0},
+    "cart": {"type": POSITION, "joint": "stand_cart", "pid": WEAK},
+    "cart2": {"type": POSITION, "joint": "stand_cart", "pid": WEAK},
+    "pole": {"type": POSITION, "joint": "cart_pole", "pid": WEAK},
+    "both": {
+        "type": "effort_controllers/JointGroupEffortController",
+        "joints": ["stand_cart", "cart_pole"],
+    },
+}
+PLUGIN = re.compile(r"(<plugin [^>]*libgazebo_ros_control[^>]*)/>")
+
+
+def call(name, kind, *args, **kwargs):
+    rospy.wait_for_service(name, BOUND)
+    return rospy.ServiceProxy(name, kind)(*args, **kwargs)
+
+
+def wait_until(condition, bound=BOUND):
+    done, pause = False, threading.Event()
+    for _ in range(int(bound / 0.02)):
+        done = condition()
+        if done:
+            break
+        pause.wait(0.02)
+    return done
+
+
+def spawn(name="cartpole", robot_namespace="/", own_namespace=None):
+    """Spawns the cart-pole; `own_namespace` goes into the plugin of its URDF."""
+    xml = rospy.get_param("/robot_description")
+    if own_namespace is not None:
+        tag = f"<robotNamespace>{own_namespace}</robotNamespace>"
+        xml = PLUGIN.sub(rf"\1>{tag}</plugin>", xml)
+    request = SpawnModelRequest(model_name=name, model_xml=xml, robot_namespace=robot_namespace)
+    return call("/gazebo/spawn_urdf_model", SpawnModel, request)
+
+
+def delete(name="cartpole"):
+    return call("/gazebo/delete_model", DeleteModel, name)
+
+
+def sim_time():
+    return call("/gazebo/get_world_properties", GetWorldProperties).sim_time
+
+
+class Manager:
+    """The six services of the manager in a namespace."""
+
+    def __init__(self, namespace=""):
+        self.prefix = f"{namespace}/controller_manager"
+
+    def load(self, name):
+        return call(f"{self.prefix}/load_controller", LoadController, name).ok
+
+    def unload(self, name):
+        return call(f"{self.prefix}/unload_controller", UnloadController, name).ok
+
+    def switch(self, start, stop, strictness, start_asap=False, timeout=0.0):
+        request = (start, stop, strictness, start_asap, timeout)
+        return call(f"{self.prefix}/switch_controller", SwitchController, *request).ok
+
+    def listed(self):
+        return call(f"{self.prefix}/list_controllers", ListControllers).controller
+
+    def states(self):
+        """Name: state, in the order of the list."""
+        return {each.name: each.state for each in self.listed()}
+
+    def types(self):
+        return call(f"{self.prefix}/list_controller_types", ListControllerTypes)
+
+    def reload(self, force_kill):
+        name = f"{self.prefix}/reload_controller_libraries"
+        return call(name, ReloadControllerLibraries, force_kill).ok
+
+
+class PausedRobot:
+    """For test cases with one robot in a world that stands still: no call may need it to run."""
+
+    @classmethod
+    def setUpClass(cls):
+        for name, params in CONTROLLERS.items():
+            rospy.set_param(f"/{name}", params)
+
+    def setUp(self):
+        rospy.wait_for_service("/gazebo/get_world_properties", BOUND)
+        self.assertTrue(spawn().success)
+        self.manager = Manager()
+        self.began = sim_time()
+
+    def tearDown(self):
+        self.assertEqual(sim_time(), self.began, "the world wasn't paused")
+        delete()
+
+    def load(self, *names):
+        for name in names:
+            self.assertTrue(self.manager.load(name), name)

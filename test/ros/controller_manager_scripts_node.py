@@ -1,0 +1,269 @@
+#!/usr/bin/env python3
+"""controller_manager and controller_group as processes: printed lines and exit codes.
+
+The world is paused throughout. Lines are those that ros_control's own tests expect of its scripts.
+"""
+
+import contextlib
+import io
+import os
+import socket
+import subprocess
+import unittest
+
+import rospy
+import rostest
+from controller_client import BOUND, STRICT, Manager, delete, spawn
+from controller_manager import controller_manager_interface as interface
+
+POSITION = "effort_controllers/JointPositionController"
+CONTROLLERS = {
+    "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 100.0},
+    "cart": {"type": POSITION, "joint": "stand_cart", "pid": {"p": 1.0}},
+    "cart2": {"type": POSITION, "joint": "stand_cart", "pid": {"p": 1.0}},
+    "pole": {"type": POSITION, "joint": "cart_pole", "pid": {"p": 1.0}},
+}
+GROUPS = {"upper": ["pole"], "lower": ["cart", "pole"], "other": ["cart2", "pole"], "empty": []}
+NONE = "No controllers are loaded in mechanism control\n"
+PATIENCE = 30.0  # [s] that the scripts wait for a manager
+
+
+def listed(name, state):
+    return f"'{name}' - 'hardware_interface::EffortJointInterface' ( {state} )\n"
+
+
+def start_script(script, *arguments, **environment):
+    return subprocess.Popen(
+        ["rosrun", "controller_manager", script, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | environment,
+    )
+
+
+def finish(program, bound=BOUND):
+    """Returns exit code, output and errors."""
+    try:
+        output, errors = program.communicate(timeout=bound)
+    except subprocess.TimeoutExpired:
+        program.kill()
+        program.communicate()
+        raise
+    return program.returncode, output, errors
+
+
+class ScriptsTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        for name, params in CONTROLLERS.items():
+            rospy.set_param(f"/{name}", params)
+        # They wait for long, so the other tests run meanwhile.
+        cls.lonely = [
+            start_script("controller_manager", "list", ROS_NAMESPACE="/nowhere"),
+            start_script("controller_manager", "load", "cart", "__ns:=/nowhere"),
+        ]
+
+    @classmethod
+    def tearDownClass(cls):
+        for program in cls.lonely:
+            finish(program, PATIENCE + BOUND)
+
+    def setUp(self):
+        self.assertTrue(spawn().success)
+        rospy.set_param("/controller_groups", GROUPS)
+        self.manager = Manager()
+
+    def tearDown(self):
+        delete()
+
+    def run_script(self, script, *arguments, **environment):
+        return finish(start_script(script, *arguments, **environment))
+
+    def expect(self, command, expected):
+        """`command` is a command line of controller_manager, or of the script that it begins with."""
+        words = command.split()
+        script = words.pop(0) if words[0] == "controller_group" else "controller_manager"
+        code, output, errors = self.run_script(script, *words)
+        self.assertEqual((output, errors, code), (expected, "", 0), command)
+
+    # controller_manager
+
+    def test_one_controller_from_load_to_unload(self):
+        self.expect("list", NONE)
+        self.expect("load cart", "Loaded 'cart'\n")
+        self.expect("list", listed("cart", "initialized"))
+        self.expect("start cart", "Started ['cart'] successfully\n")
+        self.expect("lc", listed("cart", "running"))
+        self.expect("unload cart", "Error when unloading 'cart'\n")
+        self.expect("stop cart", "Stopped ['cart'] successfully\n")
+        self.expect("list", listed("cart", "stopped"))
+        self.expect("unload cart", "Unloaded 'cart' successfully\n")
+        self.expect("list", NONE)
+
+    def test_several_controllers(self):
+        self.expect("spawn states pole", "Loaded 'states'\nLoaded 'pole'\n"
+                    "Started ['states'] successfully\nStarted ['pole'] successfully\n")  # fmt: skip
+        self.expect("list", "'states' - 'hardware_interface::JointStateInterface' ( running )\n"
+                    + listed("pole", "running"))  # fmt: skip
+        self.expect("kill pole states", "Stopped ['pole'] successfully\nStopped ['states'] successfully\n"
+                    "Unloaded 'pole' successfully\nUnloaded 'states' successfully\n")  # fmt: skip
+        self.expect("sp cart", "Loaded 'cart'\nStarted ['cart'] successfully\n")
+        self.expect("kl cart", "Stopped ['cart'] successfully\nUnloaded 'cart' successfully\n")
+
+    def test_what_the_manager_refuses_is_printed_and_no_failure(self):
+        self.expect("load nobody", "Error when loading 'nobody'\n")
+        self.expect("unload nobody", "Error when unloading 'nobody'\n")
+        self.expect("start nobody", "Error when starting ['nobody']\n")
+        self.expect("stop nobody", "Error when stopping ['nobody']\n")
+        self.expect("spawn nobody cart", "Error when loading 'nobody'\nLoaded 'cart'\n"
+                    "Error when starting ['nobody']\nStarted ['cart'] successfully\n")  # fmt: skip
+        self.expect("start cart", "Error when starting ['cart']\n")
+
+    def test_types(self):
+        for command in ("list-types", "lt"):
+            self.expect(command, "".join(f"{kind}\n" for kind in self.manager.types().types))
+
+    def test_reload(self):
+        self.expect("reload-libraries", "Restore: False\nSuccessfully reloaded libraries\n")
+        self.expect("spawn cart", "Loaded 'cart'\nStarted ['cart'] successfully\n")
+        self.expect("load pole", "Loaded 'pole'\n")
+        self.expect("reload-libraries --restore", "Restore: True\nSuccessfully reloaded libraries\n"
+                    "Controllers restored to original state\n")  # fmt: skip
+        self.assertEqual(self.manager.states(), {"cart": "running", "pole": "initialized"})
+        self.expect("reload-libraries", "Restore: False\nSuccessfully reloaded libraries\n")
+        self.assertEqual(self.manager.states(), {})
+
+    def test_anything_else_is_answered_with_the_usage(self):
+        for script in ("controller_manager", "controller_group"):  # more: test_manager_cli.py
+            for line, expected in (("", 2), ("spin cart", 2), ("--help", 0)):
+                with self.subTest(script, line=line):
+                    code, output, errors = self.run_script(script, *line.split())
+                    self.assertEqual((code, errors), (expected, ""))
+                    self.assertTrue(output.startswith(f"usage: {script} COMMAND"), output)
+
+    def test_in_a_namespace(self):
+        delete()
+        self.assertTrue(spawn(robot_namespace="/my_robot").success)
+        rospy.set_param("/my_robot/cart", CONTROLLERS["cart"])
+        code, output, _ = self.run_script("controller_manager", "load", "cart", "__ns:=/my_robot")
+        self.assertEqual((code, output), (0, "Loaded 'cart'\n"))
+        code, output, _ = self.run_script("controller_manager", "list", ROS_NAMESPACE="/my_robot")
+        self.assertEqual((code, output), (0, listed("cart", "initialized")))
+
+    def test_without_a_manager_they_say_so(self):
+        for program, service in zip(
+            self.lonely, ("list_controllers", "load_controller"), strict=True
+        ):
+            code, output, errors = finish(program, PATIENCE + BOUND)
+            self.assertEqual((code, output), (1, ""))
+            name = f"/nowhere/controller_manager/{service}"
+            self.assertIn(f"waiting up to 30 s for the service {name}", errors)
+            self.assertIn(
+                f"there is no controller manager: nobody offers the service {name}", errors
+            )
+            self.assertNotIn("Traceback", errors)
+        self.lonely.clear()
+
+    def test_without_a_master_they_say_so(self):
+        with socket.socket() as reserved:  # bound, and nobody listens
+            reserved.bind(("127.0.0.1", 0))
+            master = f"http://127.0.0.1:{reserved.getsockname()[1]}"
+            for script in ("controller_manager", "controller_group"):
+                code, _, errors = self.run_script(script, "list", ROS_MASTER_URI=master)
+                self.assertEqual(
+                    (code, errors), (1, f"{script}: there is no ROS master at {master}\n")
+                )
+
+    # controller_group
+
+    def test_groups_are_listed(self):
+        self.expect("controller_group list", "Number of groups: 4\n  empty\n"
+                    "  lower\n      cart\n      pole\n  other\n      cart2\n      pole\n"
+                    "  upper\n      pole\n")  # fmt: skip
+
+    def test_a_group_is_spawned_and_switched(self):
+        self.expect("spawn states", "Loaded 'states'\nStarted ['states'] successfully\n")
+        self.expect("controller_group spawn lower", "Loaded 'cart'\nLoaded 'pole'\n"
+                    "Started ['cart'] successfully\nStarted ['pole'] successfully\n")  # fmt: skip
+        self.expect("controller_group switch other", "Loaded 'cart2'\n"
+                    "Started ['cart2'] successfully\nStopped ['cart'] successfully\n")  # fmt: skip
+        self.expect("controller_group switch other", "")
+        self.expect("controller_group switch empty", "Stopped ['pole', 'cart2'] successfully\n")
+        self.assertEqual(
+            self.manager.states(),
+            {"states": "running", "cart": "stopped", "pole": "stopped", "cart2": "stopped"},
+        )
+        self.expect("controller_group spawn upper",
+                    "Error when loading 'pole'\nStarted ['pole'] successfully\n")  # fmt: skip
+
+    def test_a_group_that_conflicts_is_not_switched_to(self):
+        rospy.set_param("/controller_groups/faulty", ["cart", "cart2"])
+        self.expect("controller_group spawn other", "Loaded 'cart2'\nLoaded 'pole'\n"
+                    "Started ['cart2'] successfully\nStarted ['pole'] successfully\n")  # fmt: skip
+        self.expect("controller_group switch faulty", "Loaded 'cart'\n"
+                    "Error when starting ['cart'] and stopping ['pole']\n")  # fmt: skip
+        self.assertEqual(
+            self.manager.states(), {"cart2": "running", "pole": "running", "cart": "initialized"}
+        )
+
+    def test_groups_that_are_none(self):
+        place = "controller_group: the parameter /controller_groups"
+        for groups, text in (
+            ("lower", " must map names of groups to lists of controllers"),
+            ({"lower": "cart"}, ": group 'lower' must be a list of names of controllers"),
+            ({"lower": [1]}, ": group 'lower' must be a list of names of controllers"),
+        ):
+            rospy.set_param("/controller_groups", groups)
+            found = self.run_script("controller_group", "spawn", "lower")
+            self.assertEqual(found, (1, "", f"{place}{text}\n"))
+        rospy.delete_param("/controller_groups")
+        found = self.run_script("controller_group", "list")
+        self.assertEqual(found, (1, "", f"{place} isn't set\n"))
+
+    def test_an_unknown_group(self):
+        code, output, errors = self.run_script("controller_group", "switch", "nobody")
+        self.assertEqual((code, output), (1, ""))
+        self.assertIn(
+            "no group 'nobody' in /controller_groups: ['empty', 'lower', 'other', 'upper']", errors
+        )
+
+    # the Python module
+
+    def test_the_module_returns_what_it_prints(self):
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            returned = [
+                interface.load_controller("nobody"),
+                interface.load_controller("cart"),
+                interface.load_controller("pole"),
+                interface.start_controller("cart"),
+                interface.stop_controller("cart"),
+                interface.start_controllers(["cart", "pole"]),
+                interface.stop_controller("states"),
+                interface.reload_libraries(False),
+                interface.stop_controllers(["cart", "pole"]),
+                interface.unload_controller("cart"),
+                interface.reload_libraries(True, restore=True),
+            ]
+            interface.list_controllers()
+            interface.list_controller_types()
+        self.assertEqual(
+            returned, [False, True, True, True, True, True, False, False, True, True, True]
+        )
+        expected = (
+            "Error when loading 'nobody'\nLoaded 'cart'\nLoaded 'pole'\n"
+            "Started ['cart'] successfully\nStopped ['cart'] successfully\n"
+            "Started ['cart', 'pole'] successfully\nError when stopping ['states']\n"
+            "Restore: False\nFailed to reload libraries. Do you still have controllers loaded?\n"
+            "Stopped ['cart', 'pole'] successfully\nUnloaded 'cart' successfully\n"
+            "Restore: True\nSuccessfully reloaded libraries\nControllers restored to original state\n"
+        ) + listed("pole", "initialized")
+        self.assertTrue(printed.getvalue().startswith(expected), printed.getvalue())
+        self.assertTrue(printed.getvalue().endswith(f"{self.manager.types().types[-1]}\n"))
+        self.assertTrue(self.manager.switch(["pole"], [], STRICT))
+
+
+if __name__ == "__main__":
+    rospy.init_node("controller_manager_scripts_test")
+    rostest.rosrun("cartpole", "controller_manager_scripts", ScriptsTest)

@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+"""switch_controller, case by case (ros_control.md section 1.6).
+
+The world is paused, and no call may need it to run.
+"""
+
+import unittest
+
+import rospy
+import rostest
+from control_msgs.msg import JointControllerState
+from controller_client import (
+    BEST_EFFORT,
+    BOUND,
+    CONTROLLERS,
+    STRICT,
+    PausedRobot,
+    sim_time,
+    wait_until,
+)
+from std_msgs.msg import Float64
+from std_srvs.srv import Empty
+
+LOOSE = (BEST_EFFORT, 0)  # 0 is taken for best effort
+# start, stop, ok if strict, states after it, ok if loose, states after it; `cart` runs before
+SWITCHES = {
+    "unknown to start": (["nobody", "pole"], [], False, {}, True, {"pole": "running"}),
+    "unknown to stop": (["pole"], ["nobody"], False, {}, True, {"pole": "running"}),
+    "only unknown": (["nobody"], ["no one"], False, {}, True, {}),
+    "to stop, idle": (["pole"], ["cart2"], False, {}, True, {"pole": "running"}),
+    "to start, running": (["cart", "pole"], [], False, {}, True, {"pole": "running"}),
+    "in both, running": (["cart", "pole"], ["cart"], False, {}, True, {"pole": "running"}),
+    "in both, idle": (["pole"], ["pole"], False, {}, True, {"pole": "running"}),
+    "conflict with a running one": (["pole", "cart2"], [], False, {}, False, {}),
+    "conflict with a stopped one": (
+        ["cart2"], ["cart"], True, {"cart2": "running", "cart": "stopped"},
+        True, {"cart2": "running", "cart": "stopped"},
+    ),
+    "conflict among those to start": (["cart2", "cart"], ["cart"], False, {}, False, {}),
+    "conflict on one of two joints": (["both"], [], False, {}, False, {}),
+    "named twice": (["pole", "pole"], [], True, {"pole": "running"}, True, {"pole": "running"}),
+    "joint states don't conflict": (["states"], [], True, {"states": "running"}, True, {"states": "running"}),
+    "stop": ([], ["cart"], True, {"cart": "stopped"}, True, {"cart": "stopped"}),
+    "nothing": ([], [], True, {}, True, {}),
+}  # fmt: skip
+
+
+class SwitchTest(PausedRobot, unittest.TestCase):
+    def test_switch(self):
+        for case, (start, stop, strict_ok, strict, loose_ok, loose) in SWITCHES.items():
+            for strictness in (STRICT, *LOOSE):
+                ok, after = (strict_ok, strict) if strictness == STRICT else (loose_ok, loose)
+                with self.subTest(case, strictness=strictness):
+                    self.assertTrue(self.manager.reload(True))
+                    self.load(*CONTROLLERS)
+                    self.assertTrue(self.manager.switch(["cart"], [], STRICT))
+                    before = dict.fromkeys(CONTROLLERS, "initialized") | {"cart": "running"}
+                    self.assertEqual(self.manager.switch(start, stop, strictness), ok)
+                    self.assertEqual(self.manager.states(), before | after)
+
+    def test_timeouts_and_asap_make_no_difference(self):
+        self.load("cart")
+        for asap in (False, True):
+            for timeout in (0.0, 0.001, 5.0, -1.0):
+                with self.subTest(asap=asap, timeout=timeout):
+                    self.assertTrue(self.manager.switch(["cart"], [], STRICT, asap, timeout))
+                    self.assertTrue(self.manager.switch([], ["cart"], STRICT, asap, timeout))
+
+    def test_restart_is_best_effort_only_and_latches_the_position(self):
+        self.load("cart")
+        self.manager.switch(["cart"], [], STRICT)
+        for stop in ([], ["cart"]):
+            self.assertEqual(self.set_point_after_command(0.3), 0.3)
+            self.assertFalse(self.manager.switch(["cart"], stop, STRICT))
+            self.assertEqual(self.next_set_point(), 0.3)
+            self.assertTrue(self.manager.switch(["cart"], stop, BEST_EFFORT))
+            self.assertAlmostEqual(self.next_set_point(), 0.0, places=2)
+        self.began = sim_time()
+
+    def set_point_after_command(self, value):
+        publisher = rospy.Publisher("/cart/command", Float64, queue_size=1)
+        self.assertTrue(wait_until(publisher.get_num_connections))
+        publisher.publish(value)
+        self.assertTrue(wait_until(lambda: self.next_set_point() == value))
+        return value
+
+    def next_set_point(self):
+        """Lets the world run until the controller tells its state."""
+        rospy.ServiceProxy("/gazebo/unpause_physics", Empty)()
+        try:
+            # The first one may have been on its way.
+            rospy.wait_for_message("/cart/state", JointControllerState, BOUND)
+            return rospy.wait_for_message("/cart/state", JointControllerState, BOUND).set_point
+        finally:
+            rospy.ServiceProxy("/gazebo/pause_physics", Empty)()
+
+
+if __name__ == "__main__":
+    rospy.init_node("controller_switch_test")
+    rostest.rosrun("cartpole", "controller_switch", SwitchTest)

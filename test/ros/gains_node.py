@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""Gains at run time: dynamic_reconfigure, write-back, PID state (ros_control.md section 4)."""
+
+import math
+import subprocess
+
+import rospy
+import rostest
+from control_msgs.msg import JointControllerState, PidState
+from dynamic_reconfigure.msg import Config, ConfigDescription, DoubleParameter
+from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
+from slides_client import SlidesTest, Topic, call
+
+PID = "/slides/effort_position/pid"
+NAMES = ["p", "i", "d", "i_clamp_min", "i_clamp_max", "antiwindup"]
+
+
+def reconfigure(namespace, **doubles):
+    request = ReconfigureRequest()
+    request.config.doubles = [DoubleParameter(name, value) for name, value in doubles.items()]
+    answer = call(f"{namespace}/set_parameters", Reconfigure, request).config
+    return {each.name: each.value for each in [*answer.doubles, *answer.bools]}
+
+
+class GainsTest(SlidesTest):
+    def setUp(self):
+        super().setUp()
+        rospy.set_param(PID, {"p": 400.0, "d": 40.0, "publish_state": True})
+
+    def test_dynparam_of_the_command_line(self):
+        self.run_controllers("effort_position")
+        state = Topic("effort_position/state", JointControllerState)
+        command = ["rosrun", "dynamic_reconfigure", "dynparam", "set", PID, "p", "250.0"]
+        subprocess.run(command, check=True, timeout=30)
+        self.step(1)
+        self.assertTrue(state.wait_for(lambda got: got and got[-1].p == 250.0))
+        self.assertEqual(rospy.get_param(f"{PID}/p"), 250.0)
+        state.close()
+
+    def test_gains_are_written_to_the_parameter_server_at_load(self):
+        self.assertTrue(self.load("effort_position"))
+        self.assertLessEqual(set(NAMES), set(rospy.get_param(PID)))
+        self.assertEqual(rospy.get_param(f"{PID}/i_clamp_max"), 0.0)
+
+    def test_gains_take_effect_are_clamped_and_told(self):
+        self.run_controllers("effort_position")
+        updates = Topic("effort_position/pid/parameter_updates", Config)  # latched
+        self.assertTrue(updates.wait_for(len))
+        answer = reconfigure(PID, p=1e9, d=-1e9, i_clamp_max=-3.0, i_clamp_min=2.0, i=5.0)
+        wanted = {"p": 1e5, "d": -1e3, "i_clamp_max": 0.0, "i_clamp_min": 0.0, "i": 5.0, "antiwindup": False}
+        self.assertEqual(answer, wanted)
+        self.assertTrue(updates.wait_for(lambda got: len(got) == 2))
+        updates.close()
+        reconfigure(PID, p=100.0, i=0.0, d=0.0)
+        joints = self.step(1, effort_position=0.1)
+        self.assertAlmostEqual(joints["effort_a"][2], 10.0, places=9)
+
+    def test_gains_that_are_no_numbers_are_refused(self):
+        self.run_controllers("effort_position")
+        for bad in (math.nan, math.inf):
+            answer = reconfigure(PID, p=bad)
+            self.assertTrue(math.isfinite(answer["p"]))
+        self.assertTrue(math.isfinite(self.step(10, effort_position=0.1)["effort_a"][0]))
+
+    def test_the_descriptions_name_the_six_parameters(self):
+        self.assertTrue(self.load("effort_position"))
+        topic = Topic("effort_position/pid/parameter_descriptions", ConfigDescription)
+        self.assertTrue(topic.wait_for(len))
+        description = topic.messages[0]
+        self.assertEqual([p.name for p in description.groups[0].parameters], NAMES)
+        self.assertEqual({p.name: p.value for p in description.max.doubles}["d"], 1000.0)
+        topic.close()
+
+    def test_pid_state_is_published_on_each_computation_if_wanted(self):
+        self.run_controllers("effort_position")
+        topic = Topic("effort_position/pid/state", PidState)
+        self.step(1, effort_position=0.1)
+        self.assertTrue(topic.wait_for(len))
+        message = topic.messages[0]
+        self.assertAlmostEqual(message.error, 0.1, places=12)
+        self.assertAlmostEqual(message.p_term, 40.0, places=9)
+        self.assertAlmostEqual(message.output, 40.0 + 40.0 * 0.1 / 0.001, places=6)
+        self.assertEqual(message.timestep, rospy.Duration(0, 1_000_000))
+        topic.close()
+
+    def test_every_joint_of_a_group_and_every_drive_has_gains(self):
+        self.run_controllers("effort_group_position")
+        answer = reconfigure("/slides/effort_group_position/effort_b/pid", p=111.0)
+        self.assertEqual(answer["p"], 111.0)
+        answer = reconfigure("/slides/gazebo_ros_control/pid_gains/velocity_b", p=222.0)
+        self.assertEqual(answer["p"], 222.0)
+
+    def test_they_go_with_the_controller(self):
+        service = f"{PID}/set_parameters"
+        for _ in range(2):
+            self.assertTrue(self.load("effort_position"))
+            rospy.wait_for_service(service, 5.0)
+            self.assertTrue(self.unload("effort_position"))
+            with self.assertRaises(rospy.ROSException):
+                rospy.wait_for_service(service, 0.3)
+
+
+if __name__ == "__main__":
+    rospy.init_node("gains_test")
+    rostest.rosrun("cartpole", "gains", GainsTest)

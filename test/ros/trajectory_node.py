@@ -1,0 +1,346 @@
+#!/usr/bin/env python3
+"""JointTrajectoryController through ROS (ros_control.md section 3.5)."""
+
+import math
+import unittest
+
+import rosgraph
+import rosnode
+import rospy
+import rostest
+from actionlib_msgs.msg import GoalID, GoalStatusArray
+from control_msgs.msg import JointTolerance
+from control_msgs.srv import QueryTrajectoryState
+from controller_client import BOUND, STRICT, Manager, call, wait_until
+from gazebo_msgs.srv import DeleteModel, GetJointProperties, SpawnModel, SpawnModelRequest
+from std_srvs.srv import Empty
+from trajectory_client import Arm, trajectory
+from trajectory_msgs.msg import JointTrajectory
+
+EFFORT = ["effort_a", "effort_b"]
+RESULTS = {"SUCCEEDED": 0, "INVALID_GOAL": -1, "INVALID_JOINTS": -2, "PATH": -4, "GOAL": -5}
+ACTION = {"goal", "cancel", "status", "feedback", "result"}
+
+
+def position(joint):
+    return call("/gazebo/get_joint_properties", GetJointProperties, joint).position[0]
+
+
+def pause():
+    call("/gazebo/pause_physics", Empty)
+
+
+def unpause():
+    call("/gazebo/unpause_physics", Empty)
+
+
+def topics_below(namespace):
+    state = rosgraph.Master("/trajectory_test").getSystemState()
+    own = rospy.get_name()
+    return {
+        topic
+        for group in state[:2]
+        for topic, nodes in group
+        if topic.startswith(namespace) and set(nodes) != {own}
+    }
+
+
+class TrajectoryTest(unittest.TestCase):
+    def setUp(self):
+        pause()
+        xml = rospy.get_param("/slides/robot_description")
+        request = SpawnModelRequest(model_name="slides", model_xml=xml)
+        self.assertTrue(call("/gazebo/spawn_urdf_model", SpawnModel, request).success)
+        self.manager = Manager("/slides")
+        self.arms = []
+
+    def tearDown(self):
+        for arm in self.arms:
+            arm.close()
+        call("/gazebo/delete_model", DeleteModel, "slides")
+
+    def arm(self, name="effort_arm", start=True):
+        """Loads a controller, and starts it, while the world is paused."""
+        self.assertTrue(self.manager.load(name))
+        if start:
+            self.assertTrue(self.manager.switch([name], [], STRICT))
+        arm = Arm(f"/slides/{name}")
+        self.arms.append(arm)
+        self.assertTrue(arm.wait_connected(), name)
+        return arm
+
+    def check(self, pursuit, state, result, text=""):
+        self.assertEqual(pursuit.wait(), (state, RESULTS[result]))
+        self.assertIn(text, pursuit.result.error_string)
+
+    # the way of each interface
+
+    def test_all_three_interfaces_follow_a_trajectory(self):
+        for name, joints in (
+            ("effort_arm", EFFORT),
+            ("position_arm", ["position_a", "position_b"]),
+            ("velocity_arm", ["velocity_a"]),
+        ):
+            with self.subTest(name):
+                arm = self.arm(name)
+                unpause()
+                tolerance = [JointTolerance(name=joint, position=0.01) for joint in joints]
+                wanted = [0.2, -0.1][: len(joints)]
+                plan = trajectory(joints, (0.0, [0.0] * len(joints)), (0.5, wanted))
+                pursuit = arm.pursue(plan, path=tolerance, goal=tolerance)
+                self.check(pursuit, "SUCCEEDED", "SUCCEEDED")
+                self.assertGreaterEqual(len(pursuit.feedback), 8)
+                for joint, place in zip(joints, wanted, strict=True):
+                    self.assertAlmostEqual(position(joint), place, delta=0.01)
+                pause()
+
+    def test_claims_are_alphabetical_and_states_keep_the_order_of_the_parameter(self):
+        arm = self.arm()
+        (listed,) = self.manager.listed()
+        self.assertEqual(listed.type, "effort_controllers/JointTrajectoryController")
+        (claim,) = listed.claimed_resources
+        self.assertEqual(claim.hardware_interface, "hardware_interface::EffortJointInterface")
+        self.assertEqual(claim.resources, EFFORT)
+        unpause()
+        self.assertTrue(arm.wait_state(lambda state: True))
+        self.assertEqual(arm.states[0].joint_names, EFFORT[::-1])
+
+    # goals that fail
+
+    def test_path_tolerance(self):
+        arm = self.arm()
+        unpause()
+        tolerance = [JointTolerance(name="effort_a", position=0.001)]
+        pursuit = arm.pursue(trajectory(EFFORT, (0.1, [2.0, 0.0])), path=tolerance)
+        self.check(pursuit, "ABORTED", "PATH", "effort_a path error 0.0")
+        self.assertEqual(pursuit.text, pursuit.result.error_string)
+        # The way goes on all the same.
+        self.assertTrue(wait_until(lambda: abs(position("effort_a") - 2.0) < 0.05))
+
+    def test_goal_tolerance(self):
+        arm = self.arm()
+        unpause()
+        tolerance = [JointTolerance(name="effort_a", position=1e-9)]
+        plan = trajectory(EFFORT, (0.1, [7.0, 0.0]))  # the rail ends at 5 m
+        self.check(
+            arm.pursue(plan, goal=tolerance, goal_time=0.1),
+            "ABORTED",
+            "GOAL",
+            "effort_a goal error",
+        )
+
+    def test_wrong_joints(self):
+        arm = self.arm()
+        for joints in (["effort_a"], ["effort_a", "elbow"], ["effort_a", "effort_b", "x"], []):
+            with self.subTest(joints):
+                plan = trajectory(joints, (1.0, [0.0] * len(joints)))
+                self.check(arm.pursue(plan), "REJECTED", "INVALID_JOINTS", "joints don't match")
+
+    def test_wrong_trajectories(self):
+        arm = self.arm()
+        for points, text in (
+            ([(1.0, [0.0, 0.0]), (1.0, [0.0, 0.0])], "time_from_start"),
+            ([(1.0, [0.0])], "1 positions for 2 joints"),
+            ([(1.0, [math.nan, 0.0])], "finite"),
+            ([(0.0, [0.0, 0.0])], "in the past"),
+        ):
+            with self.subTest(text):
+                plan = trajectory(EFFORT, *points)
+                self.check(arm.pursue(plan), "REJECTED", "INVALID_GOAL", text)
+
+    def test_a_controller_that_does_not_run_takes_no_goal(self):
+        arm = self.arm(start=False)
+        plan = trajectory(EFFORT, (1.0, [0.0, 0.0]))
+        self.check(arm.pursue(plan), "REJECTED", "INVALID_GOAL", "not running")
+
+    def test_missing_gains_refuse_the_load(self):
+        self.assertFalse(self.manager.load("no_gains"))
+        self.assertEqual(self.manager.listed(), [])
+
+    # goals that something else comes between
+
+    def test_cancel_holds_the_joints(self):
+        arm = self.arm()
+        unpause()
+        pursuit = arm.pursue(trajectory(EFFORT, (1.0, [1.0, 1.0])))
+        self.assertTrue(wait_until(lambda: position("effort_a") > 0.3))
+        pursuit.cancel()
+        self.check(pursuit, "PREEMPTED", "SUCCEEDED", "canceled by its client")
+        self.assertTrue(arm.wait_state(lambda state: state.desired.velocities == (0.0, 0.0)))
+        wanted = arm.states[-1].desired.positions
+        self.assertLess(max(wanted), 0.9)
+        self.assertTrue(arm.wait_state(lambda state: max(map(abs, state.error.positions)) < 1e-3))
+        self.assertEqual(arm.states[-1].desired.positions, wanted)
+
+    def test_a_new_goal_preempts(self):
+        arm = self.arm("velocity_arm")
+        unpause()
+        first = arm.pursue(trajectory(["velocity_a"], (5.0, [1.0])))
+        self.assertTrue(first.wait_active())
+        other = Arm("/slides/velocity_arm")  # a client that sends anew forgets its first goal
+        self.arms.append(other)
+        self.assertTrue(other.wait_connected())
+        second = other.pursue(trajectory(["velocity_a"], (0.3, [-0.2])))
+        self.check(first, "PREEMPTED", "SUCCEEDED", "another goal came")
+        self.check(second, "SUCCEEDED", "SUCCEEDED")
+
+    def test_a_command_preempts_and_bad_ones_do_not(self):
+        arm = self.arm()
+        unpause()
+        pursuit = arm.pursue(trajectory(EFFORT, (3.0, [1.0, 1.0])))
+        self.assertTrue(pursuit.wait_active())
+        before = len(arm.states)
+        arm.command.publish(trajectory(EFFORT, (0.1, [math.nan, 0.0])))
+        self.assertTrue(wait_until(lambda: len(arm.states) > before + 10))
+        self.assertFalse(pursuit.has_ended())
+        arm.command.publish(trajectory(EFFORT, (0.3, [-0.2, 0.1])))
+        self.check(pursuit, "PREEMPTED", "SUCCEEDED", "command topic")
+        self.assertTrue(arm.wait_state(lambda state: state.desired.positions == (0.1, -0.2)))
+
+    def test_an_empty_command_holds(self):
+        arm = self.arm()
+        unpause()
+        arm.command.publish(trajectory(EFFORT, (2.0, [1.0, 1.0])))
+        self.assertTrue(arm.wait_state(lambda state: state.desired.velocities[0] > 0.1))
+        arm.command.publish(JointTrajectory())
+        self.assertTrue(arm.wait_state(lambda state: state.desired.velocities == (0.0, 0.0)))
+        self.assertLess(max(arm.states[-1].desired.positions), 0.9)
+
+    def test_some_joints_if_it_is_allowed(self):
+        arm = self.arm("position_arm")
+        unpause()
+        self.check(arm.pursue(trajectory(["position_b"], (0.3, [0.2]))), "SUCCEEDED", "SUCCEEDED")
+        self.assertAlmostEqual(position("position_a"), 0.0, delta=1e-3)
+        self.assertAlmostEqual(position("position_b"), 0.2, delta=1e-3)
+
+    # state, query
+
+    def test_states_come_at_50_hz_of_simulated_time(self):
+        arm = self.arm()
+        unpause()
+        self.assertTrue(wait_until(lambda: len(arm.states) >= 30))
+        state = arm.states[-1]
+        self.assertEqual((state.actual.accelerations, state.error.accelerations), ((), ()))
+        self.assertEqual([len(state.desired.accelerations), len(state.error.velocities)], [2, 2])
+        first, last = arm.states[5].header, state.header
+        rate = (last.seq - first.seq) / (last.stamp - first.stamp).to_sec()
+        self.assertAlmostEqual(rate, 50.0, delta=1.0)
+
+    def test_query_state(self):
+        arm = self.arm(start=False)
+        name = "/slides/effort_arm/query_state"
+        with self.assertRaisesRegex(rospy.ServiceException, "not running"):
+            call(name, QueryTrajectoryState, rospy.Time(0))
+        self.assertTrue(self.manager.switch(["effort_arm"], [], STRICT))
+        unpause()
+        self.assertTrue(arm.wait_state(lambda state: True))
+        start = arm.states[-1].header.stamp + rospy.Duration(1)
+        arm.command.publish(trajectory(EFFORT, (1.0, [1.0, 0.0]), stamp=start.to_sec()))
+        middle, end = start + rospy.Duration(0, 500_000_000), start + rospy.Duration(9)
+        self.assertTrue(
+            wait_until(lambda: call(name, QueryTrajectoryState, end).position == (0.0, 1.0))
+        )
+        found = call(name, QueryTrajectoryState, middle)
+        self.assertEqual(found.name, EFFORT[::-1])
+        self.assertAlmostEqual(found.position[1], 0.5, places=6)
+        self.assertAlmostEqual(found.velocity[1], 1.875, places=6)
+
+    # pause, reset, unload
+
+    def test_a_goal_sent_while_paused_begins_with_time(self):
+        arm = self.arm()
+        pursuit = arm.pursue(trajectory(EFFORT, (0.3, [0.1, 0.1])))
+        self.assertTrue(pursuit.wait_active())
+        statuses = []
+        listener = rospy.Subscriber(
+            "/slides/effort_arm/follow_joint_trajectory/status", GoalStatusArray, statuses.append
+        )
+        self.assertTrue(wait_until(lambda: len(statuses) > 3), "no status while paused")
+        listener.unregister()
+        unpause()
+        self.check(pursuit, "SUCCEEDED", "SUCCEEDED")
+
+    def test_it_works_after_reset_simulation(self):
+        arm = self.arm()
+        unpause()
+        self.check(arm.pursue(trajectory(EFFORT, (0.3, [0.5, 0.5]))), "SUCCEEDED", "SUCCEEDED")
+        # A cancel request with a stamp, which after the reset lies in the future.
+        later = rospy.Time.now() + rospy.Duration(100)
+        cancel = arm.action.action_client.pub_cancel
+        pursuit = arm.pursue(trajectory(EFFORT, (5.0, [1.0, 1.0])))
+        self.assertTrue(pursuit.wait_active())
+        call("/gazebo/reset_simulation", Empty)
+        self.check(pursuit, "PREEMPTED", "SUCCEEDED", "began anew")
+        cancel.publish(GoalID(stamp=later))
+        arm.states.clear()
+        self.assertTrue(wait_until(lambda: len(arm.states) > 5))
+        self.assertLess(arm.states[-1].header.stamp.to_sec(), 5.0)
+        self.assertEqual(arm.states[-1].desired.positions, (0.0, 0.0))
+        self.check(arm.pursue(trajectory(EFFORT, (0.3, [0.2, 0.2]))), "SUCCEEDED", "SUCCEEDED")
+
+    def test_many_goals_over_many_resets_leave_no_list_of_them(self):
+        arm = self.arm()
+        statuses = []
+        listener = rospy.Subscriber(
+            "/slides/effort_arm/follow_joint_trajectory/status", GoalStatusArray, statuses.append
+        )
+        for _ in range(120):
+            plan = trajectory(["elbow"], (1.0, [0.0]))
+            self.check(arm.pursue(plan), "REJECTED", "INVALID_JOINTS")
+            call("/gazebo/reset_simulation", Empty)
+        self.assertTrue(wait_until(lambda: statuses and len(statuses[-1].status_list) <= 101))
+        # Five seconds of wall time later nothing of them is told any more, though time stands still.
+        self.assertTrue(wait_until(lambda: not statuses[-1].status_list))
+        listener.unregister()
+
+    def test_unloading_with_a_goal_tells_its_end_and_takes_everything_away(self):
+        for round_ in range(3):  # reload must work
+            with self.subTest(round_):
+                arm = self.arm()
+                action = {f"/slides/effort_arm/follow_joint_trajectory/{name}" for name in ACTION}
+                self.assertLessEqual(action, topics_below("/slides/effort_arm"))
+                unpause()
+                pursuit = arm.pursue(trajectory(EFFORT, (5.0, [1.0, 1.0])))
+                self.assertTrue(pursuit.wait_active())
+                self.assertTrue(self.manager.reload(True))
+                self.check(pursuit, "PREEMPTED", "SUCCEEDED", "stopped")
+                self.arms.remove(arm)
+                arm.close()
+                self.assertTrue(wait_until(lambda: not topics_below("/slides/effort_arm")))
+                self.assertFalse(
+                    [
+                        s
+                        for s in rosnode.get_node_info_description("/gazebo").split()
+                        if "effort_arm" in s
+                    ]
+                )
+                pause()
+
+    def test_stopping_ends_the_goal_and_starting_begins_where_the_joints_are(self):
+        arm = self.arm()
+        unpause()
+        pursuit = arm.pursue(trajectory(EFFORT, (5.0, [1.0, 1.0])))
+        self.assertTrue(wait_until(lambda: position("effort_a") > 0.01))
+        self.assertTrue(self.manager.switch([], ["effort_arm"], STRICT))
+        self.check(pursuit, "PREEMPTED", "SUCCEEDED", "stopped")
+        self.assertTrue(self.manager.unload("effort_arm"))
+        self.assertTrue(self.manager.load("effort_arm"))
+        self.assertTrue(self.manager.switch(["effort_arm"], [], STRICT))
+        arm.states.clear()
+        self.assertTrue(arm.wait_connected())
+        self.assertTrue(wait_until(lambda: len(arm.states) > 2))
+        self.assertGreater(arm.states[-1].desired.positions[1], 0.005)
+
+    def test_deleting_the_robot_ends_the_goal(self):
+        arm = self.arm()
+        unpause()
+        pursuit = arm.pursue(trajectory(EFFORT, (5.0, [1.0, 1.0])))
+        self.assertTrue(pursuit.wait_active())
+        call("/gazebo/delete_model", DeleteModel, "slides")
+        self.check(pursuit, "PREEMPTED", "SUCCEEDED", "stopped")
+
+
+if __name__ == "__main__":
+    rospy.init_node("trajectory_test")
+    rospy.wait_for_service("/gazebo/spawn_urdf_model", BOUND)
+    rostest.rosrun("cartpole", "trajectory", TrajectoryTest)
