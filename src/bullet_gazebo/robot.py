@@ -1,6 +1,6 @@
 """A controlled robot: the seam between a model of the physics world and its ros_control hardware."""
 
-import math
+from math import ceil, isfinite
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
@@ -41,7 +41,7 @@ class Robot:
                 f"model '{model.name}' has no joint {missing}, which a transmission names"
             )
         self._joints = [(joint, indices[name]) for name, joint in hardware.joints.items()]
-        self._effort_joints = [(joint, indices[joint.name]) for joint in hardware.effort_joints]
+        self._effort_joints = [(j, enforce, indices[j.name]) for j, enforce in hardware.enforcers]
         self._drives = [(drive, indices[drive.joint.name]) for drive in hardware.drives]
         self._efforts = [0.0] * len(indices)
         self.read()
@@ -65,32 +65,41 @@ class Robot:
 
     def _update_in_time(self, now: int, step: int) -> None:
         """The control period is a whole number of steps, and always the nominal one."""
-        period = max(1, math.ceil(self._control_period / step)) * step
+        period = max(1, ceil(self._control_period / step)) * step
         self._waited = period if self._waited is None else self._waited + step
         if self._waited >= period:
             self._waited = 0
             self.manager.update(now, period / NANOSECONDS)
 
     def write(self, dt: float) -> None:
-        """Clips the commands to the joints' limits and applies them for the next step of `dt` [s]."""
-        hardware = self.hardware
-        hardware.enforce_limits(dt)
+        """Clips the commands to the joints' limits and applies them for the next step of `dt` [s].
+
+        Done on each step, also between control periods.
+        """
         efforts = self._efforts
-        for joint, index in self._effort_joints:
-            # A controller may command NaN; the engine would carry it into every state of the world.
-            effort = joint.command if math.isfinite(joint.command) else 0.0
-            joint.effort = effort
-            efforts[index] = effort
-        if hardware.halted:
-            for joint, index in self._effort_joints:
-                joint.effort = efforts[index] = 0.0
+        for joint, enforce, index in self._effort_joints:
+            enforce(joint)
+            effort = joint.command
+            if not isfinite(effort):  # the engine would carry it into every state of the world
+                effort = 0.0
+            joint.effort = efforts[index] = effort
+        if self.hardware.halted:
+            self._halt()
         if self._drives:
             self._drive(dt)
         self.model.body.apply_efforts(efforts)
 
+    def _halt(self) -> None:
+        """What an emergency stop leaves of the commands (gazebo_api.md section 6.7)."""
+        for joint, _, index in self._effort_joints:
+            joint.effort = self._efforts[index] = 0.0
+        for drive, _ in self._drives:
+            drive.hold()
+
     def _drive(self, dt: float) -> None:
         """Moves the joints with position and velocity interfaces."""
         for drive, index in self._drives:
+            drive.limit(dt)
             if drive.pid is not None:
                 drive.joint.effort = self._efforts[index] = drive.effort(dt)
             else:

@@ -80,7 +80,9 @@ def test_soft_limits_brake_before_the_end():
 
 
 def test_without_limits_nothing_is_enforced():
-    assert effort_enforcer(JointLimits()) is None
+    joint = JointHandle("j", "prismatic", command=1e9)
+    effort_enforcer(joint.limits)(joint)
+    assert joint.command == 1e9
 
 
 def test_the_description_gives_joints_limits_and_transmissions():

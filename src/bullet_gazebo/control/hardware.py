@@ -20,7 +20,7 @@ class RobotHardware:
     """The joints that have a transmission (contract: gazebo_api.md sections 6.3 and 6.4).
 
     `joints` is in alphabetical order, the order of joint states. `effort_joints` take their command
-    for an effort; `drives` are the others.
+    for an effort, once their `enforcers` have clipped it; `drives` are the others.
     """
 
     def __init__(
@@ -42,11 +42,9 @@ class RobotHardware:
         self.effort_joints = self._of(EFFORT)
         self.drives = self._drives(gains or {})
         self.halted = False
-        self._enforcers: list[tuple[Enforcer, JointHandle]] = []
-        for joint in self.effort_joints:
-            enforce = effort_enforcer(joint.limits)
-            if enforce is not None:
-                self._enforcers.append((enforce, joint))
+        self.enforcers: list[tuple[JointHandle, Enforcer]] = [
+            (joint, effort_enforcer(joint.limits)) for joint in self.effort_joints
+        ]
 
     @property
     def pids(self) -> dict[str, Pid]:
@@ -67,15 +65,6 @@ class RobotHardware:
                 f"joint '{name}' is not in hardware_interface::{interface} (it has: {known})"
             )
         return joints[name]
-
-    def enforce_limits(self, dt: float) -> None:
-        """Clips every command in place; done on each step of `dt` [s], also between control periods."""
-        for enforce, joint in self._enforcers:
-            enforce(joint)
-        for drive in self.drives:
-            if self.halted:
-                drive.hold()
-            drive.limit(dt)
 
     def relatch(self, names: Iterable[str] | None = None) -> None:
         """Lets go of joints (default: all), or holds them where they are; what was commanded before is

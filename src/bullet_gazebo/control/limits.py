@@ -8,13 +8,17 @@ Enforcer = Callable[[JointHandle], None]
 UNLIMITED = float("inf")
 
 
-def effort_enforcer(limits: JointLimits) -> Enforcer | None:
-    """Returns what clips a joint's effort command in place on each step; None if nothing is limited."""
+def effort_enforcer(limits: JointLimits) -> Enforcer:
+    """Returns what clips a joint's effort command in place, on each step."""
     if limits.effort is None and limits.velocity is None and limits.lower is None:
-        return None
+        return _leave
     if limits.soft is not None:
         return _soft_effort(limits, limits.soft)
     return _effort_saturation(limits)
+
+
+def _leave(joint: JointHandle) -> None:
+    """For a joint without limits."""
 
 
 def _effort_saturation(limits: JointLimits) -> Enforcer:

@@ -11,12 +11,14 @@ REPORT_EVERY = 10  # updates
 class PositionLoop:
     """Holds a joint at its set-point [rad, m] (ros_control.md section 3.2)."""
 
-    __slots__ = ("joint", "pid", "set_point")
+    __slots__ = ("_compute", "_straight", "joint", "pid", "set_point")
 
     def __init__(self, joint: JointHandle, pid: Pid) -> None:
         self.joint = joint
         self.pid = pid
         self.set_point = 0.0
+        self._compute = pid.compute
+        self._straight = joint.kind == "prismatic"
 
     def hold(self) -> None:
         """Makes the joint's present position the set-point."""
@@ -27,8 +29,9 @@ class PositionLoop:
         """Commands the joint; returns the clamped set-point and the error [rad, m]."""
         joint = self.joint
         target = joint.clamped(self.set_point)
-        error = joint.way_to(target)
-        joint.command = self.pid.compute(error, dt)
+        # The short way for a rail: this runs on every tick.
+        error = target - joint.position if self._straight else joint.way_to(target)
+        joint.command = self._compute(error, dt)
         return target, error
 
 
