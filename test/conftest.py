@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import subprocess
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,17 @@ __all__ = ["pytest_collect_file"]
 collect_ignore_glob = ["ros/*.py"]
 
 ROOT = Path(__file__).resolve().parent.parent
+
+
+ENGINES = ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
+
+
+@pytest.fixture(params=ENGINES)
+def new_engine(request: pytest.FixtureRequest) -> Callable:
+    """Makes a physics engine; a test that asks for it runs with each of them."""
+    from bullet_gazebo.physics.engines import make_engine
+
+    return partial(make_engine, request.param)
 
 
 @pytest.fixture(scope="session")

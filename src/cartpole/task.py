@@ -1,10 +1,13 @@
-"""The balancing task: observation, reward, end of an episode, initial state.
+"""What is to be learned: observation, reward, end of an episode, initial state, and what an action does.
 
-Knows neither ROS nor a simulator nor a learner; every environment runs this same task.
+Knows neither ROS nor a simulator nor a learner; every environment runs these same tasks.
 """
 
-from typing import NamedTuple
+import math
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar, NamedTuple
 
+import gymnasium
 import numpy as np
 
 ANGLE_LIMIT = 0.20943951023  # [rad], 12 degrees
@@ -13,6 +16,7 @@ SET_POINT_STEP = 0.02  # [m] that one action moves the cart's set-point
 MAX_STEPS = 3000
 ALIVE_REWARD = 0.5
 FALL_PENALTY = 10.0
+_ANY = float(np.finfo(np.float32).max)
 
 
 class CartPoleState(NamedTuple):
@@ -24,21 +28,25 @@ class CartPoleState(NamedTuple):
     pole_velocity: float  # [rad/s]
 
 
-class BalanceTask:
-    """Keep the pole up and the cart near the middle, by nudging the cart's set-point.
+class Task(ABC):
+    """One thing to learn on the cart-pole.
 
-    Action 0 moves the set-point by -0.02 m, action 1 by +0.02 m; set-points add up over an
-    episode, starting from where the cart stands. The reward of a step is
-    0.5 + |pole angle| - |cart position|, and 10 less for the step that ends the episode by
-    leaving +-0.4 m or +-12 degrees.
+    Actions move the set-point of the cart's position controller. Set-points add up over an
+    episode, starting from where the cart stands.
 
     Args:
-        noise: half-width of the uniform initial position [m] and angle [rad]; 0 starts every
-            episode upright at the origin.
+        noise: half-width of what is drawn uniformly for the initial state; 0 starts every episode
+            alike.
         max_steps: length at which an episode is cut off.
+
+    Raises:
+        ValueError: if noise or max_steps make no sense.
     """
 
-    def __init__(self, noise: float = 0.0, max_steps: int = MAX_STEPS) -> None:
+    stand_height: ClassVar[float] = 0.0  # [m] above the ground, for the pole to clear it
+    start: ClassVar[CartPoleState] = CartPoleState(0.0, 0.0, 0.0, 0.0)
+
+    def __init__(self, noise: float, max_steps: int) -> None:
         if not 0.0 <= noise < ANGLE_LIMIT:
             raise ValueError(f"noise must lie in [0, {ANGLE_LIMIT}), not {noise}")
         if max_steps < 1:
@@ -46,16 +54,76 @@ class BalanceTask:
         self.noise = noise
         self.max_steps = max_steps
 
+    @abstractmethod
+    def action_space(self) -> gymnasium.Space[Any]:
+        """A new space of the actions."""
+
+    @abstractmethod
+    def observation_space(self) -> gymnasium.spaces.Box:
+        """A new space of the observations."""
+
+    def initial_state(self, rng: np.random.Generator) -> CartPoleState:
+        """Draws where an episode starts: `start`, and up to `noise` [m, m/s, rad, rad/s] off it."""
+        offsets = rng.uniform(-self.noise, self.noise, size=4)
+        return CartPoleState(
+            *(float(value + offset) for value, offset in zip(self.start, offsets, strict=True))
+        )
+
+    @abstractmethod
+    def next_set_point(self, set_point: float, action: Any) -> float:
+        """Moves the cart's set-point [m] as the action says; ValueError if it is none."""
+
+    @abstractmethod
+    def observation(self, state: CartPoleState) -> np.ndarray:
+        """The state as the learner sees it; a new array."""
+
+    @abstractmethod
+    def is_terminal(self, state: CartPoleState) -> bool:
+        """Whether the state ends the episode."""
+
+    def is_truncated(self, steps: int) -> bool:
+        """Whether an episode of that many steps is cut off."""
+        return steps >= self.max_steps
+
+    @abstractmethod
+    def reward(self, state: CartPoleState) -> float:
+        """The reward for arriving in a state."""
+
+
+class BalanceTask(Task):
+    """Keep the pole up and the cart near the middle, by nudging the cart's set-point.
+
+    Action 0 moves the set-point by -0.02 m, action 1 by +0.02 m. The reward of a step is
+    0.5 + |pole angle| - |cart position|, and 10 less for the step that ends the episode by
+    leaving +-0.4 m or +-12 degrees. The noise is of position [m] and angle [rad]; both joints
+    start at rest.
+    """
+
+    def __init__(self, noise: float = 0.0, max_steps: int = MAX_STEPS) -> None:
+        super().__init__(noise, max_steps)
+
+    def action_space(self) -> gymnasium.spaces.Discrete:
+        return gymnasium.spaces.Discrete(2)
+
+    def observation_space(self) -> gymnasium.spaces.Box:
+        """Float32, shape (4,): the state in its own order."""
+        high = np.array([2 * POSITION_LIMIT, _ANY, np.pi, _ANY], dtype=np.float32)
+        return gymnasium.spaces.Box(-high, high, dtype=np.float32)
+
     def initial_state(self, rng: np.random.Generator) -> CartPoleState:
         """Draws where an episode starts; both joints are at rest."""
         if self.noise == 0.0:
-            return CartPoleState(0.0, 0.0, 0.0, 0.0)
+            return self.start
         position, angle = rng.uniform(-self.noise, self.noise, size=2)
         return CartPoleState(float(position), 0.0, float(angle), 0.0)
 
     def next_set_point(self, set_point: float, action: int) -> float:
         """Moves the cart's set-point [m] as the action (0 or 1) says."""
-        return set_point + (SET_POINT_STEP if action == 1 else -SET_POINT_STEP)
+        if action == 1:
+            return set_point + SET_POINT_STEP
+        if action == 0:
+            return set_point - SET_POINT_STEP
+        raise ValueError(f"an action is 0 or 1, not {action!r}")
 
     def observation(self, state: CartPoleState) -> np.ndarray:
         """The state as the learner sees it: float32, shape (4,), in the state's order."""
@@ -65,11 +133,95 @@ class BalanceTask:
         """Whether the cart or the pole has left its range."""
         return abs(state.cart_position) > POSITION_LIMIT or abs(state.pole_angle) > ANGLE_LIMIT
 
-    def is_truncated(self, steps: int) -> bool:
-        """Whether an episode of that many steps is cut off."""
-        return steps >= self.max_steps
-
     def reward(self, state: CartPoleState) -> float:
         """The reward for arriving in a state."""
         reward = ALIVE_REWARD + abs(state.pole_angle) - abs(state.cart_position)
         return reward - FALL_PENALTY if self.is_terminal(state) else reward
+
+
+class ClassicTask(BalanceTask):
+    """As Gymnasium's CartPole-v1: +1 for each step, up to 500 of them.
+
+    Actions, observations and limits are BalanceTask's. Positions and velocities start within
+    +-0.05 [m, m/s, rad, rad/s]. As in CartPole-v1 the step that falls counts as well.
+    """
+
+    def __init__(self, noise: float = 0.05, max_steps: int = 500) -> None:
+        super().__init__(noise, max_steps)
+
+    def initial_state(self, rng: np.random.Generator) -> CartPoleState:
+        """Draws positions and velocities, all four from the same range."""
+        return Task.initial_state(self, rng)
+
+    def reward(self, state: CartPoleState) -> float:
+        """1, whatever the state."""
+        return 1.0
+
+
+class SwingUpTask(Task):
+    """Swing the hanging pole up and hold it there; only leaving the rail ends an episode early.
+
+    The action, shape (1,) within -1 and 1, moves the set-point by up to 0.02 m either way. The
+    reward of a step lies in [0, 1] and is the product of what dm_control's swing-up rewards:
+
+        upright   (1 + cos angle) / 2
+        centred   (1 + g(position / 0.4 m)) / 2
+        slow      (1 + g(angular velocity / 5 rad/s)) / 2
+
+    with the bell curve g(x) = 0.1 ** x², which is 0.1 at x = 1. There is no price on control.
+    The pole hangs within +-`noise` at the start, velocities too. It would hang through the
+    ground, so the stand is raised by 0.5 m.
+    """
+
+    stand_height = 0.5
+    start = CartPoleState(0.0, 0.0, math.pi, 0.0)
+    fast: ClassVar[float] = 5.0  # [rad/s]
+
+    def __init__(self, noise: float = 0.05, max_steps: int = 1250) -> None:
+        super().__init__(noise, max_steps)
+
+    def action_space(self) -> gymnasium.spaces.Box:
+        return gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float32)
+
+    def observation_space(self) -> gymnasium.spaces.Box:
+        """Float32, shape (5,): cart position and velocity, sine, cosine, pole velocity."""
+        high = np.array([2 * POSITION_LIMIT, _ANY, 1.0, 1.0, _ANY], dtype=np.float32)
+        return gymnasium.spaces.Box(-high, high, dtype=np.float32)
+
+    def next_set_point(self, set_point: float, action: np.ndarray) -> float:
+        """Moves the cart's set-point [m] by `action[0]`, which lies in [-1, 1], times 0.02 m."""
+        share = float(action[0])
+        if not -1.0 <= share <= 1.0:
+            raise ValueError(f"an action lies in [-1, 1], not {share}")
+        return set_point + SET_POINT_STEP * share
+
+    def observation(self, state: CartPoleState) -> np.ndarray:
+        """Float32, shape (5,); see `observation_space`."""
+        position, velocity, angle, rate = state
+        return np.array(
+            (position, velocity, math.sin(angle), math.cos(angle), rate), dtype=np.float32
+        )
+
+    def is_terminal(self, state: CartPoleState) -> bool:
+        """Whether the cart has left its range."""
+        return abs(state.cart_position) > POSITION_LIMIT
+
+    def reward(self, state: CartPoleState) -> float:
+        """The reward for arriving in a state."""
+        upright = (1.0 + math.cos(state.pole_angle)) / 2.0
+        centred = (1.0 + _bell(state.cart_position / POSITION_LIMIT)) / 2.0
+        slow = (1.0 + _bell(state.pole_velocity / self.fast)) / 2.0
+        return upright * centred * slow
+
+
+def _bell(x: float) -> float:
+    """1 at 0, 0.1 at 1."""
+    return 0.1 ** (x * x)
+
+
+TASKS: dict[str, type[BalanceTask] | type[SwingUpTask]] = {
+    "balance": BalanceTask,
+    "classic": ClassicTask,
+    "swing-up": SwingUpTask,
+}
+"""The tasks by name; each can be made without arguments."""

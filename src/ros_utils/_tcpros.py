@@ -1,6 +1,7 @@
-"""One service call over ROS's TCP protocol, with a time limit, under any master.
+"""Service calls over ROS's TCP protocol, each with a time limit, under any master.
 
-rospy's proxies have no time limit, and ask the process's own master even if they know the address.
+rospy's proxies have no time limit, keep a dead connection, and ask the process's own master even if they
+know the address.
 """
 
 from __future__ import annotations
@@ -16,9 +17,104 @@ import rospy
 
 from ros_utils import _master
 
+CHUNK = 65536  # [bytes]
+HEAD = struct.Struct("<BI")  # of an answer: whether the call succeeded, and its length
+LENGTH = struct.Struct("<I")
+
 
 class CallFailed(Exception):
     """The call failed; the text says why."""
+
+
+class ConnectionEnded(CallFailed):
+    """The connection broke: the other side has ended."""
+
+
+class Connection:
+    """A lasting connection to one service. Not thread-safe."""
+
+    def __init__(self, address: str, name: str, kind: Any, timeout: float) -> None:
+        """Connects to the service at a ``rosrpc://`` address; no wait is longer than `timeout` [s].
+
+        Raises:
+            CallFailed: no connection, or another type of service.
+            TimeoutError: no answer in time.
+        """
+        self._kind = kind
+        try:
+            host, port = rospy.core.parse_rosrpc_uri(address)
+            self._socket = socket.create_connection((host, port), timeout)
+            try:
+                self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._shake_hands(name)
+            except BaseException:
+                self._socket.close()
+                raise
+        except TimeoutError:
+            raise
+        except (OSError, rosgraph.network.ROSHandshakeException, rospy.ROSException) as fault:
+            raise ConnectionEnded(str(fault)) from fault
+
+    def _shake_hands(self, name: str) -> None:
+        header = {
+            "callerid": rospy.get_caller_id() or _master.CALLER,
+            "service": name,
+            "md5sum": self._kind._md5sum,
+            "type": self._kind._type,
+            "persistent": "1",
+        }
+        rosgraph.network.write_ros_handshake_header(self._socket, header)
+        answer = rosgraph.network.read_ros_handshake_header(self._socket, io.BytesIO(), CHUNK)
+        if "error" in answer:
+            raise CallFailed(answer["error"])
+
+    def call(self, message: genpy.Message) -> Any:
+        """Sends a request and returns the response.
+
+        Raises:
+            CallFailed: the service failed; ConnectionEnded: there is no connection any more.
+            TimeoutError: no answer in time; the connection is of no use afterwards.
+        """
+        payload = _serialized(message)
+        try:
+            self._socket.sendall(payload)
+            ok, answer = self._receive()
+        except TimeoutError:
+            raise
+        except OSError as fault:
+            raise ConnectionEnded(str(fault)) from fault
+        if not ok:
+            reason = answer.decode(errors="replace") or "without a reason"
+            raise CallFailed(f"it failed: {reason}")
+        response = self._kind._response_class()
+        try:
+            response.deserialize(answer)
+        except genpy.DeserializationError as fault:
+            raise CallFailed(f"its answer can't be read: {fault}") from fault
+        return response
+
+    def _receive(self) -> tuple[bool, bytes]:
+        """Reads one answer; most come in one piece."""
+        data = self._more()
+        while len(data) < HEAD.size:
+            data += self._more()
+        ok, length = HEAD.unpack_from(data)
+        if len(data) == HEAD.size + length:
+            return bool(ok), data[HEAD.size :]
+        whole = bytearray(data)
+        while len(whole) < HEAD.size + length:
+            whole += self._more()
+        return bool(ok), bytes(whole[HEAD.size :])
+
+    def _more(self) -> bytes:
+        part = self._socket.recv(CHUNK)
+        if not part:
+            raise ConnectionError("the connection ended before the answer")
+        return part
+
+    def close(self) -> None:
+        """Ends the connection."""
+        self._socket.close()
 
 
 def call(address: str, name: str, kind: Any, request: tuple[Any, ...], timeout: float) -> Any:
@@ -28,59 +124,33 @@ def call(address: str, name: str, kind: Any, request: tuple[Any, ...], timeout: 
         CallFailed: no connection, another type of service, or the service failed.
         TimeoutError: an answer didn't come within `timeout` [s].
     """
-    payload = _serialized(kind._request_class, request)
+    message = request_message(kind, request)
+    connection = Connection(address, name, kind, timeout)
     try:
-        host, port = rospy.core.parse_rosrpc_uri(address)
-        with socket.create_connection((host, port), timeout) as connection:
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            _shake_hands(connection, name, kind)
-            connection.sendall(payload)
-            (ok,) = _read(connection, 1)
-            (length,) = struct.unpack("<I", _read(connection, 4))
-            answer = _read(connection, length)
-    except TimeoutError:
-        raise
-    except (OSError, rosgraph.network.ROSHandshakeException, rospy.ROSException) as fault:
-        raise CallFailed(str(fault)) from fault
-    if not ok:
-        raise CallFailed(f"it failed: {answer.decode(errors='replace') or 'without a reason'}")
-    response = kind._response_class()
-    try:
-        response.deserialize(answer)
-    except genpy.DeserializationError as fault:
-        raise CallFailed(f"its answer can't be read: {fault}") from fault
-    return response
+        return connection.call(message)
+    finally:
+        connection.close()
 
 
-def _serialized(kind: Any, request: tuple[Any, ...]) -> bytes:
+def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
+    """The request, given as such or by its fields in order.
+
+    Raises:
+        CallFailed: if the fields are not the request's.
+    """
+    try:
+        return rospy.msg.args_kwds_to_message(kind._request_class, request, {})
+    except TypeError as fault:
+        raise CallFailed(f"the request can't be sent: {fault}") from fault
+
+
+def _serialized(message: genpy.Message) -> bytes:
     """The request with its length in front."""
+    buffer = io.BytesIO()
+    buffer.write(LENGTH.pack(0))
     try:
-        message = rospy.msg.args_kwds_to_message(kind, request, {})
-        buffer = io.BytesIO()
         message.serialize(buffer)
     except (TypeError, genpy.SerializationError, struct.error) as fault:
         raise CallFailed(f"the request can't be sent: {fault}") from fault
-    return struct.pack("<I", buffer.tell()) + buffer.getvalue()
-
-
-def _shake_hands(connection: socket.socket, name: str, kind: Any) -> None:
-    header = {
-        "callerid": rospy.get_caller_id() or _master.CALLER,
-        "service": name,
-        "md5sum": kind._md5sum,
-        "type": kind._type,
-    }
-    rosgraph.network.write_ros_handshake_header(connection, header)
-    answer = rosgraph.network.read_ros_handshake_header(connection, io.BytesIO(), 65536)
-    if "error" in answer:
-        raise CallFailed(answer["error"])
-
-
-def _read(connection: socket.socket, count: int) -> bytes:
-    data = bytearray()
-    while len(data) < count:
-        part = connection.recv(min(65536, count - len(data)))
-        if not part:
-            raise ConnectionError("the connection ended before the answer")
-        data += part
-    return bytes(data)
+    buffer.getbuffer()[: LENGTH.size] = LENGTH.pack(buffer.tell() - LENGTH.size)
+    return buffer.getvalue()

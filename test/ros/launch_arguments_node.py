@@ -26,7 +26,7 @@ class World:
     """A world launched with arguments of the user's, on a master of its own."""
 
     def __init__(self, *args):
-        self.log = tempfile.TemporaryFile()
+        self.log = tempfile.TemporaryFile()  # noqa: SIM115 - close() does
         port = free_port()
         self._master = rosgraph.Master("/launch_arguments", f"http://localhost:{port}")
         command = ["roslaunch", "-p", str(port), "gazebo_ros", "empty_world.launch", "gui:=false", *args]

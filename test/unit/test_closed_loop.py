@@ -8,7 +8,6 @@ from scipy.integrate import solve_ivp
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.physics.bullet import BulletEngine
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.urdf import parse_urdf
 from bullet_gazebo.physics.world import World
@@ -23,9 +22,9 @@ CART = {"type": "effort_controllers/JointPositionController", "joint": "stand_ca
         "pid": {"p": P, "i": 0.01, "d": D}}  # fmt: skip
 
 
-def simulated(tick):
+def simulated(engine, tick):
     """Cart positions (n,) [m] after each tick of the simulator."""
-    sim = Simulator(World(BulletEngine(), time_step=tick), lockstep=True)
+    sim = Simulator(World(engine, time_step=tick), lockstep=True)
     model = sim.world.spawn("cartpole", parse_urdf(cartpole_urdf()), Pose())
     hardware = RobotHardware(read_description(cartpole_urdf()))
     manager = ControllerManager(hardware)
@@ -63,11 +62,11 @@ def limited(force, state):
     return min(most, max(least, force))
 
 
-def difference(tick):
-    return float(np.abs(simulated(tick) - integrated(tick)).max())
+def difference(engine, tick):
+    return float(np.abs(simulated(engine, tick) - integrated(tick)).max())
 
 
-def test_the_closed_loop_agrees_and_the_difference_halves_with_the_step():
-    coarse, fine = difference(0.001), difference(0.0005)
+def test_the_closed_loop_agrees_and_the_difference_halves_with_the_step(new_engine):
+    coarse, fine = difference(new_engine(), 0.001), difference(new_engine(), 0.0005)
     assert coarse < 3e-4
     assert fine / coarse == pytest.approx(0.5, abs=0.1)

@@ -3,6 +3,7 @@
 import pytest
 from robots import cartpole_urdf
 
+from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
@@ -143,3 +144,83 @@ def test_moved_joints_relatch_running_controllers(manager):
     assert (cart.set_point, joint.command) == (0.5, 0.5)
     manager.joints_moved(2, relatch=True)
     assert (cart.set_point, joint.command) == (-0.1, 0.0)
+
+
+class Faulty(Controller):
+    """Raises where it is told to."""
+
+    type_name = "test/Faulty"
+    interface = "EffortJointInterface"
+
+    def __init__(self, name, where):
+        super().__init__(name)
+        self.where = where
+        self.calls = []
+
+    @classmethod
+    def create(cls, name, params, hardware):
+        if params["where"] == "create":
+            raise KeyError("create")
+        return cls(name, params["where"])
+
+    def _act(self, what):
+        self.calls.append(what)
+        if what == self.where:
+            raise ZeroDivisionError(what)
+
+    def starting(self, now):
+        self._act("starting")
+
+    def update(self, now, dt):
+        self._act("update")
+
+    def stopping(self):
+        self._act("stopping")
+
+    def joints_moved(self, now):
+        self._act("joints_moved")
+
+
+@pytest.fixture
+def faults(manager):
+    told = []
+    manager.types["test/Faulty"] = Faulty
+    manager.on_fault = lambda controller, error: told.append((controller.name, str(error)))
+    return told
+
+
+@pytest.mark.parametrize("where", ["update", "joints_moved"])
+def test_a_controller_that_raises_is_stopped_once_and_the_others_go_on(manager, faults, where):
+    faulty = manager.load("faulty", {"type": "test/Faulty", "where": where})
+    manager.switch(["faulty", "cart"], [], STRICT)
+    manager.get("cart").command(0.5)
+    for now in (1, 2):
+        manager.update(now, 0.001)
+        manager.joints_moved(now, relatch=False)
+    assert faults == [("faulty", where)]
+    assert faulty.calls[-1] == "stopping"
+    assert states(manager)["faulty"] == "stopped"
+    assert states(manager)["cart"] == "running"
+    assert manager.hardware.joints["stand_cart"].command != 0.0
+
+
+def test_a_controller_that_raises_at_its_start_is_refused_and_the_others_start(manager, faults):
+    manager.load("faulty", {"type": "test/Faulty", "where": "starting"})
+    with pytest.raises(ControlError, match=r"Could not start \['faulty'\]"):
+        manager.switch(["faulty", "cart"], [], STRICT)
+    assert (states(manager)["faulty"], states(manager)["cart"]) == ("stopped", "running")
+    assert faults == [("faulty", "starting")]
+
+
+def test_a_controller_that_raises_at_its_stop_is_stopped_all_the_same(manager, faults):
+    manager.load("faulty", {"type": "test/Faulty", "where": "stopping"})
+    manager.switch(["faulty"], [], STRICT)
+    manager.switch([], ["faulty"], STRICT)
+    assert states(manager)["faulty"] == "stopped"
+    assert faults == [("faulty", "stopping")]
+
+
+def test_a_controller_that_raises_while_it_is_made_is_refused_with_the_reason(manager, faults):
+    with pytest.raises(ControlError, match="Initializing controller 'faulty' failed: KeyError"):
+        manager.load("faulty", {"type": "test/Faulty", "where": "create"})
+    assert "faulty" not in states(manager)

@@ -11,7 +11,6 @@ from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
 from bullet_gazebo.control.limits import PositionLimiter, VelocityLimiter
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.physics.bullet import BulletEngine
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.urdf import parse_urdf
 from bullet_gazebo.physics.world import World
@@ -37,9 +36,9 @@ def lift_urdf(interface, limit='<limit lower="-1" upper="1" effort="100" velocit
 class Lift:
     """A lift in a lock-step world with one controller."""
 
-    def __init__(self, interface, controller="", params=None, gains=None, period=0.0, **urdf):
+    def __init__(self, engine, interface, controller="", params=None, gains=None, period=0.0, **urdf):
         text = lift_urdf(interface, **urdf)
-        self.sim = Simulator(World(BulletEngine()), lockstep=True)
+        self.sim = Simulator(World(engine), lockstep=True)
         self.model = self.sim.world.spawn("lift", parse_urdf(text), Pose())
         hardware = RobotHardware(read_description(text), gains)
         self.manager = ControllerManager(hardware)
@@ -60,11 +59,11 @@ class Lift:
 
 
 @pytest.fixture
-def make():
+def make(new_engine):
     lifts = []
 
     def build(*args, **kwargs):
-        lifts.append(Lift(*args, **kwargs))
+        lifts.append(Lift(new_engine(), *args, **kwargs))
         return lifts[-1]
 
     yield build

@@ -7,28 +7,27 @@ import pytest
 from robots import CartPole, cartpole_urdf
 from scipy.integrate import solve_ivp
 
-from bullet_gazebo.physics.bullet import BulletEngine
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.urdf import parse_urdf
 from bullet_gazebo.physics.world import NameTaken, World, ground_plane
 
 
-def make_world(step=0.001, **kwargs):
-    world = World(BulletEngine(), time_step=step, **kwargs)
+def make_world(engine, step=0.001, **kwargs):
+    world = World(engine, time_step=step, **kwargs)
     world.spawn("ground_plane", ground_plane(), Pose())
     return world, world.spawn("cartpole", parse_urdf(cartpole_urdf()), Pose())
 
 
 @pytest.fixture
-def cartpole():
-    world, model = make_world()
+def cartpole(new_engine):
+    world, model = make_world(new_engine())
     yield world, model
     world.close()
 
 
-def pole_angle(step, times):
+def pole_angle(engine, step, times):
     """Angles [rad] of a pole released at 0.1 rad above a free cart."""
-    world, model = make_world(step)
+    world, model = make_world(engine, step)
     model.set_joint_positions({"cart_pole": 0.1})
     angles, ticks = [], 0
     for time in times:
@@ -49,17 +48,18 @@ def ode_angle(times):
     return solution.y[2]
 
 
-def test_a_released_pole_falls_as_the_equations_of_motion_say():
-    error = np.abs(pole_angle(0.001, (0.2, 0.4)) - ode_angle((0.2, 0.4)))
+def test_a_released_pole_falls_as_the_equations_of_motion_say(new_engine):
+    error = np.abs(pole_angle(new_engine(), 0.001, (0.2, 0.4)) - ode_angle((0.2, 0.4)))
     assert error[0] < 0.001
     assert error[1] < 0.004
 
 
 @pytest.mark.parametrize("step", [0.004, 0.002, 0.001])
-def test_half_the_step_gives_half_the_error(step):
+def test_half_the_step_gives_half_the_error(new_engine, step):
     truth = ode_angle((0.2, 0.4))
-    ratio = (pole_angle(step, (0.2, 0.4)) - truth) / (pole_angle(step / 2, (0.2, 0.4)) - truth)
-    assert ratio == pytest.approx([2.0, 2.0], rel=0.05)
+    coarse = pole_angle(new_engine(), step, (0.2, 0.4)) - truth
+    fine = pole_angle(new_engine(), step / 2, (0.2, 0.4)) - truth
+    assert coarse / fine == pytest.approx([2.0, 2.0], rel=0.05)
 
 
 @pytest.mark.parametrize("angle", [-2.5, -0.7, 0.0, 0.3, 1.2, math.pi / 2])
@@ -79,9 +79,9 @@ def test_one_step_has_the_acceleration_of_the_equations_of_motion(cartpole, angl
     assert got == pytest.approx([wanted[1], wanted[3]], rel=1e-6, abs=1e-6)
 
 
-def test_a_free_swing_keeps_its_energy():
+def test_a_free_swing_keeps_its_energy(new_engine):
     """Semi-implicit Euler: the energy swings with the step, but doesn't drift."""
-    world, model = make_world(0.0005)
+    world, model = make_world(new_engine(), 0.0005)
     robot = CartPole()
     model.set_joint_positions(
         {"cart_pole": math.pi - 0.5}
@@ -171,8 +171,8 @@ BOX = """<robot name="box"><link name="body"><inertial><origin xyz="0.1 0 0.2" r
 </link></robot>"""
 
 
-def test_a_free_body_is_where_it_was_put_and_moves_as_told():
-    world = World(BulletEngine(), gravity=(0.0, 0.0, 0.0))
+def test_a_free_body_is_where_it_was_put_and_moves_as_told(new_engine):
+    world = World(new_engine(), gravity=(0.0, 0.0, 0.0))
     start = Pose((1.0, 2.0, 3.0), (0.0, 0.0, math.sin(0.4), math.cos(0.4)))
     model = world.spawn("box", parse_urdf(BOX), start)
     pose, _ = model.state()
@@ -187,8 +187,8 @@ def test_a_free_body_is_where_it_was_put_and_moves_as_told():
     world.close()
 
 
-def test_a_free_body_falls_with_g():
-    world = World(BulletEngine())
+def test_a_free_body_falls_with_g(new_engine):
+    world = World(new_engine())
     model = world.spawn("box", parse_urdf(BOX), Pose((0.0, 0.0, 10.0)))
     for _ in range(1000):
         world.step()

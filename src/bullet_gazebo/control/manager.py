@@ -164,6 +164,7 @@ class ControllerManager:
         try:
             controller.starting(self._now)
         except Exception as error:  # noqa: BLE001 - a user's code must not stop the world
+            controller.state = STOPPED
             self._fail(controller, error)
             return False
         controller.state = RUNNING
@@ -178,7 +179,8 @@ class ControllerManager:
 
     def _fail(self, controller: Controller, error: Exception) -> None:
         """Stops a controller that raised, and lets go of its joints."""
-        controller.state = STOPPED
+        if controller.state == RUNNING:
+            self._stop(controller)
         # A new list: the old one may be in use by the update that is going on.
         self._running = [c for c in self._running if c is not controller]
         self.hardware.relatch(controller.claimed)

@@ -2,6 +2,7 @@
 
 from typing import Protocol
 
+from cartpole.envs.variation import Variation
 from cartpole.task import CartPoleState
 
 CONTROL_PERIOD = 0.008  # [s] of simulated time for each action
@@ -12,11 +13,18 @@ class Plant(Protocol):
     """A cart-pole robot whose cart follows a position set-point."""
 
     def reset(self, state: CartPoleState) -> CartPoleState:
-        """Puts both joints where the state says, at rest; returns the state reached."""
+        """Puts both joints where the state says; returns the state reached.
+
+        A plant that can't set velocities puts them at rest, and says so in what it returns.
+        """
         ...
 
     def act(self, set_point: float) -> CartPoleState:
         """Commands the cart to a set-point [m]; returns the state one control period later."""
+        ...
+
+    def vary(self, variation: Variation) -> None:
+        """Gives the robot other masses, lengths and friction; to be called before a reset."""
         ...
 
     def close(self) -> None:
@@ -32,7 +40,8 @@ def ticks_per_action(
     Raises:
         ValueError: if the period isn't a whole number of steps.
     """
-    ticks = round(control_period / physics_step)
+    ratio = control_period / physics_step
+    ticks = round(ratio) if 0.0 < ratio < 1e6 else 0  # also for NaN
     if ticks < 1 or abs(ticks * physics_step - control_period) > 1e-9:
         raise ValueError(
             f"control period {control_period} s is no multiple of the physics step {physics_step} s"

@@ -1,0 +1,122 @@
+"""Moving a world in lock-step from Python: a client for `/gazebo/step_world` (srv/StepWorld.srv).
+
+    client = StepClient()
+    client.reset({"cart_pole": 0.1}, {"cart_pole": -0.5})
+    state = client.step(8, {"stand_cart_position_controller": 0.02})
+    state.joint_states.position, state.sim_time
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cartpole.srv import StepWorld, StepWorldRequest, StepWorldResponse
+from ros_utils.service_client import ServiceClient, ServiceFailed, ServiceGone
+
+STEP_SERVICE = "/gazebo/step_world"
+TIMEOUT = 10.0  # [s] of wall time
+Commands = Mapping[str, float | Sequence[float]]
+
+
+class StepRefused(ServiceFailed):
+    """The simulator didn't do what was asked for, and nothing has changed; the text says why."""
+
+
+class StepClient:
+    """Steps a world over a lasting connection, which is renewed after a restart of the simulator.
+
+    No call takes longer than `timeout` [s] of wall time and the time of its steps. Errors are those of
+    ros_utils.service_client (ServiceGone, ServiceHangs, ServiceFailed), and StepRefused.
+    """
+
+    def __init__(self, service: str = STEP_SERVICE, timeout: float = TIMEOUT) -> None:
+        self._call = ServiceClient(service, StepWorld, persistent=True, timeout=timeout)
+
+    def step(
+        self,
+        ticks: int,
+        commands: Commands | None = None,
+        *,
+        joint_commands: Mapping[str, float] | None = None,
+        model_states: bool = False,
+    ) -> StepWorldResponse:
+        """Commands controllers and joints, and lets `ticks` physics steps pass.
+
+        Args:
+            ticks: at least 1.
+            commands: for controllers by name: a number, or as many as a group has joints
+                [m, rad, m/s, rad/s, N, N m].
+            joint_commands: for joints that no running controller has.
+            model_states: ask for the models' poses and twists, too.
+        """
+        request = _request(ticks, commands or {}, joint_commands or {}, model_states)
+        return self._answer(request)
+
+    def reset(
+        self,
+        positions: Mapping[str, float] | None = None,
+        velocities: Mapping[str, float] | None = None,
+        *,
+        seed: int = 0,
+        everything: bool = False,
+        ticks: int = 0,
+        commands: Commands | None = None,
+        model_states: bool = False,
+    ) -> StepWorldResponse:
+        """Resets the world, and begins an episode from a defined state.
+
+        Args:
+            positions: joints to place [rad, m]. Those that aren't named stay, or go to 0 with
+                `everything`.
+            velocities: of the joints that are placed [rad/s, m/s]; the others rest.
+            seed: for the simulator's random numbers; 0 leaves them.
+            everything: as reset_simulation, time begins at 0; else as reset_world, it goes on.
+            ticks, commands, model_states: as for `step`; no step unless asked for.
+        """
+        positions = positions or {}
+        missing = sorted(set(velocities or {}) - set(positions))
+        if missing:
+            raise StepRefused(f"velocities without positions: {missing}")
+        request = _request(ticks, commands or {}, {}, model_states)
+        request.reset = StepWorldRequest.SIMULATION if everything else StepWorldRequest.WORLD
+        request.seed = seed
+        request.joints = list(positions)
+        request.positions = list(positions.values())
+        request.velocities = [(velocities or {}).get(name, 0.0) for name in positions]
+        return self._answer(request, again=True)
+
+    def send(self, request: StepWorldRequest) -> StepWorldResponse:
+        """Sends a request as it is: the fast way for whoever keeps one and changes its fields."""
+        return self._answer(request)
+
+    def _answer(self, request: StepWorldRequest, again: bool = False) -> StepWorldResponse:
+        try:
+            response: Any = self._call(request)
+        except ServiceGone:
+            if not again:
+                raise
+            response = self._call(request)  # a reset may meet the connection to the last simulator
+        if not response.success:
+            raise StepRefused(response.status_message)
+        return response
+
+    def close(self) -> None:
+        """Gives the connection up; the next call makes a new one."""
+        self._call.close()
+
+
+def _request(
+    ticks: int, commands: Commands, joint_commands: Mapping[str, float], model_states: bool
+) -> StepWorldRequest:
+    values: list[float] = []
+    for command in commands.values():
+        values += command if isinstance(command, Sequence) else [command]
+    return StepWorldRequest(
+        ticks=ticks,
+        controllers=list(commands),
+        commands=values,
+        commanded_joints=list(joint_commands),
+        joint_commands=list(joint_commands.values()),
+        model_states=model_states,
+    )
