@@ -1,0 +1,143 @@
+#!/usr/bin/env python3
+"""StepClient against simulators that are there, restarted, stopped, and full of robots."""
+
+import os
+import signal
+import time
+import unittest
+import xmlrpc.client
+
+import rosgraph
+import rostest
+
+from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
+from ros_utils.service_client import ServiceFailed, ServiceGone, ServiceHangs
+from ros_utils.simulation import Simulation, reserved_port
+from ros_utils.step_client import StepClient, StepRefused
+
+CART = "stand_cart_position_controller"
+ROBOTS = ("left", "right")
+
+
+def add_cartpole(name="cartpole", namespace="/", pos_y=0.0):
+    assert ros_urdf.urdf_load_from_pkg(
+        "cartpole_gazebo", "cartpole_v1.urdf", "robot_description", folder="/robots", ns=namespace
+    )
+    assert ros_params.ros_load_yaml_from_pkg(
+        "cartpole_controller", "joint_position_control.yaml", ns=namespace
+    )
+    assert ros_gazebo.gazebo_spawn_urdf_param(
+        "robot_description", model_name=name, robot_namespace=namespace, pos_y=pos_y
+    )[0]
+    assert ros_controllers.spawn_controllers_srv([CART], ns=namespace)
+
+
+def positions(response):
+    return dict(zip(response.joint_states.name, response.joint_states.position, strict=True))
+
+
+class StepClientTest(unittest.TestCase):
+    def simulate(self, **arguments):
+        simulation = Simulation(lockstep=True, **arguments)
+        self.addCleanup(simulation.close)
+        return simulation
+
+    def client(self, **arguments):
+        client = StepClient(**arguments)
+        self.addCleanup(client.close)
+        return client
+
+    def test_an_episode(self):
+        with self.simulate().active():
+            add_cartpole()
+            client = self.client()
+            runs = []
+            for _ in range(2):
+                first = client.reset({"cart_pole": 0.1, "stand_cart": 0.05}, {"cart_pole": -0.5})
+                self.assertEqual(first.joint_states.position, (0.1, 0.05))
+                self.assertEqual(first.joint_states.velocity, (-0.5, 0.0))
+                runs.append([client.step(8, {CART: 0.02 * n}).joint_states.position for n in range(20)])
+            self.assertEqual(runs[0], runs[1])
+            self.assertEqual(client.reset(everything=True).sim_time, 0.0)
+            self.assertEqual(client.step(8, model_states=True).model_names, ["ground_plane", "cartpole"])
+
+    def test_what_is_refused(self):
+        with self.simulate().active():
+            add_cartpole()
+            client = self.client()
+            for call in (
+                lambda: client.step(0),
+                lambda: client.step(-1),
+                lambda: client.step(1, {"nobody": 1.0}),
+                lambda: client.step(1, {CART: float("nan")}),
+                lambda: client.step(1, {CART: [0.1, 0.2]}),
+                lambda: client.reset({"elbow": 0.0}),
+                lambda: client.reset({"cart_pole": float("inf")}),
+                lambda: client.reset({}, {"cart_pole": 1.0}),
+            ):
+                with self.assertRaises(StepRefused):
+                    call()
+            with self.assertRaises(ServiceFailed):
+                client.step("many")
+            self.assertEqual(client.step(1).sim_time, 0.001)
+
+    def test_several_robots_have_full_names(self):
+        with self.simulate().active():
+            for place, name in enumerate(ROBOTS):
+                add_cartpole(name, f"/{name}", pos_y=float(place))
+            client = self.client()
+            client.reset({"left::cart_pole": 0.1, "right::cart_pole": -0.1})
+            with self.assertRaisesRegex(StepRefused, "several robots have a controller"):
+                client.step(8, {CART: 0.1})
+            found = positions(client.step(200, {f"/left/{CART}": 0.1, f"/right/{CART}": -0.1}))
+            self.assertEqual(len(found), 4)
+            self.assertAlmostEqual(found["left::stand_cart"], -found["right::stand_cart"], places=12)
+            self.assertGreater(found["left::stand_cart"], 0.05)
+
+    def test_a_restarted_simulator_is_found_again(self):
+        port = reserved_port()
+        client = None
+        for _ in range(2):
+            simulation = self.simulate(port=port)
+            with simulation.active():
+                add_cartpole()
+                if client is None:
+                    client = self.client()
+                self.assertEqual(client.reset({"cart_pole": 0.1}).joint_states.position[0], 0.1)
+                client.step(8, {CART: 0.1})
+                simulation.close()
+                with self.assertRaises(ServiceGone):
+                    client.step(8, {CART: 0.1})
+
+    def test_a_simulator_that_hangs_is_an_error_in_time(self):
+        simulation = self.simulate()
+        with simulation.active():
+            add_cartpole()
+            client = self.client(timeout=1.0)
+            client.step(1)
+            process = simulator_process(simulation.master_uri)
+            os.kill(process, signal.SIGSTOP)
+            self.addCleanup(os.kill, process, signal.SIGCONT)  # before the simulation is closed
+            begin = time.monotonic()
+            with self.assertRaises(ServiceHangs):
+                client.step(1)
+            self.assertLess(time.monotonic() - begin, 5.0)
+
+    def test_the_world_survives_a_client_that_goes_in_the_middle(self):
+        with self.simulate().active():
+            add_cartpole()
+            gone = self.client()
+            gone.step(100, {CART: 0.1})
+            gone.close()
+            client = self.client()
+            self.assertAlmostEqual(client.step(1).sim_time, 0.101, places=9)
+
+
+def simulator_process(master_uri):
+    """Process id of the simulator under a master."""
+    uri = rosgraph.Master("/step_client", master_uri).lookupNode("/gazebo")
+    return xmlrpc.client.ServerProxy(uri).getPid("/step_client")[2]
+
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "step_client", StepClientTest)
