@@ -6,18 +6,14 @@
 Runs simulators on masters of its own, prints a table and writes interface.json.
 """
 
-import argparse
-import datetime
-import json
 import os
-import platform
 import statistics
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
+import reporting
 import rospy
 from gazebo_msgs.srv import GetWorldProperties, SetModelConfiguration
 from std_srvs.srv import Empty
@@ -132,11 +128,7 @@ def summary(values: list[float]) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("runs/benchmark"))
-    parser.add_argument("--launches", type=int, default=3)
-    parser.add_argument("--calls", type=int, default=2000)
-    options = parser.parse_args()
+    options = reporting.options(__doc__ or "", launches=3, calls=2000)
     results = {
         name: summary(values) for name, values in measure(options.launches, options.calls).items()
     }
@@ -144,16 +136,7 @@ def main() -> None:
     for name, values in results.items():
         target = " / ".join(f"{each:g}" for each in TARGETS[name] if each is not None)
         print(f"{name:52}{values['median']:10.3f}{values['p99']:10.3f}{target:>16}")
-    options.out.mkdir(parents=True, exist_ok=True)
-    record = {
-        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}",
-        "unit": "ms",
-        "results": results,
-    }
-    path = options.out / "interface.json"
-    path.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
-    print(path)
+    reporting.write(options.out, "interface", {"unit": "ms", **results})
 
 
 if __name__ == "__main__":

@@ -7,14 +7,11 @@ All figures of a round are taken one after the other, so that ratios are of one 
 median round. Prints a table and writes ticks.json.
 """
 
-import argparse
-import datetime
-import json
-import platform
 import statistics
 import time
 from collections.abc import Callable
-from pathlib import Path
+
+import reporting
 
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.description import read_description
@@ -104,11 +101,7 @@ def measure(urdf: str, count: int, rounds: int) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("runs"), help="folder for ticks.json")
-    parser.add_argument("--ticks", type=int, default=20_000)
-    parser.add_argument("--rounds", type=int, default=9)
-    options = parser.parse_args()
+    options = reporting.options(__doc__ or "", ticks=20_000, rounds=9)
     urdf = ros_urdf.urdf_parse_from_pkg("cartpole_gazebo", "cartpole_v1.urdf", "/robots") or ""
     costs = measure(urdf, options.ticks, options.rounds)
     bare = costs["bare step"]
@@ -118,10 +111,7 @@ def main() -> None:
     share = bare / costs["tick with two controllers"]
     print(f"ticks a second with two controllers: {1e6 / costs['tick with two controllers']:,.0f}, "
           f"{share:.0%} of bare steps (target {SHARE:.0%})")  # fmt: skip
-    options.out.mkdir(parents=True, exist_ok=True)
-    record = {"date": datetime.date.today().isoformat(), "machine": platform.platform(),
-              "python": platform.python_version(), "microseconds": costs, "share": share}  # fmt: skip
-    (options.out / "ticks.json").write_text(json.dumps(record, indent=2) + "\n")
+    reporting.write(options.out, "ticks", {"microseconds": costs, "share": share})
 
 
 if __name__ == "__main__":
