@@ -63,6 +63,12 @@ class Simulator:
     def paused(self) -> bool:
         return self._paused
 
+    @property
+    def outruns_the_clock(self) -> bool:
+        """Whether ticks may come faster than real time: in lock-step, step(), and beyond factor 1."""
+        rate = self.max_update_rate
+        return self.lockstep or self._paused or rate <= 0.0 or rate * self.world.time_step > 1.0001
+
     def pause(self) -> None:
         """Stops time; no step is in progress once this returns."""
         with self.lock:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from robots import CartPole, cartpole_urdf
 
-from bullet_gazebo.physics.bullet import BulletEngine
 from bullet_gazebo.physics.description import Inertia
 from bullet_gazebo.physics.mass_matrix import effective_inertias
 from bullet_gazebo.physics.model import AT_REST
@@ -35,8 +34,8 @@ UP = Pose((0.0, 0.0, 50.0))
 
 
 @pytest.fixture
-def world():
-    world = World(BulletEngine())
+def world(new_engine):
+    world = World(new_engine())
     world.spawn("ground_plane", ground_plane(), Pose())
     yield world
     world.close()

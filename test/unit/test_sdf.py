@@ -6,7 +6,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bullet_gazebo.physics.bullet import BulletEngine
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.meshes import Resources
 from bullet_gazebo.physics.pose import Pose, from_rpy, rotate
@@ -35,8 +34,8 @@ def sdf(*parts, version="1.6", name="m"):
     return f'<sdf version="{version}"><model name="{name}">{"".join(parts)}</model></sdf>'
 
 
-def spawn(text, pose=ORIGIN, gravity=(0.0, 0.0, 0.0)):
-    world = World(BulletEngine(), gravity=gravity)
+def spawn(engine, text, pose=ORIGIN, gravity=(0.0, 0.0, 0.0)):
+    world = World(engine, gravity=gravity)
     description = parse_sdf(text)
     return world, world.spawn("m", description, pose)
 
@@ -44,8 +43,8 @@ def spawn(text, pose=ORIGIN, gravity=(0.0, 0.0, 0.0)):
 COLLIDE = "<self_collide>{}</self_collide>"
 
 
-def test_a_box_comes_to_rest_on_the_ground():
-    world = World(BulletEngine())
+def test_a_box_comes_to_rest_on_the_ground(new_engine):
+    world = World(new_engine())
     world.spawn("ground_plane", ground_plane(), Pose())
     box = parse_sdf(sdf(link("b", more=BOX.format(size="0.2 0.2 0.2"))))
     model = world.spawn("box", box, Pose((0.0, 0.0, 0.5)))
@@ -58,8 +57,9 @@ def test_a_box_comes_to_rest_on_the_ground():
     world.close()
 
 
-def test_link_poses_are_the_models_and_survive_a_model_pose():
+def test_link_poses_are_the_models_and_survive_a_model_pose(new_engine):
     world, model = spawn(
+        new_engine(),
         sdf("<pose>5 0 0 0 0 0</pose>", link("a", "0 0 1 0 0 0.5"), link("b", "1 0 2 0.3 0 0"),
             joint("j", "revolute", "a", "b")),
         Pose((0.0, 1.0, 0.0)),
@@ -87,13 +87,13 @@ def frame(values):
 
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
 @given(six, six, six, st.floats(-3.0, 3.0), st.sampled_from(["revolute", "prismatic"]))
-def test_a_joint_moves_its_child_about_its_own_frame(parent, child, anchor, position, kind):
+def test_a_joint_moves_its_child_about_its_own_frame(new_engine, parent, child, anchor, position, kind):
     """For any place of links and joint the child goes where the transforms say."""
     text = sdf(
         link("a", words(parent)), link("b", words(child)),
         joint("j", kind, "a", "b", "0 0 1", f"<pose>{words(anchor)}</pose>"),
     )  # fmt: skip
-    world, model = spawn(text)
+    world, model = spawn(new_engine(), text)
     model.set_joint_positions({"j": position})
     axis = frame(child).compose(frame(anchor))
     step = (
@@ -109,8 +109,9 @@ def test_a_joint_moves_its_child_about_its_own_frame(parent, child, anchor, posi
     world.close()
 
 
-def test_a_link_off_its_joint_has_the_velocity_of_its_own_origin():
+def test_a_link_off_its_joint_has_the_velocity_of_its_own_origin(new_engine):
     world, model = spawn(
+        new_engine(),
         sdf(link("a"), link("b", "2 0 0 0 0 0"), joint("w", "fixed", "world", "a"),
             joint("j", "revolute", "a", "b", pose="<pose>-2 0 0 0 0 0</pose>"))
     )  # fmt: skip
@@ -179,8 +180,9 @@ def test_limits_dynamics_defaults_and_surfaces_are_read():
     assert (model.links["c"].collisions[0].mu, model.links["c"].gravity) == (0.3, False)
 
 
-def test_a_link_without_gravity_stays_where_it_is():
+def test_a_link_without_gravity_stays_where_it_is(new_engine):
     world, model = spawn(
+        new_engine(),
         sdf(link("a", more="<gravity>false</gravity>")), Pose((0.0, 0.0, 1.0)), (0.0, 0.0, -9.8)
     )
     for _ in range(500):
@@ -193,8 +195,9 @@ def test_a_link_without_gravity_stays_where_it_is():
     world.close()
 
 
-def test_a_model_may_stand_on_the_world_by_a_movable_joint():
+def test_a_model_may_stand_on_the_world_by_a_movable_joint(new_engine):
     world, model = spawn(
+        new_engine(),
         sdf(link("cart", "0 0 1 0 0 0"), joint("slide", "prismatic", "world", "cart", "1 0 0")),
         gravity=(0.0, 0.0, -9.8),
     )
@@ -206,8 +209,9 @@ def test_a_model_may_stand_on_the_world_by_a_movable_joint():
     world.close()
 
 
-def test_a_static_model_stands_whatever_its_links_are_joined_to():
+def test_a_static_model_stands_whatever_its_links_are_joined_to(new_engine):
     world, model = spawn(
+        new_engine(),
         sdf("<static>true</static>", link("a"), link("b", "0 0 3 0 0 0"), link("c", "1 0 0 0 0 0"),
             joint("j", "revolute", "b", "c")),
         gravity=(0.0, 0.0, -9.8),
@@ -222,11 +226,12 @@ def test_a_static_model_stands_whatever_its_links_are_joined_to():
     world.close()
 
 
-def test_a_plane_faces_where_its_normal_says():
+def test_a_plane_faces_where_its_normal_says(new_engine):
     plane = (
         '<collision name="c"><geometry><plane><normal>1 0 0</normal></plane></geometry></collision>'
     )
     world, wall = spawn(
+        new_engine(),
         sdf("<static>true</static>", f'<link name="l">{plane}</link>'),
         Pose((-1.0, 0.0, 0.0)), (-9.8, 0.0, 0.0),
     )  # fmt: skip
@@ -361,8 +366,8 @@ def pair(a="", b="", of_model=""):
         (COLLIDE.format(0), COLLIDE.format(0), COLLIDE.format("true"), False),
     ],
 )
-def test_two_links_of_a_model_meet_if_either_wants_it(a, b, of_model, meet):
-    world = World(BulletEngine(), gravity=(0.0, 0.0, 0.0))
+def test_two_links_of_a_model_meet_if_either_wants_it(new_engine, a, b, of_model, meet):
+    world = World(new_engine(), gravity=(0.0, 0.0, 0.0))
     model = world.spawn("m", parse_sdf(pair(a, b, of_model)), Pose())
     for _ in range(500):
         world.step()

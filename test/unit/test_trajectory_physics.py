@@ -9,7 +9,6 @@ from bullet_gazebo.control.manager import STRICT, ControllerManager
 from bullet_gazebo.control.trajectory.goal import GoalRequest, Outcome
 from bullet_gazebo.control.trajectory.plan import Plan, PlanPoint
 from bullet_gazebo.control.trajectory.tolerances import Tolerance
-from bullet_gazebo.physics.bullet import BulletEngine
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.urdf import parse_urdf
 from bullet_gazebo.physics.world import World
@@ -66,8 +65,8 @@ class Listener:
 
 
 @pytest.fixture
-def sim():
-    simulator = Simulator(World(BulletEngine()), lockstep=True)
+def sim(new_engine):
+    simulator = Simulator(World(new_engine()), lockstep=True)
     yield simulator
     simulator.world.close()
 

@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robots import cartpole_urdf
 
-from bullet_gazebo.physics.bullet import BulletEngine
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.pose import Pose, from_rpy, multiply, normalized, rotate, to_rpy
 from bullet_gazebo.physics.urdf import parse_urdf
@@ -102,11 +101,11 @@ def test_links_without_mass_are_dropped_with_what_hangs_from_them():
     assert "ghost" in model.warnings[0]
 
 
-def test_a_robot_may_turn_on_the_world_itself():
+def test_a_robot_may_turn_on_the_world_itself(new_engine):
     model = parse_urdf(
         robot('<link name="world"/>', link("arm"), joint("j", "continuous", "world", "arm"))
     )
-    world = World(BulletEngine(), gravity=(0.0, 0.0, 0.0))
+    world = World(new_engine(), gravity=(0.0, 0.0, 0.0))
     spawned = world.spawn("r", model, Pose())
     assert spawned.link_names == ["arm"]
     spawned.body.apply_efforts((0.1,))
@@ -186,8 +185,8 @@ def chain(count):
     return parse_urdf(robot(*links, *joints))
 
 
-def test_a_long_chain_moves_to_its_last_joint():
-    world = World(BulletEngine(), gravity=(0.0, 0.0, 0.0))
+def test_a_long_chain_moves_to_its_last_joint(new_engine):
+    world = World(new_engine(), gravity=(0.0, 0.0, 0.0))
     model = world.spawn("r", chain(121), Pose())
     model.body.apply_efforts([0.0] * 120 + [0.1])
     world.step()
@@ -195,11 +194,11 @@ def test_a_long_chain_moves_to_its_last_joint():
     world.close()
 
 
-def test_links_may_come_before_the_ones_that_carry_them():
+def test_links_may_come_before_the_ones_that_carry_them(new_engine):
     """PyBullet's process dies of it."""
     text = robot(link("c"), link("b"), link("a"), joint("k", "revolute", "b", "c", "0 0 1"),
                  joint("j", "revolute", "a", "b", "0 0 1"))  # fmt: skip
-    world = World(BulletEngine(), gravity=(0.0, 0.0, 0.0))
+    world = World(new_engine(), gravity=(0.0, 0.0, 0.0))
     model = world.spawn("r", parse_urdf(text), Pose())
     assert model.link_names == ["c", "b", "a"]
     assert model.joint_names == ("k", "j")
@@ -207,8 +206,8 @@ def test_links_may_come_before_the_ones_that_carry_them():
     world.close()
 
 
-def test_a_chain_too_long_for_the_engine_is_refused():
-    world = World(BulletEngine())
+def test_a_chain_too_long_for_the_engine_is_refused(new_engine):
+    world = World(new_engine())
     with pytest.raises(DescriptionError, match="it has 122 joints"):
         world.spawn("r", chain(122), Pose())
     assert world.models == {}
@@ -236,8 +235,8 @@ HUGE = '<collision><geometry><sphere radius="1e30"/></geometry></collision>'
         ),
     ],
 )
-def test_what_the_engine_would_crash_on_is_refused(parts, fault):
-    world = World(BulletEngine())
+def test_what_the_engine_would_crash_on_is_refused(new_engine, parts, fault):
+    world = World(new_engine())
     with pytest.raises(DescriptionError) as raised:
         world.spawn("r", parse_urdf(robot(*parts)), Pose())
     assert fault in str(raised.value)
@@ -263,7 +262,7 @@ def test_collisions_are_named_as_sdformat_names_them():
     ]  # fmt: skip
 
 
-def test_fixed_joints_are_kept_where_the_file_says():
+def test_fixed_joints_are_kept_where_the_file_says(new_engine):
     extra = (
         '<gazebo reference="a"><preserveFixedJoint>true</preserveFixedJoint></gazebo>'
         '<gazebo reference="b"><disableFixedJointLumping>true</disableFixedJointLumping></gazebo>'
@@ -274,7 +273,7 @@ def test_fixed_joints_are_kept_where_the_file_says():
     )  # fmt: skip
     assert [(j.name, j.kind) for j in model.joints.values()] == [("a", "fixed"), ("b", "revolute")]
     assert (model.joints["b"].lower, model.joints["b"].upper) == (0.0, 0.0)
-    world = World(BulletEngine())
+    world = World(new_engine())
     spawned = world.spawn("r", model, Pose())
     assert spawned.link_names == ["base", "x", "y"]
     for _ in range(200):
@@ -295,13 +294,13 @@ def test_gazebo_blocks_set_friction_and_gravity():
     assert model.warnings == ["<gazebo reference='nobody'> refers to no link or joint"]
 
 
-def test_friction_decides_whether_a_box_slides():
+def test_friction_decides_whether_a_box_slides(new_engine):
     """On a slope of 20 degrees, by gravity turned so, with a coefficient below and above its tangent."""
     slope = (9.8 * math.sin(math.radians(20)), 0.0, -9.8 * math.cos(math.radians(20)))
     shape = '<collision><geometry><box size="0.4 0.4 0.1"/></geometry></collision>'
     ways = []
     for mu in (0.2, 0.6):
-        world = World(BulletEngine(), gravity=slope)
+        world = World(new_engine(), gravity=slope)
         world.spawn("ground_plane", ground_plane(), Pose())
         text = robot(link("b", more=shape), f'<gazebo reference="b"><mu1>{mu}</mu1></gazebo>')
         box = world.spawn("b", parse_urdf(text), Pose((0.0, 0.0, 0.05)))
@@ -313,7 +312,7 @@ def test_friction_decides_whether_a_box_slides():
     assert ways == pytest.approx([sliding, 0.0], abs=0.05)
 
 
-def test_a_lumped_caster_keeps_its_own_friction():
+def test_a_lumped_caster_keeps_its_own_friction(new_engine):
     """A sledge that rests on two runners, one of them without friction: a push of g/4 meets mu N/2."""
     sphere = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
     plate = '<collision><geometry><box size="0.1 1 0.1"/></geometry></collision>'
@@ -326,7 +325,7 @@ def test_a_lumped_caster_keeps_its_own_friction():
         '<gazebo reference="runner"><mu1>0.2</mu1></gazebo>'
         '<gazebo reference="caster"><mu1>0</mu1><mu2>0</mu2></gazebo>',
     )  # fmt: skip
-    world = World(BulletEngine(), gravity=(0.0, 2.45, -9.8))
+    world = World(new_engine(), gravity=(0.0, 2.45, -9.8))
     world.spawn("ground_plane", ground_plane(), Pose())
     model = world.spawn("r", parse_urdf(text), Pose((0.0, 0.0, 0.15)))
     assert model.link_names == ["base"]
@@ -343,13 +342,13 @@ def test_a_lumped_caster_keeps_its_own_friction():
     world.close()
 
 
-def test_a_wheel_stands_still_and_rolls():
+def test_a_wheel_stands_still_and_rolls(new_engine):
     """A roller that a torque of 0.5 N m on its axis would drive by T r / (m r² + J)."""
     shape = (
         '<collision><origin rpy="1.5707963267948966 0 0"/><geometry>'
         '<cylinder radius="0.1" length="0.5"/></geometry></collision>'
     )
-    world = World(BulletEngine())
+    world = World(new_engine())
     world.spawn("ground_plane", ground_plane(), Pose())
     text = robot(link("a", mass=2.0, inertia=0.01, more=shape))
     model = world.spawn("r", parse_urdf(text), Pose((0.0, 0.0, 0.1)))

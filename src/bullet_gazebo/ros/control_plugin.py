@@ -14,6 +14,7 @@ from bullet_gazebo.robot import Robot
 from bullet_gazebo.ros.controller_services import ControllerServices
 from bullet_gazebo.ros.pid_ports import PidPorts
 from bullet_gazebo.ros.plugins import PluginContext
+from bullet_gazebo.ros.thinning import Thinner
 
 FILENAME = "libgazebo_ros_control.so"
 POLL = 0.1  # [s]
@@ -24,7 +25,8 @@ SLOWEST = 3600.0  # [s]; the longest control period
 class ControlPlugin:
     """Makes a controller manager for a model as soon as its robot description is on the server."""
 
-    def __init__(self, context: PluginContext) -> None:
+    def __init__(self, thinner: Thinner, context: PluginContext) -> None:
+        self._thinner = thinner
         self._context = context
         self._sim = context.sim
         self._namespace = rospy.names.ns_join(rospy.get_namespace(), context.namespace)
@@ -100,7 +102,7 @@ class ControlPlugin:
             )
         self._services = self._offer(manager)
         self._pids = [
-            PidPorts(self._sim, pid, rospy.names.ns_join(self._namespace, place))
+            PidPorts(self._sim, self._thinner, pid, rospy.names.ns_join(self._namespace, place))
             for place, pid in hardware.pids.items()
         ]
         with self._sim.lock:
@@ -140,7 +142,7 @@ class ControlPlugin:
 
     def _offer(self, manager: ControllerManager) -> ControllerServices:
         try:
-            return ControllerServices(self._sim, manager, self._namespace)
+            return ControllerServices(self._sim, self._thinner, manager, self._namespace)
         except rospy.service.ServiceException as error:
             raise ControlError(
                 f"there is a controller manager in the namespace '{self._namespace}' already; "

@@ -14,6 +14,7 @@ from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryCo
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.ros.conversions import to_joint_controller_state, to_joint_state
 from bullet_gazebo.ros.pid_ports import PidPorts
+from bullet_gazebo.ros.thinning import ThinnedTopic, Thinner
 from bullet_gazebo.ros.trajectory_conversions import to_controller_state
 from bullet_gazebo.ros.trajectory_ports import TrajectoryPorts
 from bullet_gazebo.simulator import Simulator
@@ -33,17 +34,21 @@ REPEAT = 1.0  # [s]; how often the same complaint about a topic is logged
 class ControllerPorts:
     """Publishers and subscribers of one controller, and what tunes its PIDs."""
 
-    def __init__(self, sim: Simulator, controller: Controller, namespace: str) -> None:
+    def __init__(
+        self, sim: Simulator, thinner: Thinner, controller: Controller, namespace: str
+    ) -> None:
         """`namespace` is the manager's; the controller's own is below it."""
         own = rospy.names.ns_join(namespace, controller.name)
         self._sim = sim
+        self._thinner = thinner
+        self._topics: list[ThinnedTopic] = []
         self._outputs = controller.outputs
         self._publishers = [
             self._publish(output, namespace if output.shared else own)
             for output in controller.outputs
         ]
         self._pids = [
-            PidPorts(sim, pid, rospy.names.ns_join(own, place))
+            PidPorts(sim, thinner, pid, rospy.names.ns_join(own, place))
             for place, pid in controller.pids.items()
         ]
         self._subscribers = [self._subscribe(port, own) for port in controller.inputs]
@@ -57,9 +62,12 @@ class ControllerPorts:
             rospy.names.ns_join(namespace, output.topic), kind, queue_size=queue, tcp_nodelay=True
         )
 
+        topic = ThinnedTopic(self._thinner, lambda sample: publisher.publish(convert(sample)))
+        self._topics.append(topic)
+
         def send(sample: object) -> None:
             if publisher.get_num_connections():
-                publisher.publish(convert(sample))
+                topic.send(sample)
 
         output.sink = send
         return publisher
@@ -90,6 +98,8 @@ class ControllerPorts:
             self._trajectory.shutdown()
         for pid in self._pids:
             pid.shutdown()
+        for topic in self._topics:
+            topic.close()
         for publisher in self._publishers:
             publisher.unregister()
 

@@ -29,6 +29,7 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.manager import ControllerManager, Listed
 from bullet_gazebo.control.user_types import find_type
 from bullet_gazebo.ros.controller_ports import ControllerPorts
+from bullet_gazebo.ros.thinning import Thinner
 from bullet_gazebo.simulator import Simulator
 
 BASE_CLASS = "controller_interface::ControllerBase"
@@ -37,8 +38,11 @@ BASE_CLASS = "controller_interface::ControllerBase"
 class ControllerServices:
     """Serves one manager. All calls answer at once, also while the world is paused."""
 
-    def __init__(self, sim: Simulator, manager: ControllerManager, namespace: str) -> None:
+    def __init__(
+        self, sim: Simulator, thinner: Thinner, manager: ControllerManager, namespace: str
+    ) -> None:
         self._sim = sim
+        self._thinner = thinner
         self._manager = manager
         self._namespace = namespace
         self._ports: dict[str, ControllerPorts] = {}
@@ -105,7 +109,7 @@ class ControllerServices:
 
     def _open(self, controller: Controller) -> ControllerPorts:
         try:
-            return ControllerPorts(self._sim, controller, self._namespace)
+            return ControllerPorts(self._sim, self._thinner, controller, self._namespace)
         except (rospy.ROSException, KeyError, TypeError, ValueError) as error:
             with self._sim.lock:
                 self._manager.unload(controller.name)

@@ -4,10 +4,12 @@ import argparse
 import sys
 import threading
 import traceback
+from functools import partial
 
 import rospy
 
-from bullet_gazebo.physics.bullet import BulletEngine
+from bullet_gazebo.physics.engine import Engine
+from bullet_gazebo.physics.engines import BULLET, ENGINES, EngineError, make_engine
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.ros.connections import guard_connections
 from bullet_gazebo.ros.control_plugin import FILENAME as CONTROL_PLUGIN
@@ -20,22 +22,22 @@ from bullet_gazebo.ros.signals import Ending, init_node
 from bullet_gazebo.ros.spawn_services import SpawnServices
 from bullet_gazebo.ros.state_topics import advertise_states
 from bullet_gazebo.ros.step_service import StepService
+from bullet_gazebo.ros.thinning import Thinner
 from bullet_gazebo.ros.world_control import WorldControl
 from bullet_gazebo.ros.world_loader import fill_world, load_plugins, read_world
 from bullet_gazebo.ros.world_services import advertise_world_services
 from bullet_gazebo.simulator import Simulator
 
-ENGINES = ("ode", "bullet", "simbody", "dart")
 STOP_TIMEOUT = 5.0  # [s]
 
 
 class GazeboNode:
     """The simulator, its thread, and all that it offers to ROS."""
 
-    def __init__(self, args: argparse.Namespace) -> None:
+    def __init__(self, args: argparse.Namespace, engine: Engine) -> None:
         if not rospy.has_param("/use_sim_time"):
             rospy.set_param("/use_sim_time", True)
-        world = World(BulletEngine())
+        world = World(engine)
         relatch = rospy.get_param("~relatch_on_reset", True)
         self.sim = Simulator(world, lockstep=args.lockstep, relatch=bool(relatch))
         fill_world(self.sim, read_world(args.world))
@@ -48,11 +50,12 @@ class GazeboNode:
     def _advertise(self, network: bool) -> None:
         WorldControl(self.sim).offer()
         guard_connections()
-        advertise_states(self.sim, _clock_frequency(), network)
+        thinner = Thinner(self.sim)
+        advertise_states(self.sim, thinner, _clock_frequency(), network)
         plugins = PluginRegistry(
             self.sim,
             {
-                CONTROL_PLUGIN: ControlPlugin,
+                CONTROL_PLUGIN: partial(ControlPlugin, thinner),
                 JOINT_STATE_PLUGIN: JointStatePlugin,
             },
         )
@@ -110,4 +113,9 @@ def main(argv: list[str] | None = None) -> int:
     if args.ignored:
         rospy.logwarn("Arguments without effect here: %s", " ".join(args.ignored))
     seed_random_numbers(args.seed)
-    return GazeboNode(args).run(ending)
+    try:
+        engine = make_engine(args.physics if args.physics in ENGINES else BULLET[0])
+    except EngineError as error:
+        rospy.logfatal("%s", error)
+        return 1
+    return GazeboNode(args, engine).run(ending)

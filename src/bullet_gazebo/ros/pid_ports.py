@@ -10,6 +10,7 @@ from bullet_gazebo.control.pid import Gains, Pid
 from bullet_gazebo.control.samples import PidSample
 from bullet_gazebo.ros.conversions import to_time
 from bullet_gazebo.ros.dynamic_server import FIRST, DynamicServer, Parameter
+from bullet_gazebo.ros.thinning import ThinnedTopic, Thinner
 from bullet_gazebo.simulator import Simulator
 
 MOST = 100_000.0
@@ -29,7 +30,7 @@ class PidPorts:
     Gains are written back to the parameter server, at the start and whenever they change.
     """
 
-    def __init__(self, sim: Simulator, pid: Pid, namespace: str) -> None:
+    def __init__(self, sim: Simulator, thinner: Thinner, pid: Pid, namespace: str) -> None:
         self._sim = sim
         self._pid = pid
         self._namespace = namespace
@@ -37,6 +38,7 @@ class PidPorts:
         self._publisher: rospy.Publisher | None = None
         if pid.publish_state:
             self._publisher = rospy.Publisher(f"{namespace}/state", PidState, queue_size=1)
+            self._topic = ThinnedTopic(thinner, self._publisher.publish)
             pid.sink = self._publish
 
     def shutdown(self) -> None:
@@ -44,6 +46,7 @@ class PidPorts:
         self._server.shutdown()
         self._pid.sink = None
         if self._publisher is not None:
+            self._topic.close()
             self._publisher.unregister()
 
     def _apply(self, config: Config, level: int) -> Config:
@@ -69,7 +72,7 @@ class PidPorts:
         message = PidState(**sample._asdict())
         message.timestep = rospy.Duration.from_sec(sample.timestep)
         message.header.stamp = to_time(self._sim.now)
-        publisher.publish(message)
+        self._topic.send(message)
 
 
 def _gains(config: Config) -> Gains:

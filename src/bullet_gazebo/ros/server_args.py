@@ -33,14 +33,14 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     """
     parser = argparse.ArgumentParser(
         prog="gzserver",
-        description="A PyBullet stand-in for Gazebo's server.",
+        description="A stand-in for Gazebo's server.",
         usage="gzserver [options] [WORLD_FILE]",
         allow_abbrev=False,
     )
     # The world is taken from what is left: it may stand anywhere, also behind an unknown option.
     parser.add_argument("-u", dest="paused", action="store_true", help="start paused")
     parser.add_argument(
-        "-e", "--physics", default="ode", help="accepted; physics is always PyBullet"
+        "-e", "--physics", default="ode", help="mujoco; all of Gazebo's own names mean PyBullet"
     )
     parser.add_argument("-o", "--profile", nargs="?", help="accepted, without effect")
     parser.add_argument("--lockstep", action="store_true", help="time moves only by ~step_world")

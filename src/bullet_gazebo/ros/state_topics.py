@@ -1,7 +1,7 @@
 """/clock, model_states and link_states (contract: gazebo_api.md section 1.3)."""
 
-import threading
 from collections.abc import Callable
+from functools import partial
 
 import rospy
 import rospy.impl.simtime
@@ -9,11 +9,10 @@ from gazebo_msgs.msg import LinkStates, ModelStates
 from rosgraph_msgs.msg import Clock
 
 from bullet_gazebo.ros.conversions import to_pose_msg, to_time, to_twist_msg
+from bullet_gazebo.ros.thinning import ThinnedTopic, Thinner
 from bullet_gazebo.simulator import Simulator
 
 QUEUE = 10
-STOP_TIMEOUT = 1.0  # [s]
-PERIOD = 0.001  # [s of wall time] between two messages of a thinned topic
 
 
 class Audience(rospy.SubscribeListener):
@@ -32,40 +31,39 @@ class Audience(rospy.SubscribeListener):
         self.size = num_peers
 
 
-class StateTopic:
+class StateTopic(ThinnedTopic):
     """A topic that shows the state before each step, while somebody listens."""
 
-    def __init__(self, name: str, kind: type, make: Callable[[], object]) -> None:
+    def __init__(
+        self, name: str, kind: type, sim: Simulator, thinner: Thinner, make: Callable[[], object]
+    ) -> None:
         self._audience = Audience()
+        self._sim = sim
         self._make = make
-        self._publisher = rospy.Publisher(
+        publisher = rospy.Publisher(
             name, kind, subscriber_listener=self._audience, queue_size=QUEUE, tcp_nodelay=True
         )
+        # A sample only says that there is news: states are many, and made up when they are sent.
+        super().__init__(thinner, lambda now: publisher.publish(make()))
 
     def __call__(self, now: int) -> None:
         if self._audience.size:
-            self._publisher.publish(self._make())
+            self.send(now)
+
+    def flush(self) -> None:
+        with self._sim.lock:  # making it up looks at the world
+            super().flush()
 
 
-class ClockTopic:
-    """/clock: on every tick in real time.
+class ClockTopic(ThinnedTopic):
+    """/clock: on every tick, or at a frequency."""
 
-    Faster than real time no subscriber could follow: then messages are thinned by wall time, and the
-    newest one is always sent.
-    """
-
-    def __init__(self, sim: Simulator, frequency: float) -> None:
+    def __init__(self, sim: Simulator, thinner: Thinner, frequency: float) -> None:
         """`frequency` [Hz of simulated time] is ~pub_clock_frequency; 0 means every tick."""
-        self._sim = sim
+        super().__init__(thinner, self._publish_time)
         self._publisher = rospy.Publisher("/clock", Clock, queue_size=QUEUE, tcp_nodelay=True)
         self._period = round(1e9 / frequency) if frequency > 0 else 0
         self._last = -self._period
-        self._newest = 0
-        self._news = threading.Event()
-        self._ending = threading.Event()
-        self._sender = threading.Thread(target=self._send_newest, name="clock", daemon=True)
-        self._sender.start()
-        rospy.on_shutdown(self._stop)
         # With use_sim_time:=false this node, like all others, goes by the wall clock.
         self._sets_own_time = bool(rospy.get_param("/use_sim_time", True))
         if self._sets_own_time:
@@ -76,29 +74,9 @@ class ClockTopic:
         if self._period and 0 <= now - self._last < self._period:  # negative after a reset: publish
             return
         self._last = now
-        if self._thinned():
-            self._newest = now
-            self._news.set()
-        else:
-            self._publish(now)
+        self.send(now)
 
-    def _thinned(self) -> bool:
-        rate = self._sim.max_update_rate
-        # Ticks of a paused world come from step(), as fast as they can be computed.
-        return self._sim.lockstep or self._sim.paused or rate <= 0.0 or rate * PERIOD > 1.0
-
-    def _send_newest(self) -> None:
-        while not self._ending.wait(PERIOD):
-            self._news.wait()
-            self._news.clear()
-            self._publish(self._newest)
-
-    def _stop(self) -> None:
-        self._ending.set()
-        self._news.set()
-        self._sender.join(STOP_TIMEOUT)
-
-    def _publish(self, now: int) -> None:
+    def _publish_time(self, now: int) -> None:
         time = to_time(now)
         if self._sets_own_time:
             rospy.rostime._set_rostime(time)
@@ -117,12 +95,17 @@ def _stop_listening_to_clock() -> None:
         subscription.unregister()
 
 
-def advertise_states(sim: Simulator, clock_frequency: float, network: bool) -> None:
+def advertise_states(
+    sim: Simulator, thinner: Thinner, clock_frequency: float, network: bool
+) -> None:
     """Publishes /clock and, with `network`, the state topics, as the simulation ticks."""
-    sim.listeners.append(ClockTopic(sim, clock_frequency))
+    sim.listeners.append(ClockTopic(sim, thinner, clock_frequency))
     if network:
-        sim.listeners.append(StateTopic("~link_states", LinkStates, lambda: _link_states(sim)))
-        sim.listeners.append(StateTopic("~model_states", ModelStates, lambda: _model_states(sim)))
+        for name, kind, make in (
+            ("~link_states", LinkStates, _link_states),
+            ("~model_states", ModelStates, _model_states),
+        ):
+            sim.listeners.append(StateTopic(name, kind, sim, thinner, partial(make, sim)))
 
 
 def _model_states(sim: Simulator) -> ModelStates:

@@ -1,0 +1,104 @@
+"""Topics of a world that runs faster than real time: thinned by wall time, the newest message always sent.
+
+A subscriber follows some thousand messages a second. In real time each message is sent, at once.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+
+from bullet_gazebo.simulator import Simulator
+
+PERIOD = 0.001  # [s of wall time] between two messages of a thinned topic
+STOP_TIMEOUT = 1.0  # [s]
+
+
+class ThinnedTopic:
+    """One topic. `publish` is called with the samples that are to be sent, in order."""
+
+    def __init__(self, thinner: "Thinner", publish: Callable[[Any], None]) -> None:
+        self._thinner = thinner
+        self._publish = publish
+        self._guard = threading.Lock()
+        self._kept: Any = None
+        self._sent = 0.0  # [s of wall time]
+
+    def send(self, sample: Any) -> None:
+        """Publishes the sample, or keeps it until its turn or a newer one comes; called by the tick."""
+        if not self._thinner.active:
+            self._send_now(sample)
+            return
+        with self._guard:
+            early = self._kept is not None or time.monotonic() - self._sent < PERIOD
+            if early:
+                self._kept = sample
+        if early:
+            self._thinner.remember(self)
+        else:
+            self._send_now(sample)
+
+    def _send_now(self, sample: Any) -> None:
+        with self._guard:
+            self._kept = None
+            self._sent = time.monotonic()
+            self._publish(sample)
+
+    def close(self) -> None:
+        """Ends it; what is kept is dropped."""
+        with self._guard:
+            self._kept = None
+            self._publish = _drop
+
+    def flush(self) -> None:
+        """Publishes what is kept."""
+        with self._guard:
+            if self._kept is not None:
+                sample, self._kept = self._kept, None
+                self._sent = time.monotonic()
+                self._publish(sample)
+
+
+def _drop(sample: Any) -> None:
+    """For a topic that has been closed."""
+
+
+class Thinner:
+    """Sends what thinned topics kept, from a thread of its own."""
+
+    def __init__(self, sim: Simulator) -> None:
+        self._sim = sim
+        self._guard = threading.Lock()
+        self._waiting: set[ThinnedTopic] = set()
+        self._news = threading.Event()
+        self._ending = threading.Event()
+        self._sender = threading.Thread(target=self._send, name="thinned topics", daemon=True)
+        self._sender.start()
+        rospy.on_shutdown(self._stop)
+
+    @property
+    def active(self) -> bool:
+        """Whether the world runs, or is stepped, faster than real time."""
+        return self._sim.outruns_the_clock
+
+    def remember(self, topic: ThinnedTopic) -> None:
+        """Has a topic flushed in a moment."""
+        with self._guard:
+            self._waiting.add(topic)
+        self._news.set()
+
+    def _send(self) -> None:
+        while not self._ending.wait(PERIOD):
+            self._news.wait()
+            self._news.clear()
+            with self._guard:
+                waiting, self._waiting = self._waiting, set()
+            for topic in waiting:
+                topic.flush()
+
+    def _stop(self) -> None:
+        self._ending.set()
+        self._news.set()
+        self._sender.join(STOP_TIMEOUT)
