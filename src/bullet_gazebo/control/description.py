@@ -60,8 +60,15 @@ def read_description(text: str) -> RobotDescription:
         raise ControlError(f"robot_description is not well-formed XML: {error}") from error
     joints = {e.get("name", ""): _joint(e) for e in robot.findall("joint")}
     warnings: list[str] = []
-    found = [_transmission(e, warnings) for e in robot.findall("transmission")]
-    return RobotDescription(joints, [t for t in found if t is not None], warnings)
+    transmissions: dict[str, Transmission] = {}
+    for element in robot.findall("transmission"):
+        found = _transmission(element, warnings)
+        if found is None:
+            continue
+        if found.joint in transmissions:
+            warnings.append(f"Joint '{found.joint}' has several transmissions; the first is used.")
+        transmissions.setdefault(found.joint, found)
+    return RobotDescription(joints, list(transmissions.values()), warnings)
 
 
 def _joint(element: Element) -> JointHandle:
@@ -73,8 +80,8 @@ def _joint(element: Element) -> JointHandle:
         limits = JointLimits(
             lower=_float(limit, "lower") if bounded else None,
             upper=_float(limit, "upper") if bounded else None,
-            velocity=_float(limit, "velocity"),
-            effort=_float(limit, "effort"),
+            velocity=_size(limit, "velocity"),
+            effort=_size(limit, "effort"),
             soft=_soft(element.find("safety_controller")),
         )
     return JointHandle(element.get("name", ""), kind, limits)
@@ -101,6 +108,13 @@ def _float(element: Element, key: str) -> float:
         ) from error
     if not math.isfinite(value):
         raise ControlError(f"robot_description: <{element.tag} {key}='{text}'> is not finite")
+    return value
+
+
+def _size(element: Element, key: str) -> float:
+    value = _float(element, key)
+    if value < 0.0:  # as a limit it would push
+        raise ControlError(f"robot_description: <{element.tag} {key}='{value:g}'> is negative")
     return value
 
 
@@ -154,16 +168,21 @@ def _overridden(joint: JointHandle, params: Mapping, warnings: list[str]) -> Joi
         if switch is False or wraps:
             limits = replace(limits, **dict.fromkeys(fields))
         elif switch is True:
-            wrong = [key for key in fields.values() if not is_number(params.get(key))]
+            signed = what == "position"
+            wrong = [key for key in fields.values() if not _is_limit(params.get(key), signed)]
             if wrong:
                 warnings.append(
                     f"joint_limits/{joint.name}: has_{what}_limits is set, but {', '.join(wrong)} is "
-                    "missing or no number; it is ignored."
+                    "missing, negative or no number; it is ignored."
                 )
                 continue
             values: dict[str, Any] = {field: float(params[key]) for field, key in fields.items()}
             limits = replace(limits, **values)
     return limits
+
+
+def _is_limit(value: Any, signed: bool) -> bool:
+    return is_number(value) and (signed or value >= 0)
 
 
 def is_number(value: object) -> bool:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from bullet_gazebo.control.controllers import BUILT_IN
 from bullet_gazebo.control.controllers.base import Controller
-from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.errors import FAULTS, ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 
 BEST_EFFORT = 1
@@ -42,7 +42,7 @@ class ControllerManager:
         self._controllers: dict[str, Controller] = {}
         self._running: list[Controller] = []
         self._now = 0
-        self.on_fault: Callable[[Controller, Exception], None] = _ignore
+        self.on_fault: Callable[[Controller, BaseException], None] = _ignore
 
     def update(self, now: int, dt: float) -> None:
         """Updates the running controllers; `now` [ns], `dt` [s]."""
@@ -50,7 +50,7 @@ class ControllerManager:
         for controller in self._running:
             try:
                 controller.update(now, dt)
-            except Exception as error:  # noqa: BLE001 - a user's code must not stop the world
+            except FAULTS as error:  # a user's code must not stop the world
                 self._fail(controller, error)
 
     @property
@@ -83,7 +83,8 @@ class ControllerManager:
             )
         try:
             controller = self.types[kind].create(name, params, self.hardware)
-        except Exception as error:
+            _check_claims(controller, self.hardware)
+        except FAULTS as error:
             reason = error if isinstance(error, ControlError) else repr(error)
             raise ControlError(f"Initializing controller '{name}' failed: {reason}") from error
         self._controllers[name] = controller
@@ -157,13 +158,13 @@ class ControllerManager:
         for controller in self._running:
             try:
                 controller.joints_moved(now)
-            except Exception as error:  # noqa: BLE001 - a user's code must not stop the world
+            except FAULTS as error:  # a user's code must not stop the world
                 self._fail(controller, error)
 
     def _start(self, controller: Controller) -> bool:
         try:
             controller.starting(self._now)
-        except Exception as error:  # noqa: BLE001 - a user's code must not stop the world
+        except FAULTS as error:
             controller.state = STOPPED
             self._fail(controller, error)
             return False
@@ -174,10 +175,10 @@ class ControllerManager:
         controller.state = STOPPED
         try:
             controller.stopping()
-        except Exception as error:  # noqa: BLE001 - a user's code must not stop the world
+        except FAULTS as error:
             self._fail(controller, error)
 
-    def _fail(self, controller: Controller, error: Exception) -> None:
+    def _fail(self, controller: Controller, error: BaseException) -> None:
         """Stops a controller that raised, and lets go of its joints."""
         if controller.state == RUNNING:
             self._stop(controller)
@@ -196,8 +197,20 @@ class ControllerManager:
         return list(found.values())
 
 
-def _ignore(controller: Controller, error: Exception) -> None:
+def _ignore(controller: Controller, error: BaseException) -> None:
     """For a manager that nobody listens to."""
+
+
+def _check_claims(controller: object, hardware: RobotHardware) -> None:
+    """Refuses a user's controller whose claims would break list_controllers or the check of conflicts."""
+    if not isinstance(controller, Controller):
+        raise ControlError(f"create() returned {controller!r}, which is no controller")
+    claimed = controller.claimed
+    if not isinstance(claimed, (tuple, list)) or not all(name in hardware.joints for name in claimed):
+        raise ControlError(
+            f"it claims {claimed!r}, which is no tuple of names of controlled joints "
+            f"({', '.join(hardware.joints) or 'there are none'})"
+        )
 
 
 def _check_strict(starting: list[Controller], stopping: list[Controller]) -> None:

@@ -3,7 +3,7 @@
 import importlib
 
 from bullet_gazebo.control.controllers.base import Controller
-from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.errors import FAULTS, ControlError
 
 
 def find_type(type_name: str) -> type[Controller] | None:
@@ -20,7 +20,7 @@ def find_type(type_name: str) -> type[Controller] | None:
         if error.name == package:
             return None
         raise ControlError(f"controller type '{type_name}': {error}") from error
-    except Exception as error:
+    except FAULTS as error:
         raise ControlError(f"controller type '{type_name}': {package} raised {error!r}") from error
     found = getattr(module, name, None)
     if not isinstance(found, type) or not issubclass(found, Controller):

@@ -11,6 +11,10 @@ from bullet_gazebo.physics.mujoco_model import xyzw
 from bullet_gazebo.physics.pose import Pose
 
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
+LARGEST = 1e10  # of a position, velocity or acceleration: beyond that, MuJoCo warns
+BAD = slice(
+    int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1
+)  # the warnings of that kind
 
 
 class Motion(NamedTuple):
@@ -32,14 +36,19 @@ class MujocoState:
     loaded: bool = False  # efforts or wrenches wait for the next step
     speeds: dict[int, float] = field(default_factory=dict)  # that motors want, by degree of freedom
 
+    def __post_init__(self) -> None:
+        self._watch()
+
     def replace(self, model: mujoco.MjModel) -> None:
         """Goes on with another model; its bodies have to be bound to it."""
         self.model, self.data = model, mujoco.MjData(model)
+        self._watch()
         self.stale, self.loaded = True, False
         self.speeds.clear()
 
     def step(self) -> None:
         """Integrates by one time step, after which nothing acts any more."""
+        np.copyto(self._before, self.data.qpos)
         if self.speeds:
             mujoco.mj_step1(self.model, self.data)
             self._drive()
@@ -47,10 +56,27 @@ class MujocoState:
         else:
             mujoco.mj_step(self.model, self.data)
         self.stale = True
+        if self._warnings.tobytes() != self._quiet:
+            self._mend()
         if self.loaded:
             self.data.qfrc_applied[:] = 0.0
             self.data.xfrc_applied[:] = 0.0
             self.loaded = False
+
+    def _watch(self) -> None:
+        self._before = self.data.qpos.copy()
+        self._warnings = self.data.warning.number[BAD]
+        self._quiet = np.zeros_like(self._warnings).tobytes()  # the fastest of comparisons
+
+    def _mend(self) -> None:
+        """What has grown beyond all bounds stops where it was: NaN would spread over the whole world."""
+        data = self.data
+        fast = ~(np.abs(data.qvel) < LARGEST)
+        far = ~(np.abs(data.qpos) < LARGEST)
+        data.qvel[fast] = 0.0
+        data.qpos[far] = self._before[far]
+        if not fast.any() and not far.any():
+            self._warnings[:] = 0  # so that the next time is told again
 
     def _drive(self) -> None:
         """Dry friction brakes towards speed 0; a motor is dry friction towards another speed."""

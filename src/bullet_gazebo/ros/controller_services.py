@@ -160,7 +160,7 @@ def _refused(error: ControlError) -> bool:
     return False
 
 
-def _report_fault(controller: Controller, error: Exception) -> None:
+def _report_fault(controller: Controller, error: BaseException) -> None:
     rospy.logerr(
         "Controller '%s' (%s) is stopped, because it raised:\n%s",
         controller.name, controller.type_name, "".join(traceback.format_exception(error)),
