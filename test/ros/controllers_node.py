@@ -6,6 +6,7 @@ import math
 import rospy
 import rostest
 from control_msgs.msg import JointControllerState
+from gazebo_msgs.srv import SetModelConfiguration
 from geometry_msgs.msg import Vector3
 from sensor_msgs.msg import JointState
 from slides_client import SlidesTest, Topic, call, wait_until
@@ -57,6 +58,8 @@ class ControllersTest(SlidesTest):
         state = topic.messages[-1]
         self.assertEqual((state.set_point, state.time_step, state.p, state.d), (0.3, 0.001, 400.0, 40.0))
         self.assertAlmostEqual(state.error, state.set_point - state.process_value, places=12)
+        self.step(20, effort_position=9.0)  # beyond the rail's end
+        self.assertTrue(topic.wait_for(lambda got: got[-1].set_point == 5.0))
         topic.close()
 
     def test_effort_velocity_with_its_state_topic(self):
@@ -139,13 +142,38 @@ class ControllersTest(SlidesTest):
         self.assertEqual(topic.messages[0].name, names)
         topic.close()
 
+    def test_joint_states_of_some_joints_and_of_extra_ones(self):
+        self.assertTrue(self.load("some_states"))
+        topic = Topic("joint_states", JointState)
+        self.assertTrue(self.switch(["some_states"]))
+        self.step(2)
+        self.assertTrue(topic.wait_for(len))
+        message = topic.messages[0]
+        self.assertEqual(message.name, ["velocity_a", "effort_a", "finger", "thumb"])
+        self.assertEqual(message.position, (0.0, 0.0, 0.25, 0.0))
+        self.assertEqual(message.velocity, (0.0, 0.0, 0.5, 0.0))
+        self.assertEqual(message.effort, (0.0, 0.0, -1.0, 0.0))
+        topic.close()
+
     def test_a_reset_relatches_and_position_joints_stay_where_they_are_put(self):
         self.run_controllers("position_joint", "effort_position", "states")
         self.step(1000, position_joint=0.4, effort_position=0.3)
         call("/gazebo/reset_simulation", Empty)
-        joints = self.step(200)
-        self.assertAlmostEqual(joints["position_a"][0], 0.0, places=6)
-        self.assertEqual(joints["effort_a"], (0.0, 0.0, 0.0))  # no kick
+        for ticks in (1, 1, 200):
+            joints = self.step(ticks)
+            self.assertAlmostEqual(joints["position_a"][0], 0.0, places=6)
+            self.assertEqual(joints["effort_a"], (0.0, 0.0, 0.0))  # no kick
+
+    def test_position_joints_stay_where_a_service_puts_them(self):
+        self.run_controllers("position_joint", "position_group_b", "effort_position")
+        self.step(100, position_joint=0.4, effort_position=0.3)
+        names, places = ["position_a", "position_b", "effort_a"], [-0.5, 0.25, 0.1]
+        request = ("slides", "robot_description", names, places)
+        self.assertTrue(call("/gazebo/set_model_configuration", SetModelConfiguration, *request).success)
+        for ticks in (1, 1, 200):
+            joints = self.step(ticks)
+            for name, place in zip(names, places, strict=True):
+                self.assertAlmostEqual(joints[name][0], place, places=6)
 
     def test_what_cannot_be_loaded(self):
         before = self.types()
@@ -191,6 +219,10 @@ class ControllersTest(SlidesTest):
         self.assertTrue(wait_until(lambda: self.step(1, effort_joint=2.0)["effort_a"][2] == 2.0))
         for name in ("effort_joint", "position_joint", "velocity_joint"):
             self.assertEqual(self.state(name), "running")
+        # They began anew: what was commanded during the stop, and before it, is forgotten.
+        joints = self.step(100)
+        self.assertAlmostEqual(joints["position_a"][0], held["position_a"][0], places=6)
+        self.assertAlmostEqual(joints["velocity_a"][1], 0.0, places=6)
 
 
 if __name__ == "__main__":

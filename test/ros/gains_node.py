@@ -7,7 +7,7 @@ import subprocess
 import rospy
 import rostest
 from control_msgs.msg import JointControllerState, PidState
-from dynamic_reconfigure.msg import Config, ConfigDescription, DoubleParameter
+from dynamic_reconfigure.msg import BoolParameter, Config, ConfigDescription, DoubleParameter
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
 from slides_client import SlidesTest, Topic, call
 
@@ -54,6 +54,18 @@ class GainsTest(SlidesTest):
         reconfigure(PID, p=100.0, i=0.0, d=0.0)
         joints = self.step(1, effort_position=0.1)
         self.assertAlmostEqual(joints["effort_a"][2], 10.0, places=9)
+
+    def test_antiwindup_and_the_clamps_act_from_the_next_tick_on(self):
+        self.run_controllers("effort_position")
+        reconfigure(PID, p=0.0, d=0.0, i=1000.0, i_clamp_min=-2.0, i_clamp_max=2.0)
+        self.assertEqual(self.step(100, effort_position=1.0)["effort_a"][2], 2.0)
+        # The integral wound up behind its clamp, until antiwindup cuts it: then it leaves at once.
+        request = ReconfigureRequest()
+        request.config.bools = [BoolParameter("antiwindup", True)]
+        call(f"{PID}/set_parameters", Reconfigure, request)
+        self.assertEqual(rospy.get_param(f"{PID}/antiwindup"), True)
+        self.assertEqual(self.step(1)["effort_a"][2], 2.0)
+        self.assertLess(self.step(1, effort_position=-1.0)["effort_a"][2], 1.0)
 
     def test_gains_that_are_no_numbers_are_refused(self):
         self.run_controllers("effort_position")

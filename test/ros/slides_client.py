@@ -54,17 +54,23 @@ class SlidesTest(unittest.TestCase):
     """Spawns the robot for each test."""
 
     def setUp(self):
+        self.publishers = []
         call("/gazebo/reset_simulation", Empty)
+        self.spawn()
+
+    def tearDown(self):
+        self.delete()
+        for publisher in self.publishers:
+            publisher.unregister()
+
+    def spawn(self):
         xml = rospy.get_param("/slides/robot_description")
         request = SpawnModelRequest(model_name="slides", model_xml=xml)
         answer = call("/gazebo/spawn_urdf_model", SpawnModel, request)
         self.assertTrue(answer.success, answer.status_message)
-        self.publishers = []
 
-    def tearDown(self):
+    def delete(self):
         call("/gazebo/delete_model", DeleteModel, "slides")
-        for publisher in self.publishers:
-            publisher.unregister()
 
     def load(self, name):
         return call(MANAGER + "load_controller", LoadController, name).ok

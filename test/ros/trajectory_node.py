@@ -117,6 +117,12 @@ class TrajectoryTest(unittest.TestCase):
         # The way goes on all the same.
         self.assertTrue(wait_until(lambda: abs(position("effort_a") - 2.0) < 0.05))
 
+    def test_tolerances_of_the_parameters(self):
+        arm = self.arm("velocity_arm")
+        unpause()
+        pursuit = arm.pursue(trajectory(["velocity_a"], (0.1, [3.0])))  # ten times the limit
+        self.check(pursuit, "ABORTED", "PATH", "tolerance 0.1")
+
     def test_goal_tolerance(self):
         arm = self.arm()
         unpause()
@@ -225,6 +231,21 @@ class TrajectoryTest(unittest.TestCase):
         first, last = arm.states[5].header, state.header
         rate = (last.seq - first.seq) / (last.stamp - first.stamp).to_sec()
         self.assertAlmostEqual(rate, 50.0, delta=1.0)
+
+    def test_states_tell_what_is_wanted_what_is_and_the_difference(self):
+        arm = self.arm()
+        unpause()
+        arm.command.publish(trajectory(EFFORT, (2.0, [1.0, -1.0])))
+        self.assertTrue(arm.wait_state(lambda state: state.actual.velocities[1] > 0.3))
+        state = arm.states[-1]
+        for field in ("positions", "velocities"):
+            desired, actual, error = (
+                getattr(part, field) for part in (state.desired, state.actual, state.error)
+            )
+            for wanted, found, off in zip(desired, actual, error, strict=True):
+                self.assertAlmostEqual(off, wanted - found, places=12)
+                self.assertAlmostEqual(off, 0.0, delta=0.05)
+        self.assertLess(state.actual.velocities[0], -0.3)
 
     def test_query_state(self):
         arm = self.arm(start=False)

@@ -1,5 +1,6 @@
 """Small plants to learn on in unit tests: deterministic, and quick."""
 
+from cartpole.envs.variation import Variation
 from cartpole.errors import SimulatorError
 from cartpole.task import CartPoleState
 
@@ -13,9 +14,12 @@ class FakePlant:
         fail_after: number of actions after which the simulator "dies"; None: never.
     """
 
+    deterministic = True
+
     def __init__(self, fail_after: int | None = None) -> None:
         self.closed = 0
         self.actions = 0
+        self.variations: list[Variation] = []
         self._fail_after = fail_after
         self._state = CartPoleState(0.0, 0.0, 0.0, 0.0)
 
@@ -35,6 +39,9 @@ class FakePlant:
         angle += rate * DT
         self._state = CartPoleState(x, v, angle, rate)
         return self._state
+
+    def vary(self, variation: Variation) -> None:
+        self.variations.append(variation)
 
     def close(self) -> None:
         self.closed += 1

@@ -27,7 +27,10 @@ class RecordingPlant(FakePlant):
 
 @pytest.fixture
 def checked_env() -> CartPoleEnv:
-    gymnasium.register("CartPoleFake-v0", lambda: CartPoleEnv(FakePlant(), BalanceTask(0.02)))
+    gymnasium.register(
+        "CartPoleFake-v0",
+        lambda **options: CartPoleEnv(FakePlant(), BalanceTask(0.02), **options),
+    )
     yield gymnasium.make("CartPoleFake-v0", disable_env_checker=True).unwrapped
     del gymnasium.registry["CartPoleFake-v0"]
 

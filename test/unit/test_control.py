@@ -114,6 +114,22 @@ def test_odd_transmissions_are_skipped_with_a_warning(old, new, warning):
     )
 
 
+def test_of_several_transmissions_of_a_joint_the_first_counts():
+    pole, cart = (f'<joint name="{name}">\n      <hard' for name in ("cart_pole", "stand_cart"))
+    description = read_description(cartpole_urdf().replace(pole, cart))
+    assert [t.joint for t in description.transmissions] == ["stand_cart"]
+    assert description.warnings == ["Joint 'stand_cart' has several transmissions; the first is used."]
+
+
+def test_a_negative_limit_would_push_so_it_is_refused():
+    with pytest.raises(ControlError, match="<limit effort='-30'> is negative"):
+        read_description(cartpole_urdf().replace('effort="30"', 'effort="-30"', 1))
+    params = {"stand_cart": {"has_effort_limits": True, "max_effort": -3}}
+    description = read_description(cartpole_urdf()).limited_by(params)
+    assert description.joints["stand_cart"].limits.effort == 30.0
+    assert "max_effort is missing, negative or no number" in description.warnings[-1]
+
+
 def test_an_unknown_interface_is_fatal():
     with pytest.raises(ControlError, match="NoJointInterface"):
         read_description(cartpole_urdf().replace("EffortJointInterface", "NoJointInterface"))

@@ -152,6 +152,8 @@ class Faulty(Controller):
     type_name = "test/Faulty"
     interface = "EffortJointInterface"
 
+    error: type[BaseException] = ZeroDivisionError
+
     def __init__(self, name, where):
         super().__init__(name)
         self.where = where
@@ -166,7 +168,7 @@ class Faulty(Controller):
     def _act(self, what):
         self.calls.append(what)
         if what == self.where:
-            raise ZeroDivisionError(what)
+            raise self.error(what)
 
     def starting(self, now):
         self._act("starting")
@@ -189,8 +191,12 @@ def faults(manager):
     return told
 
 
+@pytest.mark.parametrize("error", [ZeroDivisionError, SystemExit])
 @pytest.mark.parametrize("where", ["update", "joints_moved"])
-def test_a_controller_that_raises_is_stopped_once_and_the_others_go_on(manager, faults, where):
+def test_a_controller_that_raises_is_stopped_once_and_the_others_go_on(
+    manager, faults, where, error, monkeypatch
+):
+    monkeypatch.setattr(Faulty, "error", error)
     faulty = manager.load("faulty", {"type": "test/Faulty", "where": where})
     manager.switch(["faulty", "cart"], [], STRICT)
     manager.get("cart").command(0.5)
@@ -223,4 +229,20 @@ def test_a_controller_that_raises_at_its_stop_is_stopped_all_the_same(manager, f
 def test_a_controller_that_raises_while_it_is_made_is_refused_with_the_reason(manager, faults):
     with pytest.raises(ControlError, match="Initializing controller 'faulty' failed: KeyError"):
         manager.load("faulty", {"type": "test/Faulty", "where": "create"})
+    assert "faulty" not in states(manager)
+
+
+@pytest.mark.parametrize("claimed", ["stand_cart", ("elbow",), None, (3,)])
+def test_claims_that_are_no_joints_are_refused(manager, faults, claimed, monkeypatch):
+    def create(name, params, hardware):
+        made = Faulty(name, "")
+        made.claimed = claimed
+        return made
+
+    monkeypatch.setattr(Faulty, "create", create)
+    with pytest.raises(ControlError, match="no tuple of names of controlled joints"):
+        manager.load("faulty", {"type": "test/Faulty"})
+    monkeypatch.setattr(Faulty, "create", lambda name, params, hardware: None)
+    with pytest.raises(ControlError, match="returned None"):
+        manager.load("faulty", {"type": "test/Faulty"})
     assert "faulty" not in states(manager)

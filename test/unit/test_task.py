@@ -1,9 +1,17 @@
-"""The balancing task against the document's figures."""
+"""The balancing task against the document's figures; the other two against their own words."""
 
 import numpy as np
 import pytest
 
-from cartpole.task import ANGLE_LIMIT, POSITION_LIMIT, BalanceTask, CartPoleState
+from cartpole.task import (
+    ANGLE_LIMIT,
+    POSITION_LIMIT,
+    TASKS,
+    BalanceTask,
+    CartPoleState,
+    ClassicTask,
+    SwingUpTask,
+)
 
 UPRIGHT = CartPoleState(0.0, 0.0, 0.0, 0.0)
 
@@ -66,3 +74,77 @@ def test_impossible_noise_is_refused(noise: float) -> None:
 def test_an_episode_needs_a_step() -> None:
     with pytest.raises(ValueError, match="max_steps"):
         BalanceTask(max_steps=0)
+
+
+@pytest.mark.parametrize("kind", TASKS.values())
+def test_every_task_can_be_made_without_arguments(kind) -> None:
+    task, rng = kind(), np.random.default_rng(0)
+    for _ in range(50):
+        state = task.initial_state(rng)
+        assert not task.is_terminal(state)
+        assert task.observation(state) in task.observation_space()
+    assert task.is_truncated(task.max_steps)
+    assert not task.is_truncated(task.max_steps - 1)
+
+
+def test_the_classic_task_gives_one_for_each_step_and_ends_where_balancing_does() -> None:
+    classic, balance = ClassicTask(), BalanceTask()
+    for state in (UPRIGHT, UPRIGHT._replace(pole_angle=0.3), UPRIGHT._replace(cart_position=-0.41)):
+        assert classic.reward(state) == 1.0
+        assert classic.is_terminal(state) == balance.is_terminal(state)
+
+
+def test_the_classic_task_starts_moving() -> None:
+    rng = np.random.default_rng(0)
+    states = np.array([ClassicTask().initial_state(rng) for _ in range(500)])
+    assert states.max(axis=0) == pytest.approx([0.05] * 4, abs=0.002)
+    assert states.min(axis=0) == pytest.approx([-0.05] * 4, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("state", "reward"),
+    [
+        (UPRIGHT, 1.0),
+        (UPRIGHT._replace(pole_angle=np.pi), 0.0),
+        (UPRIGHT._replace(pole_angle=np.pi / 2), 0.5),
+        (UPRIGHT._replace(cart_position=-0.4), 0.55),
+        (UPRIGHT._replace(pole_velocity=5.0), 0.55),
+        (UPRIGHT._replace(pole_angle=2 * np.pi, cart_velocity=9.0), 1.0),
+    ],
+)
+def test_swing_up_rewards_a_pole_that_stands_still_in_the_middle(state, reward) -> None:
+    assert SwingUpTask().reward(state) == pytest.approx(reward)
+
+
+def test_swing_up_ends_at_the_rails_end_only() -> None:
+    task = SwingUpTask()
+    assert not task.is_terminal(CartPoleState(0.4, 9.0, 7.0, 50.0))
+    assert task.is_terminal(CartPoleState(-0.41, 0.0, 0.0, 0.0))
+
+
+def test_swing_up_moves_the_set_point_by_the_action() -> None:
+    task = SwingUpTask()
+    assert task.next_set_point(0.1, np.array([-0.5], np.float32)) == pytest.approx(0.09)
+
+
+def test_swing_up_starts_hanging_and_sees_no_jump_at_a_full_turn() -> None:
+    task = SwingUpTask(noise=0.0)
+    state = task.initial_state(np.random.default_rng(0))
+    assert task.observation(state).tolist() == pytest.approx([0.0, 0.0, 0.0, -1.0, 0.0], abs=1e-6)
+    turned = task.observation(state._replace(pole_angle=-np.pi))
+    assert turned == pytest.approx(task.observation(state), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("task", "action"),
+    [
+        (BalanceTask(), 2),
+        (BalanceTask(), -1),
+        (BalanceTask(), 0.5),
+        (SwingUpTask(), np.array([1.01])),
+        (SwingUpTask(), np.array([np.nan])),
+    ],
+)
+def test_what_is_no_action_is_refused(task, action) -> None:
+    with pytest.raises(ValueError, match="an action"):
+        task.next_set_point(0.0, action)

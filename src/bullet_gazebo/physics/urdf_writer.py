@@ -15,6 +15,8 @@ from bullet_gazebo.physics.description import (
 from bullet_gazebo.physics.meshes import drum, engine_mesh
 from bullet_gazebo.physics.pose import Pose, to_rpy
 
+MARGIN = 0.001  # [m]; PyBullet's, around convex hulls
+
 
 def write_urdf(model: ModelDescription, folder: Path | None = None) -> str:
     """Returns URDF text with the numbers of `model` to the last digit.
@@ -48,10 +50,14 @@ def _write_link(robot: Element, link: Link, static: bool, folder: Path | None) -
 
 
 def _finer(shape: Shape, folder: Path | None) -> Shape:
-    """The engine's own cylinder has 32 sides: a wheel rocks on them, and each one brakes it."""
+    """The engine's own cylinder has 32 sides: a wheel rocks on them, and each one brakes it.
+
+    Around a mesh the engine keeps a margin, by which a wheel would roll too far.
+    """
     if shape.kind != "cylinder" or folder is None:
         return shape
-    radius, length = shape.size
+    radius, length = max(shape.size[0] - MARGIN, 0.5 * shape.size[0]), shape.size[1]
+    length = max(length - 2.0 * MARGIN, 0.5 * length)
     return replace(shape, kind="mesh", size=(radius, radius, length), mesh=str(drum(folder)))
 
 

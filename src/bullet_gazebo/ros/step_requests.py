@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import rospy
 
 from bullet_gazebo.control.controllers.base import Controller, Input
-from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.errors import FAULTS, ControlError
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import RUNNING
 from bullet_gazebo.physics.model import Model
@@ -139,7 +139,13 @@ def _check_free(robot: Robot, joint: JointHandle) -> None:
 
 
 def _sending(port: Input, value: float | Sequence[float]) -> Callable[[], None]:
-    return lambda: port.receive(value)
+    def send() -> None:
+        try:
+            port.receive(value)
+        except FAULTS as error:
+            raise ControlError(f"the reader of '{port.topic}' raised {error!r}") from error
+
+    return send
 
 
 def _commanding(joint: JointHandle, value: float) -> Callable[[], None]:

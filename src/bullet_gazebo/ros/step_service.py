@@ -28,9 +28,9 @@ class StepService:
         with self._one_at_a_time, self._sim.lock:
             try:
                 plan = StepPlan(self._sim, request)  # everything is checked before anything is done
+                self._begin(request, plan)  # what is left to fail is a user's controller
             except ControlError as error:
                 return self._answer(request, f"StepWorld: {error}")
-            self._begin(request, plan)
             self._advance(request.ticks)
             return self._answer(request)
 

@@ -51,6 +51,8 @@ class Episode:
     observations: list[np.ndarray] = field(default_factory=list)  # each float32 (4,)
     actions: list[int] = field(default_factory=list)
     rewards: list[float] = field(default_factory=list)
+    final_observation: np.ndarray | None = None  # after the last step
+    terminated: bool = False  # by the task; False: it was cut off
 
     def add(self, observation: np.ndarray, action: int, reward: float) -> None:
         self.observations.append(observation)
@@ -108,8 +110,8 @@ class PolicyGradientAgent:
             self.policy = PolicyNetwork()
             self.value = ValueNetwork()
         if not random_weights:
-            _zero(self.policy.fc)
-            _zero(self.value.fc2)
+            start_at_zero(self.policy.fc)
+            start_at_zero(self.value.fc2)
         self.policy_optimizer = torch.optim.Adam(self.policy.parameters(), POLICY_LEARNING_RATE)
         self.value_optimizer = torch.optim.Adam(self.value.parameters(), VALUE_LEARNING_RATE)
         self._rng = np.random.default_rng(seed)
@@ -151,25 +153,28 @@ class PolicyGradientAgent:
         chosen = self.policy(observations).gather(1, actions.unsqueeze(1)).squeeze(1)
         policy_loss = -torch.sum(torch.log(chosen) * advantages)
         losses = Losses(policy_loss.item(), value_loss.item())
-        self._check(losses)
-        _descend(self.value_optimizer, value_loss)
-        _descend(self.policy_optimizer, policy_loss)
+        check_finite(losses)
+        descend(self.value_optimizer, value_loss)
+        descend(self.policy_optimizer, policy_loss)
         self.sync()
         return losses
 
-    @staticmethod
-    def _check(losses: Losses) -> None:
-        for name, loss in losses._asdict().items():
-            if not math.isfinite(loss):
-                raise CartpoleError(f"the {name} loss is {loss}; the networks were left unchanged")
+
+def check_finite(losses: Losses) -> None:
+    """Refuses losses that are no numbers with a CartpoleError, before anything is changed."""
+    for name, loss in losses._asdict().items():
+        if not math.isfinite(loss):
+            raise CartpoleError(f"the {name} loss is {loss}; the networks were left unchanged")
 
 
-def _zero(layer: nn.Linear) -> None:
+def start_at_zero(layer: nn.Linear) -> None:
+    """Has a layer begin with an output of 0 everywhere."""
     nn.init.zeros_(layer.weight)
     nn.init.zeros_(layer.bias)
 
 
-def _descend(optimizer: torch.optim.Optimizer, loss: torch.Tensor) -> None:
+def descend(optimizer: torch.optim.Optimizer, loss: torch.Tensor) -> None:
+    """One step of the optimizer down the loss."""
     optimizer.zero_grad()
     loss.backward()
     optimizer.step()

@@ -12,6 +12,8 @@ PHYSICS_STEP = 0.001  # [s]
 class Plant(Protocol):
     """A cart-pole robot whose cart follows a position set-point."""
 
+    deterministic: bool  # whether the same commands give the same states
+
     def reset(self, state: CartPoleState) -> CartPoleState:
         """Puts both joints where the state says; returns the state reached.
 

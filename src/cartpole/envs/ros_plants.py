@@ -13,19 +13,18 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Empty
 
 from cartpole.envs.plant import ticks_per_action
+from cartpole.envs.robot_names import CART_JOINT, CONTROLLER, DESCRIPTION, MODEL, POLE_JOINT
 from cartpole.envs.ros_service import ServiceClient
+from cartpole.envs.ros_variation import RosVariation
+from cartpole.envs.variation import Variation
 from cartpole.errors import SimulatorError
 from cartpole.task import CartPoleState
 
-MODEL = "cartpole"
-DESCRIPTION = "robot_description"
-CART_JOINT = "stand_cart"
-POLE_JOINT = "cart_pole"
-CONTROLLER = "stand_cart_position_controller"
 STEP_SERVICE = "/gazebo/step_world"
 STATE_TIMEOUT = 5.0  # [s] of wall time without a joint state
 RESET_WAIT = 0.5  # [s] of wall time for the joint state that a reset publishes
 _SAME = 1e-6  # [m], [rad]
+_EARLY = 1e-6  # [s]; of rounding
 
 
 def read_state(message: JointState) -> CartPoleState:
@@ -67,16 +66,25 @@ class _Resetter:
 
 
 class LockstepPlant:
-    """One service call for each action: command, advance, read; time stands still between."""
+    """One service call for each action: command, advance, read; time stands still between.
 
-    def __init__(self) -> None:
+    Args:
+        ticks: physics steps of one action.
+    """
+
+    deterministic = True
+
+    def __init__(self, ticks: int | None = None) -> None:
         from cartpole.srv import StepWorld, StepWorldRequest
 
         self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True)
         self._begin = StepWorldRequest(
             reset=StepWorldRequest.WORLD, joints=[CART_JOINT, POLE_JOINT]
         )
-        self._advance = StepWorldRequest(ticks=ticks_per_action(), controllers=[CONTROLLER])
+        self._advance = StepWorldRequest(
+            ticks=ticks or ticks_per_action(), controllers=[CONTROLLER]
+        )
+        self._variation = RosVariation()
 
     def reset(self, state: CartPoleState) -> CartPoleState:
         """See `Plant.reset`; the state asked for is the state reached, exactly."""
@@ -99,19 +107,32 @@ class LockstepPlant:
             raise SimulatorError(f"{STEP_SERVICE}: {answer.status_message}")
         return read_state(answer.joint_states)
 
+    def vary(self, variation: Variation) -> None:
+        """See `Plant.vary`."""
+        self._variation(variation)
+
     def close(self) -> None:
-        """Closes the connection to the simulator."""
+        """Closes the connection to the simulator; the robot is as it was found."""
         self._step.close()
+        self._variation.undo()
 
 
 class RealtimePlant:
     """As the existing script does it, with nothing but Gazebo's services and topics.
 
-    An action unpauses the world, publishes the set-point, and takes the newest joint state
-    without waiting for another one; so how much simulated time it gets depends on the machine.
+    An action unpauses the world, publishes the set-point, and takes the newest joint state; so
+    how much simulated time it gets depends on the machine.
+
+    Args:
+        control_period: simulated time [s] from one joint state to the next one that is taken;
+            None takes the newest one without waiting for another one.
     """
 
-    def __init__(self) -> None:
+    deterministic = False
+
+    def __init__(self, control_period: float | None = None) -> None:
+        self._period = control_period
+        self._variation = RosVariation()
         self._reset = _Resetter()
         self._pause = ServiceClient("/gazebo/pause_physics", Empty)
         self._unpause = ServiceClient("/gazebo/unpause_physics", Empty)
@@ -162,9 +183,11 @@ class RealtimePlant:
             SimulatorError: if joint states stop coming or the simulator doesn't answer.
         """
         self._unpause()
+        with self._arrived:
+            due = self._due()
         self._command.publish(set_point)
         with self._arrived:
-            self._arrived.wait_for(lambda: self._newest is not None, STATE_TIMEOUT)
+            self._arrived.wait_for(lambda: self._is_there(due), STATE_TIMEOUT)
             newest = self._newest
         if newest is None or time.monotonic() - newest[1] > STATE_TIMEOUT:
             raise SimulatorError(
@@ -172,6 +195,17 @@ class RealtimePlant:
                 "and joint_state_controller started?"
             )
         return read_state(newest[0])
+
+    def _due(self) -> float | None:
+        """Simulated time [s] of the joint state to wait for; None: any will do."""
+        if self._period is None or self._newest is None:
+            return None
+        return self._newest[0].header.stamp.to_sec() + self._period
+
+    def _is_there(self, due: float | None) -> bool:
+        if self._newest is None:
+            return False
+        return due is None or self._newest[0].header.stamp.to_sec() > due - _EARLY
 
     def _wait_for_command_link(self) -> None:
         deadline = time.monotonic() + STATE_TIMEOUT
@@ -182,7 +216,12 @@ class RealtimePlant:
                 )
             time.sleep(0.01)
 
+    def vary(self, variation: Variation) -> None:
+        """See `Plant.vary`."""
+        self._variation(variation)
+
     def close(self) -> None:
-        """Leaves the topics; the world stays as it is."""
+        """Leaves the topics; the world stays as it is, the robot as it was found."""
         self._subscriber.unregister()
         self._command.unregister()
+        self._variation.undo()

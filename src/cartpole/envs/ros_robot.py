@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import rospy
 from controller_manager_msgs.srv import ListControllers
-from gazebo_msgs.srv import GetWorldProperties
+from gazebo_msgs.srv import GetModelState, GetWorldProperties
 
 from cartpole.envs import ros_node
-from cartpole.envs.ros_plants import CONTROLLER, DESCRIPTION, MODEL
+from cartpole.envs.robot_names import CONTROLLER, DESCRIPTION, MODEL
 from cartpole.envs.ros_service import ServiceClient
 from cartpole.errors import CartpoleError, SimulatorError, SimulatorHangs
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
@@ -19,6 +19,7 @@ from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 CONTROLLERS = ["joint_state_controller", CONTROLLER]
 WORLD_SERVICE = "/gazebo/get_world_properties"
 SIMULATOR_TIMEOUT = 60.0  # [s]
+_ROUNDING = 1e-6  # [m]
 Say = Callable[[str], None]
 Undo = Callable[[], object]
 
@@ -40,8 +41,11 @@ def simulator_answers() -> bool:
         return False
 
 
-def bring_up(say: Say) -> list[Undo]:
+def bring_up(say: Say, height: float = 0.0) -> list[Undo]:
     """Spawns the robot and starts its controllers, each only if it isn't there.
+
+    Args:
+        height: where to spawn it, above the ground [m].
 
     Returns:
         What undoes the changes made, in the order in which they were made.
@@ -49,14 +53,14 @@ def bring_up(say: Say) -> list[Undo]:
     Raises:
         CartpoleError: if something can't be loaded, spawned or started.
     """
-    return [*_bring_model(say), *_bring_controllers(say)]
+    return [*_bring_model(say, height), *_bring_controllers(say)]
 
 
 def _models() -> list[str]:
     return ServiceClient(WORLD_SERVICE, GetWorldProperties)().model_names
 
 
-def _bring_model(say: Say) -> list[Undo]:
+def _bring_model(say: Say, height: float) -> list[Undo]:
     if MODEL in _models():
         return []
     say("spawning the robot")
@@ -65,11 +69,28 @@ def _bring_model(say: Say) -> list[Undo]:
     )
     if not loaded:
         raise CartpoleError("the robot's URDF can't be loaded; see the messages above")
-    answer = ros_gazebo.gazebo_spawn_urdf_param(DESCRIPTION, model_name=MODEL)
+    answer = ros_gazebo.gazebo_spawn_urdf_param(DESCRIPTION, model_name=MODEL, pos_z=height)
     succeeded, text = answer if isinstance(answer, tuple) else (answer, "see the messages above")
     if not succeeded:
         raise CartpoleError(f"the robot can't be spawned: {text}")
     return [lambda: ros_gazebo.gazebo_delete_model(MODEL)]
+
+
+def check_height(height: float) -> None:
+    """Makes sure that the robot stands at least that high above the ground [m].
+
+    Raises:
+        CartpoleError: if it doesn't.
+    """
+    if height <= 0.0:
+        return
+    answer = ServiceClient("/gazebo/get_model_state", GetModelState)(MODEL, "world")
+    found = answer.pose.position.z
+    if not answer.success or found < height - _ROUNDING:
+        raise CartpoleError(
+            f"the robot stands {found:g} m above the ground, where its hanging pole would hit it; "
+            f"this task needs {height:g} m: delete the model '{MODEL}' and it is spawned there"
+        )
 
 
 def _bring_controllers(say: Say) -> list[Undo]:

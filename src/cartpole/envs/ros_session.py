@@ -24,14 +24,24 @@ class RosSession:
         realtime: let the world run by itself, instead of in lock-step.
         gui: ask a simulator that is started here for its window.
         seed: for a simulator that is started here.
+        height: above the ground, where a robot that is spawned here stands [m].
     """
 
-    def __init__(self, name: str, argv: list[str], realtime: bool, gui: bool, seed: int) -> None:
+    def __init__(
+        self,
+        name: str,
+        argv: list[str],
+        realtime: bool,
+        gui: bool,
+        seed: int,
+        height: float = 0.0,
+    ) -> None:
         self._name = name
         self._argv = argv
         self._realtime = realtime
         self._gui = gui
         self._seed = seed
+        self._height = height
         self._undo = contextlib.ExitStack()
 
     def start(self, say: Say) -> Plant:
@@ -47,7 +57,7 @@ class RosSession:
             self._start_simulator()
         self._join()
         self._check_mode()
-        changes = ros_robot.bring_up(say)
+        changes = ros_robot.bring_up(say, self._height)
         if not own_simulator:  # one of ours ends with all that is in it
             for undo in changes:
                 self._undo.callback(_at_living_simulator, undo)
@@ -70,7 +80,9 @@ class RosSession:
         self._undo.callback(ros_gazebo.close_Gazebo)
 
     def _join(self) -> None:
-        """Becomes a node; the training handles signals itself."""
+        """Becomes a node, unless the process is one; the training handles signals itself."""
+        if rospy.core.is_initialized():
+            return
         ros_node.refuse_twin(self._name)
         rospy.init_node(os.path.basename(self._name), argv=["", *self._argv], disable_signals=True)
         self._undo.callback(rospy.signal_shutdown, "training ended")

@@ -25,13 +25,13 @@ class Sensor:
     """
 
     def __init__(self, noise: float | Sequence[float] = 0.0, delay: int = 0) -> None:
-        sizes = tuple(float(size) for size in np.broadcast_to(np.asarray(noise, float), (4,)))
-        if not all(math.isfinite(size) and size >= 0.0 for size in sizes):
+        sizes = tuple(noise) if isinstance(noise, Sequence) else (float(noise),) * 4
+        if len(sizes) != 4 or not all(math.isfinite(size) and size >= 0.0 for size in sizes):
             raise ValueError(f"sensor noise must be one or four numbers >= 0, not {noise}")
         if not 0 <= delay <= MOST_DELAY:
             raise ValueError(f"sensor delay must lie in [0, {MOST_DELAY}] steps, not {delay}")
         self._noise = sizes
-        self._is_noisy = any(sizes)
+        self.is_noisy = any(sizes)
         self._seen: deque[CartPoleState] = deque(maxlen=delay + 1)
 
     def begin(self, state: CartPoleState, rng: np.random.Generator) -> CartPoleState:
@@ -41,7 +41,7 @@ class Sensor:
 
     def measure(self, state: CartPoleState, rng: np.random.Generator) -> CartPoleState:
         """Returns the measurement that arrives when the robot is in `state`."""
-        self._seen.append(self._noisy(state, rng) if self._is_noisy else state)
+        self._seen.append(self._noisy(state, rng) if self.is_noisy else state)
         return self._seen[0]
 
     def _noisy(self, state: CartPoleState, rng: np.random.Generator) -> CartPoleState:

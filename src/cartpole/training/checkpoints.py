@@ -9,8 +9,7 @@ from typing import BinaryIO
 
 import torch
 
-from cartpole.agents.policy_gradient import PolicyGradientAgent
-from cartpole.training.loop import EpisodeRecord
+from cartpole.training.loop import Agent, EpisodeRecord
 
 
 def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
@@ -56,7 +55,7 @@ class NetworkSaver:
         every: episodes between two saves (the first is episode 0); 0 saves only at the end.
     """
 
-    def __init__(self, folder: Path, agent: PolicyGradientAgent, every: int) -> None:
+    def __init__(self, folder: Path, agent: Agent, every: int) -> None:
         self._folder = folder
         self._agent = agent
         self._every = every

@@ -2,13 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
+import gymnasium
 import numpy as np
 
-from cartpole.agents.policy_gradient import PolicyGradientAgent
 from cartpole.envs.cartpole_env import CartPoleEnv
 from cartpole.envs.plant import Plant
 from cartpole.task import BalanceTask
+from cartpole.training.loop import Agent
 
 EPISODES = 20
 # The simulator repeats itself: from the upright state a greedy policy would run the same
@@ -34,13 +36,24 @@ class Evaluation:
 
 def evaluate(
     plant: Plant,
-    agent: PolicyGradientAgent,
+    agent: Agent,
     seed: int,
     episodes: int = EPISODES,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Evaluation | None:
     """Runs greedy episodes from seeded initial states; None if told to stop."""
     env = CartPoleEnv(plant, BalanceTask(noise=NOISE))
+    return run_greedily(env, agent.act_greedily, seed, episodes, should_stop)
+
+
+def run_greedily(
+    env: gymnasium.Env[Any, Any],
+    act: Callable[[np.ndarray], int],
+    seed: int,
+    episodes: int,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> Evaluation | None:
+    """Runs episodes in any environment, seeded once; None if told to stop."""
     lengths, returns = [], []
     for index in range(episodes):
         observation, _ = env.reset(seed=seed if index == 0 else None)
@@ -49,9 +62,9 @@ def evaluate(
             if should_stop():
                 return None
             observation, reward, terminated, truncated, _ = env.step(
-                agent.act_greedily(observation)
+                act(np.asarray(observation, np.float32))
             )
-            length, total = length + 1, total + reward
+            length, total = length + 1, total + float(reward)
             finished = terminated or truncated
         lengths.append(length)
         returns.append(total)

@@ -17,8 +17,7 @@ class TensorBoardLog:
 
     def __init__(self, folder: Path, settings: dict[str, object]) -> None:
         self._writer = SummaryWriter(str(folder))
-        rows = "\n".join(f"|{name}|{value}|" for name, value in settings.items())
-        self._writer.add_text("hyperparameters", f"|parameter|value|\n|-|-|\n{rows}")
+        add_table(self._writer, settings)
 
     def episode_done(self, record: EpisodeRecord) -> None:
         points = {
@@ -35,3 +34,9 @@ class TensorBoardLog:
     def close(self) -> None:
         """Writes what is still in memory."""
         self._writer.close()
+
+
+def add_table(writer: SummaryWriter, settings: dict[str, object]) -> None:
+    """Shows settings as a table under TEXT."""
+    rows = "\n".join(f"|{name}|{value}|" for name, value in settings.items())
+    writer.add_text("hyperparameters", f"|parameter|value|\n|-|-|\n{rows}")

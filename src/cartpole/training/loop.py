@@ -5,8 +5,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from cartpole.agents.policy_gradient import Episode, Losses, PolicyGradientAgent
+import numpy as np
+from torch import nn
+
+from cartpole.agents.policy_gradient import Episode, Losses
 from cartpole.envs.cartpole_env import CartPoleEnv
+
+WINDOW = 20  # [episodes] over which a mean length counts
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,11 @@ class History:
         self.episodes.append(record)
         return record
 
+    def is_solved(self, length: float) -> bool:
+        """Whether the last 20 episodes lasted that long on average."""
+        recent = self.lengths[-WINDOW:]
+        return len(recent) == WINDOW and sum(recent) >= length * WINDOW
+
     @property
     def lengths(self) -> list[int]:
         return [record.length for record in self.episodes]
@@ -47,6 +57,22 @@ class History:
         return [record.total_reward for record in self.episodes]
 
 
+class Agent(Protocol):
+    """What acts, and learns from whole episodes."""
+
+    @property
+    def policy(self) -> nn.Module: ...
+
+    @property
+    def value(self) -> nn.Module: ...
+
+    def act(self, observation: np.ndarray) -> int: ...
+
+    def act_greedily(self, observation: np.ndarray) -> int: ...
+
+    def learn(self, episode: Episode) -> Losses: ...
+
+
 class Observer(Protocol):
     """Is told of every finished episode: a logger, a progress bar, a checkpoint writer."""
 
@@ -54,7 +80,7 @@ class Observer(Protocol):
 
 
 def run_episode(
-    env: CartPoleEnv, agent: PolicyGradientAgent, should_stop: Callable[[], bool]
+    env: CartPoleEnv, agent: Agent, should_stop: Callable[[], bool]
 ) -> Episode | None:
     """Runs one episode with the agent's own, random choice of actions.
 
@@ -72,18 +98,23 @@ def run_episode(
         episode.add(observation, action, reward)
         observation = following
         finished = terminated or truncated
+    episode.final_observation, episode.terminated = observation, terminated
     return episode
 
 
 def train(
     env: CartPoleEnv,
-    agent: PolicyGradientAgent,
+    agent: Agent,
     episodes: int,
     history: History,
     observers: list[Observer],
     should_stop: Callable[[], bool] = lambda: False,
+    stop_at: float | None = None,
 ) -> None:
     """Trains for that many episodes, or until `should_stop()`; an episode broken off is dropped.
+
+    Args:
+        stop_at: the mean length [steps] of the last 20 episodes with which it is done.
 
     Raises:
         SimulatorError: if the simulator fails; `history` and `agent` hold what was learned.
@@ -96,3 +127,5 @@ def train(
         record = history.add(index, episode, losses)
         for observer in observers:
             observer.episode_done(record)
+        if stop_at and history.is_solved(stop_at):
+            return

@@ -3,12 +3,17 @@
 import contextlib
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cartpole.envs import ros_node
 from cartpole.errors import CartpoleError
 from cartpole.training import run_folder
 from cartpole.training.interrupt import Interrupt
 from cartpole.training.pg_settings import Settings, settings
+
+if TYPE_CHECKING:
+    from cartpole.envs.local_session import LocalSession
+    from cartpole.envs.ros_session import RosSession
 
 NODE = "pg_train"
 
@@ -19,9 +24,11 @@ def main(argv: list[str] | None = None) -> int:
     interrupt = Interrupt().install()
     try:
         flags = ros_node.plain_arguments(argv)
-        settings(flags, {})  # wrong flags and --help need no master
+        chosen = settings(flags, {})  # wrong flags and --help need no master
         name = ros_node.full_name(argv, NODE)
-        return run(settings(flags, ros_node.private_parameters(name)), name, argv, interrupt)
+        if chosen.backend == "ros":  # without ROS there may be no master to ask
+            chosen = settings(flags, ros_node.private_parameters(name))
+        return run(chosen, name, argv, interrupt)
     except CartpoleError as error:
         return _failed(error, interrupt)
     except KeyboardInterrupt:
@@ -43,11 +50,10 @@ def run(chosen: Settings, name: str, argv: list[str], interrupt: Interrupt) -> i
         CartpoleError: if the run folder can't be made.
     """
     # Slow to import, and --help needs none of it.
-    from cartpole.envs.ros_session import RosSession
     from cartpole.training.pg_run import Training, say
 
     folder = run_folder.create(chosen.run_dir, "cartpole", "pg", chosen.seed)
-    session = RosSession(name, argv, chosen.realtime, chosen.gui, chosen.seed)
+    session = _session(chosen, name, argv)
     try:
         plant = session.start(say)
         interrupt.defer()
@@ -59,6 +65,16 @@ def run(chosen: Settings, name: str, argv: list[str], interrupt: Interrupt) -> i
         session.close()
         _remove_if_empty(folder)
     return interrupt.exit_code
+
+
+def _session(chosen: Settings, name: str, argv: list[str]) -> "RosSession | LocalSession":
+    if chosen.backend == "bullet":
+        from cartpole.envs.local_session import LocalSession
+
+        return LocalSession()
+    from cartpole.envs.ros_session import RosSession
+
+    return RosSession(name, argv, chosen.realtime, chosen.gui, chosen.seed)
 
 
 def _failed(error: CartpoleError, interrupt: Interrupt) -> int:

@@ -13,6 +13,7 @@ from cartpole.agents.policy_gradient import (
     VALUE_LEARNING_RATE,
     PolicyGradientAgent,
 )
+from cartpole.agents.reinforce import ReinforceAgent, ReinforceSettings
 from cartpole.envs.cartpole_env import CartPoleEnv
 from cartpole.envs.plant import Plant
 from cartpole.errors import CartpoleError
@@ -22,11 +23,12 @@ from cartpole.training.checkpoints import NetworkSaver
 from cartpole.training.evaluation import Evaluation, evaluate
 from cartpole.training.interrupt import Interrupt
 from cartpole.training.logs import TensorBoardLog
-from cartpole.training.loop import History, train
+from cartpole.training.loop import Agent, History, train
 from cartpole.training.pg_settings import Settings
 from cartpole.training.plots import learning_curve
 from cartpole.training.progress import progress
 
+SCALE = (0.4, 1.0, 0.2, 2.0)  # [m], [m/s], [rad], [rad/s]: what an observation comes to
 LAST = 60  # [episodes] over which the summary reports a mean
 
 
@@ -53,7 +55,7 @@ class Training:
         self._folder = folder
         self._plant = plant
         self._interrupt = interrupt
-        self._agent = PolicyGradientAgent(settings.seed, settings.random_weights)
+        self._agent = make_agent(settings)
         self._saver = NetworkSaver(folder, self._agent, settings.save_every)
         self._history = History()  # its clock starts here
 
@@ -78,7 +80,7 @@ class Training:
 
     def _train(self) -> None:
         settings = self._settings
-        log = TensorBoardLog(self._folder, {**asdict(settings), **hyperparameters()})
+        log = TensorBoardLog(self._folder, {**asdict(settings), **hyperparameters(settings)})
         shown = progress(settings.episodes)
         say(f"training for {settings.episodes} episodes with seed {settings.seed}")
         env = CartPoleEnv(self._plant, BalanceTask(noise=settings.start_noise))
@@ -91,6 +93,7 @@ class Training:
                 self._history,
                 [log, self._saver, shown],
                 self._interrupt.requested,
+                settings.stop_at or None,
             )
         finally:
             shown.close()
@@ -134,7 +137,7 @@ class Training:
         history = self._history
         return {
             "settings": asdict(self._settings),
-            "hyperparameters": hyperparameters(),
+            "hyperparameters": hyperparameters(self._settings),
             "versions": run_folder.versions(),
             "failure": str(failure) if failure else None,
             "interrupted": self._interrupt.requested(),
@@ -164,8 +167,17 @@ class Training:
         say(f"watch: tensorboard --logdir {shlex.quote(str(self._folder))}")
 
 
-def hyperparameters() -> dict[str, float]:
+def make_agent(settings: Settings) -> Agent:
+    """The learner that the settings name."""
+    if settings.algorithm == "gae":
+        return ReinforceAgent(settings.seed, SCALE)
+    return PolicyGradientAgent(settings.seed, settings.random_weights)
+
+
+def hyperparameters(settings: Settings) -> dict[str, float]:
     """The algorithm's constants, for logs and summaries."""
+    if settings.algorithm == "gae":
+        return asdict(ReinforceSettings())
     return {
         "gamma": GAMMA,
         "policy_learning_rate": POLICY_LEARNING_RATE,

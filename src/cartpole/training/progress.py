@@ -20,19 +20,25 @@ def _has_size(stream: TextIO) -> bool:
         return False
 
 
+def terminal_bar(total: int, unit: str, stream: TextIO, done: int = 0) -> tqdm:
+    """An empty bar that suits the terminal."""
+    sized = _has_size(stream)
+    return tqdm(
+        total=total,
+        initial=done,
+        unit=unit,
+        file=stream,
+        dynamic_ncols=sized,
+        ncols=None if sized else WIDTH,
+        nrows=None if sized else 2,
+    )
+
+
 class Bar:
     """A tqdm bar with the last return, the last length and the steps per second."""
 
     def __init__(self, episodes: int, stream: TextIO) -> None:
-        sized = _has_size(stream)
-        self._bar = tqdm(
-            total=episodes,
-            unit="episode",
-            file=stream,
-            dynamic_ncols=sized,
-            ncols=None if sized else WIDTH,
-            nrows=None if sized else 2,
-        )
+        self._bar = terminal_bar(episodes, "episode", stream)
 
     def episode_done(self, record: EpisodeRecord) -> None:
         self._bar.set_postfix_str(

@@ -1,9 +1,13 @@
 """The folder of one run: its name, and its summary as JSON."""
 
+import fcntl
 import json
+import os
 import platform
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +38,26 @@ def create(run_dir: str | None, env: str, experiment: str, seed: int) -> Path:
             f"the run folder {folder} isn't empty; name another one or remove its contents"
         )
     return folder.resolve()
+
+
+@contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Keeps a second training out of a run's folder; the lock ends with the process.
+
+    Raises:
+        CartpoleError: if another process holds it, or there is no such folder.
+    """
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError as error:
+        raise CartpoleError(f"{folder} is no run folder: {error.strerror}") from error
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError as error:
+        raise CartpoleError(f"a training is running in {folder}") from error
+    finally:
+        os.close(descriptor)
 
 
 def _fresh_name(parent: Path, name: str) -> Path:

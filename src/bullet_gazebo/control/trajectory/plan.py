@@ -9,6 +9,7 @@ from bullet_gazebo.control.trajectory.segment import NANOSECONDS, Waypoint
 
 SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS = 0, -1, -2  # control_msgs/FollowJointTrajectoryResult
 PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
+MOST_NAMED = 10  # joints in an error text
 LARGEST = 1e12  # of a position and its derivatives; beyond it a spline's figures would overflow
 
 
@@ -51,15 +52,21 @@ def check_joints(names: Sequence[str], joints: Sequence[str], partial: bool) -> 
     missing = [joint for joint in joints if joint not in names]
     fault = ""
     if unknown:
-        fault = f"the controller has no joint {unknown}; it has {list(joints)}"
+        fault = f"the controller has no joint {_shortened(unknown)}; it has {list(joints)}"
     elif len(set(names)) < len(names):
-        fault = f"a joint is named twice: {list(names)}"
+        fault = f"a joint is named twice: {_shortened(names)}"
     elif not names:
         fault = "it names no joint"
     elif missing and not partial:
         fault = f"it lacks {missing}, and allow_partial_joints_goal is not set"
     if fault:
         raise TrajectoryRefused(INVALID_JOINTS, f"The trajectory's joints don't match: {fault}")
+
+
+def _shortened(names: Sequence[str]) -> str:
+    """A list of names for a text that goes into the log and to the client."""
+    rest = len(names) - MOST_NAMED
+    return str(list(names[:MOST_NAMED])) + (f" and {rest} more" if rest > 0 else "")
 
 
 def check_points(plan: Plan) -> None:

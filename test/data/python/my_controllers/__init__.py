@@ -65,3 +65,44 @@ class Raises(Controller):
 
     def update(self, now, dt):
         raise ZeroDivisionError("a user's mistake")
+
+
+class Rude(Controller):
+    """A controller that misbehaves at the place that the parameter `where` names."""
+
+    type_name = "my_controllers/Rude"
+    interface = "EffortJointInterface"
+
+    def __init__(self, name, joint, where):
+        super().__init__(name)
+        self.joint = joint
+        self.where = where
+        self.heard = 0
+        self.claimed = joint.name if where == "claimed" else (joint.name,)
+        self.report = Output("report", Vector3)
+        self.outputs = [self.report]
+        if where == "topic":
+            self.outputs = [self.report, Output("other", "NoSuchKind")]
+        self.inputs = [Input("command", "Float64", self.command)]
+
+    @classmethod
+    def create(cls, name, params, hardware):
+        where = params["where"]
+        if where == "create":
+            raise SystemExit(1)
+        made = cls(name, joint_param(params, name, cls.interface, hardware), where)
+        return None if where == "nothing" else made
+
+    def command(self, value):
+        self.heard += 1
+        if self.where == "command" and value < 0.0:
+            raise SystemExit("a message that it dislikes")
+        self.joint.command = value
+
+    def update(self, now, dt):
+        if self.where == "update":
+            raise SystemExit("it has had enough")
+        if self.where == "report":
+            self.report.sink("no message")
+        if self.where == "content":
+            self.report.sink(Vector3(x="no number"))

@@ -1,0 +1,23 @@
+"""The environments under Gymnasium's names."""
+
+import gymnasium
+
+NAMESPACE = "cartpole"
+VERSION = 0
+IDS = {"Balance": "balance", "Classic": "classic", "SwingUp": "swing-up"}  # name: task
+SOLVED = {"classic": 475.0}  # of 500 steps, as for CartPole-v1
+
+
+def register_environments() -> None:
+    """Registers all of them; again does no harm."""
+    for name, task in IDS.items():
+        identifier = f"{NAMESPACE}/{name}-v{VERSION}"
+        if identifier in gymnasium.registry:
+            continue
+        gymnasium.register(
+            identifier,
+            entry_point="cartpole.envs.making:make_environment",
+            vector_entry_point="cartpole.envs.making:make_vector_environment",
+            reward_threshold=SOLVED.get(task),
+            kwargs={"task": task},
+        )

@@ -1,0 +1,59 @@
+#!/usr/bin/env python3
+"""dqn_train.py as a ROS node, and with no ROS around."""
+
+import json
+import unittest
+
+import rostest
+from pg_train_runs import Place
+
+SHORT = ["total_timesteps:=300", "eval_frequency:=0"]
+
+
+class DqnTrain(unittest.TestCase):
+    def place(self) -> Place:
+        place = Place()
+        self.addCleanup(place.close)
+        return place
+
+    def config(self, place: Place) -> dict:
+        return json.loads((place.run / "config.json").read_text())
+
+    def launched(self, place: Place, *arguments: str) -> str:
+        launched = place.start("roslaunch", "cartpole", "dqn_train.launch", *SHORT, *arguments)
+        launched.end(90)
+        self.assertNotIn("Traceback", launched.output)
+        return launched.output
+
+    def test_roslaunch_passes_parameters(self):
+        place = self.place()
+        self.launched(place, f"run_dir:={place.run}", "seed:=7", "params:=gamma=0.9 n_step=2")
+        config = self.config(place)
+        self.assertEqual((config["run"]["seed"], config["dqn"]["total_timesteps"]), (7, 300))
+        self.assertEqual((config["dqn"]["gamma"], config["dqn"]["n_step"]), (0.9, 2))
+        self.assertIn("last.pt", place.files())
+
+    def test_rosrun_needs_no_master_and_starts_none(self):
+        place = self.place()
+        training = place.start("rosrun", "cartpole", "dqn_train.py", f"--run-dir={place.run}",
+                               "--total-timesteps=300", "__name:=learner")  # fmt: skip
+        self.assertEqual(training.end(90), 0, training.output)
+        self.assertEqual(place.processes(), {})
+        self.assertIn("last.pt", place.files())
+
+    def test_a_master_far_away_that_does_not_answer_is_no_hindrance(self):
+        place = Place("http://127.0.0.2:1")
+        self.addCleanup(place.close)
+        training = place.start("rosrun", "cartpole", "dqn_train.py", f"--run-dir={place.run}",
+                               "--total-timesteps=300")  # fmt: skip
+        self.assertEqual(training.end(90), 0, training.output)
+
+    def test_an_unknown_parameter_is_one_line(self):
+        place = self.place()
+        output = self.launched(place, f"run_dir:={place.run}", "params:=gama=0.9")
+        self.assertIn("dqn_train: --params: unknown option 'gama'; did you mean gamma?", output)
+        self.assertFalse(place.run.exists())
+
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "dqn_train", DqnTrain)

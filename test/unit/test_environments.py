@@ -1,0 +1,103 @@
+"""The conformance suite over all tasks, in-process; and what only registration can get wrong."""
+
+import subprocess
+import sys
+
+import gymnasium
+import pytest
+from environment_conformance import EnvironmentConformance
+
+import cartpole  # noqa: F401 - registers the environments
+from cartpole.envs.bullet_plant import BulletPlant
+from cartpole.errors import CartpoleError
+
+
+class TestBalance(EnvironmentConformance):
+    identifier = "cartpole/Balance-v0"
+
+
+class TestClassic(EnvironmentConformance):
+    identifier = "cartpole/Classic-v0"
+
+
+class TestSwingUp(EnvironmentConformance):
+    identifier = "cartpole/SwingUp-v0"
+
+
+@pytest.mark.extras("stable_baselines3")
+@pytest.mark.parametrize("case", [TestBalance, TestClassic, TestSwingUp])
+def test_stable_baselines3s_checker_has_nothing_to_say(case):
+    case().stable_baselines3_agrees()
+
+
+def test_importing_the_package_loads_no_engine_no_ros_and_no_torch():
+    script = (
+        "import sys, cartpole, gymnasium; assert 'cartpole/Balance-v0' in gymnasium.registry;"
+        "print([m for m in ('pybullet', 'rospy', 'torch', 'xacro', 'cartpole.envs') if m in sys.modules])"
+    )
+    shown = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert shown.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (
+            {"backend": "gazebo"},
+            "there is no backend 'gazebo'; there are bullet, ros, ros-realtime",
+        ),
+        ({"noise": 0.5}, "noise must lie in"),
+        ({"max_steps": 0}, "max_steps must be at least 1"),
+        ({"sensor_noise": -1.0}, "sensor noise must be"),
+        ({"sensor_delay": -1}, "sensor delay must lie in"),
+        (
+            {"randomisation": {"mass": 2.0}},
+            r"randomisation of mass must lie in \[0, 0.9\], not 2.0",
+        ),
+        ({"randomisation": {"length": float("nan")}}, "randomisation of length"),
+        ({"control_period": 0.0}, "control period 0.0 s is no multiple"),
+        ({"control_period": float("nan")}, "control period nan s is no multiple"),
+        ({"render_mode": "ansi"}, "render_mode is"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options, text):
+    with pytest.raises(ValueError, match=text):
+        gymnasium.make("cartpole/Balance-v0", **options).close()
+
+
+@pytest.mark.parametrize("display", [None, ":77"])
+def test_a_window_without_a_display_is_an_error_that_says_what_to_do(monkeypatch, display):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    if display:
+        monkeypatch.setenv("DISPLAY", display)
+    with pytest.raises(CartpoleError, match="needs a display .*rgb_array"):
+        gymnasium.make("cartpole/Balance-v0", render_mode="human")
+
+
+def test_a_plant_that_got_no_environment_is_closed(monkeypatch):
+    closed, close = [], BulletPlant.close
+
+    def watched(plant):
+        closed.append(plant)
+        close(plant)
+
+    monkeypatch.setattr(BulletPlant, "close", watched)
+    with pytest.raises(ValueError, match="render_mode"):
+        gymnasium.make("cartpole/Balance-v0", render_mode="ansi")
+    assert len(closed) == 1
+
+
+def test_the_control_period_is_that_of_the_physics():
+    slow, quick = (
+        gymnasium.make("cartpole/Balance-v0", control_period=period).unwrapped
+        for period in (0.016, 0.008)
+    )
+    for env in (slow, quick):
+        env.reset(seed=0)
+    state = slow.plant.act(0.02)
+    quick.plant.act(0.02)
+    assert quick.plant.act(0.02) == state
+    slow.close()
+    quick.close()

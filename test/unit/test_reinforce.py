@@ -1,0 +1,113 @@
+"""REINFORCE with generalised advantages: its formulas, its repeatability, and that it learns."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from unit.learning_fakes import FakePlant
+
+from cartpole.agents.policy_gradient import Episode
+from cartpole.agents.reinforce import ReinforceAgent, ReinforceSettings, generalised_advantages
+from cartpole.envs.cartpole_env import CartPoleEnv
+from cartpole.errors import CartpoleError
+from cartpole.training.loop import History, run_episode, train
+
+numbers = st.floats(-10.0, 10.0)
+
+
+def an_episode(length=12, seed=0, terminated=True):
+    rng = np.random.default_rng(seed)
+    episode = Episode()
+    for _ in range(length):
+        episode.add(rng.normal(size=4).astype(np.float32), int(rng.integers(2)), float(rng.normal()))
+    episode.final_observation = rng.normal(size=4).astype(np.float32)
+    episode.terminated = terminated
+    return episode
+
+
+@given(st.lists(st.tuples(numbers, numbers), min_size=1, max_size=30), numbers, st.floats(0, 1))
+def test_advantages_are_the_sums_of_the_paper(pairs, last, gae_lambda):
+    gamma = 0.9
+    rewards, values = [p[0] for p in pairs], np.array([p[1] for p in pairs] + [last])
+    deltas = [r + gamma * values[t + 1] - values[t] for t, r in enumerate(rewards)]
+    expected = [
+        sum((gamma * gae_lambda) ** k * delta for k, delta in enumerate(deltas[t:]))
+        for t in range(len(deltas))
+    ]
+    found = generalised_advantages(rewards, values, gamma, gae_lambda)
+    assert found == pytest.approx(expected, abs=1e-9)
+
+
+def test_with_lambda_1_they_are_returns_less_the_baseline():
+    values = np.array([1.0, 2.0, 3.0, 0.0])
+    found = generalised_advantages([1.0, 1.0, 1.0], values, 0.5, 1.0)
+    assert found == pytest.approx([1.75 - 1.0, 1.5 - 2.0, 1.0 - 3.0])
+
+
+def test_a_terminated_episode_does_not_bootstrap_and_a_truncated_one_does():
+    agent = ReinforceAgent(0)
+    assert agent._values(an_episode(terminated=True))[-1] == 0.0
+    assert agent._values(an_episode(terminated=False))[-1] != 0.0
+
+
+def test_the_policy_starts_uniform_and_acting_agrees_with_the_network():
+    agent = ReinforceAgent(3, scale=(0.4, 1.0, 0.2, 2.0))
+    observation = np.array([0.1, -0.3, 0.05, 0.7], np.float32)
+    assert agent.probability_of_zero(observation) == 0.5
+    agent.learn(an_episode())
+    scaled = torch.from_numpy(observation / np.array([0.4, 1.0, 0.2, 2.0], np.float32))
+    expected = agent.policy(scaled.unsqueeze(0))[0, 0].item()
+    assert agent.probability_of_zero(observation) == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_batch_updates_with_its_last_episode():
+    agent = ReinforceAgent(0, settings=ReinforceSettings(batch_episodes=3))
+    before = agent.policy.fc.weight.detach().clone()
+    for seed in range(2):
+        agent.learn(an_episode(seed=seed))
+    assert torch.equal(agent.policy.fc.weight, before)
+    agent.learn(an_episode(seed=2))
+    assert not torch.equal(agent.policy.fc.weight, before)
+
+
+def test_the_same_seed_learns_the_same_bits():
+    agents = [ReinforceAgent(5) for _ in range(2)]
+    for agent in agents:
+        for seed in range(4):
+            agent.learn(an_episode(seed=seed))
+    for ours, theirs in zip(agents[0].value.parameters(), agents[1].value.parameters(), strict=True):
+        assert torch.equal(ours, theirs)
+
+
+def test_a_loss_that_is_no_number_changes_nothing():
+    agent, episode = ReinforceAgent(0), an_episode()
+    before = [p.detach().clone() for p in (*agent.policy.parameters(), *agent.value.parameters())]
+    episode.rewards[3] = math.nan
+    with pytest.raises(CartpoleError, match="loss is nan"):
+        agent.learn(episode)
+    after = [*agent.policy.parameters(), *agent.value.parameters()]
+    assert all(torch.equal(a, b) for a, b in zip(after, before, strict=True))
+
+
+def test_an_episode_that_is_not_over_is_refused():
+    episode = an_episode()
+    episode.final_observation = None
+    with pytest.raises(ValueError, match="isn't over"):
+        ReinforceAgent(0).learn(episode)
+
+
+def test_it_learns_on_a_fake_plant_and_stops_when_it_is_done():
+    history = History()
+    torch.set_num_threads(1)
+    train(CartPoleEnv(FakePlant()), ReinforceAgent(1), 60, history, [], stop_at=2000.0)
+    first, last = np.mean(history.lengths[:20]), np.mean(history.lengths[-20:])
+    assert last > 1.2 * first
+
+
+def test_the_loop_tells_how_an_episode_ended():
+    episode = run_episode(CartPoleEnv(FakePlant()), ReinforceAgent(0), lambda: False)
+    assert episode.terminated
+    assert episode.final_observation.shape == (4,)
