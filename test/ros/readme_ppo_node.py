@@ -1,0 +1,33 @@
+#!/usr/bin/env python3
+"""README's quick start with Stable-Baselines3 runs as it stands there, for fewer steps."""
+
+import importlib.util
+import re
+import unittest
+from pathlib import Path
+
+import rospkg
+import rostest
+from pg_train_runs import Place
+
+BLOCK = re.compile(r"## As a Gymnasium environment\n+```python\n(.*?)```", re.DOTALL)
+
+
+@unittest.skipUnless(importlib.util.find_spec("stable_baselines3"), "./ws extras isn't installed")
+class ReadmePpo(unittest.TestCase):
+    def test_it_trains_over_ros_and_leaves_nothing(self):
+        readme = Path(rospkg.RosPack().get_path("cartpole"), "README.md").read_text()
+        code = BLOCK.search(readme).group(1)
+        self.assertIn("60_000", code)
+        place = Place()
+        self.addCleanup(place.close)
+        script = place.folder / "ppo.py"
+        script.write_text(code.replace("60_000", "1_024") + "\nprint(model.num_timesteps)\n")
+        training = place.start("python3", str(script))
+        self.assertEqual(training.end(100), 0, training.output)
+        self.assertTrue(training.output.rstrip().endswith("1024"), training.output)
+        self.assertEqual(place.left_after(10), {})
+
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "readme_ppo", ReadmePpo)
