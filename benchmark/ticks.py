@@ -74,6 +74,22 @@ def ticks(sim: Simulator) -> Callable[[int], None]:
     return run
 
 
+def plain_loop(sim: Simulator) -> Callable[[int], None]:
+    """What no general simulator in Python can beat: read, one line of control, write, step."""
+    body = sim.world.models["cartpole"].body
+    cart = body.joint_names.index("stand_cart")
+    efforts = [0.0] * len(body.joint_names)
+
+    def run(count: int) -> None:
+        for _ in range(count):
+            position, velocity, *_ = body.joint_states()[cart]
+            efforts[cart] = -100.0 * position - 10.0 * velocity
+            body.apply_efforts(efforts)
+            sim.world.step()
+
+    return run
+
+
 def updates(controller: Controller) -> Callable[[int], None]:
     def run(count: int) -> None:
         for now in range(count):
@@ -87,6 +103,7 @@ def measure(urdf: str, count: int, rounds: int) -> dict[str, float]:
     both = make_world(urdf, {"states": STATES, "cart": CART})
     parts = {
         "bare step": steps(make_world(urdf, {})),
+        "read, control, write, step": plain_loop(make_world(urdf, {})),
         "tick without a robot": ticks(make_world(urdf, {})),
         "tick with joint states": ticks(make_world(urdf, {"states": STATES})),
         "tick with two controllers": ticks(both),
