@@ -17,7 +17,7 @@ def register_environments() -> None:
         gymnasium.register(
             identifier,
             entry_point="cartpole.envs.making:make_environment",
-            vector_entry_point="cartpole.envs.making:make_vector_environment",
+            vector_entry_point="cartpole.envs.vector_env:CartPoleVectorEnv",
             reward_threshold=SOLVED.get(task),
             kwargs={"task": task},
         )

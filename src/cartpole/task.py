@@ -119,10 +119,11 @@ class BalanceTask(Task):
 
     def next_set_point(self, set_point: float, action: int) -> float:
         """Moves the cart's set-point [m] as the action (0 or 1) says."""
-        if action == 1:
-            return set_point + SET_POINT_STEP
-        if action == 0:
-            return set_point - SET_POINT_STEP
+        if getattr(action, "shape", ()) == ():  # an array of several compares to neither
+            if action == 1:
+                return set_point + SET_POINT_STEP
+            if action == 0:
+                return set_point - SET_POINT_STEP
         raise ValueError(f"an action is 0 or 1, not {action!r}")
 
     def observation(self, state: CartPoleState) -> np.ndarray:
@@ -190,10 +191,13 @@ class SwingUpTask(Task):
 
     def next_set_point(self, set_point: float, action: np.ndarray) -> float:
         """Moves the cart's set-point [m] by `action[0]`, which lies in [-1, 1], times 0.02 m."""
-        share = float(action[0])
-        if not -1.0 <= share <= 1.0:
-            raise ValueError(f"an action lies in [-1, 1], not {share}")
-        return set_point + SET_POINT_STEP * share
+        try:
+            (share,) = action
+            if -1.0 <= share <= 1.0:
+                return set_point + SET_POINT_STEP * float(share)
+        except (TypeError, ValueError):  # not one number
+            pass
+        raise ValueError(f"an action is one number in [-1, 1], not {action!r}")
 
     def observation(self, state: CartPoleState) -> np.ndarray:
         """Float32, shape (5,); see `observation_space`."""

@@ -68,8 +68,8 @@ class Connection:
         if "error" in answer:
             raise CallFailed(answer["error"])
 
-    def call(self, message: genpy.Message) -> Any:
-        """Sends a request and returns the response.
+    def call(self, message: genpy.Message, timeout: float) -> Any:
+        """Sends a request and returns the response; no wait is longer than `timeout` [s].
 
         Raises:
             CallFailed: the service failed; ConnectionEnded: there is no connection any more.
@@ -77,6 +77,7 @@ class Connection:
         """
         payload = _serialized(message)
         try:
+            self._socket.settimeout(timeout)
             self._socket.sendall(payload)
             ok, answer = self._receive()
         except TimeoutError:
@@ -127,7 +128,7 @@ def call(address: str, name: str, kind: Any, request: tuple[Any, ...], timeout: 
     message = request_message(kind, request)
     connection = Connection(address, name, kind, timeout)
     try:
-        return connection.call(message)
+        return connection.call(message, timeout)
     finally:
         connection.close()
 

@@ -33,7 +33,7 @@ class ServiceClient:
         name: the service's name, global or relative to the node's namespace.
         kind: its generated class.
         persistent: keep the connection between calls; several times as fast.
-        timeout: wall time [s] that connecting and an answer may take.
+        timeout: wall time [s] that connecting and an answer may take; the attribute may be changed.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class ServiceClient:
         self.name = str(rospy.resolve_name(name))
         self._kind = kind
         self._persistent = persistent
-        self._timeout = timeout
+        self.timeout = timeout
         self._connection: _tcpros.Connection | None = None
 
     def __call__(self, *request: Any) -> Any:
@@ -57,11 +57,11 @@ class ServiceClient:
         kept = False
         try:
             message = _tcpros.request_message(self._kind, request)
-            response = self._connected().call(message)
+            response = self._connected().call(message, self.timeout)
             kept = self._persistent
             return response
         except TimeoutError as fault:
-            raise ServiceHangs(f"{self.name}: no answer within {self._timeout:g} s") from fault
+            raise ServiceHangs(f"{self.name}: no answer within {self.timeout:g} s") from fault
         except _tcpros.ConnectionEnded as fault:
             raise ServiceGone(f"{self.name}: the connection broke; its node has ended") from fault
         except _tcpros.CallFailed as fault:
@@ -73,7 +73,7 @@ class ServiceClient:
     def _connected(self) -> _tcpros.Connection:
         if self._connection is None:
             self._connection = _tcpros.Connection(
-                self._address(), self.name, self._kind, self._timeout
+                self._address(), self.name, self._kind, self.timeout
             )
         return self._connection
 

@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from typing import Any
 
 from cartpole.srv import StepWorld, StepWorldRequest, StepWorldResponse
@@ -16,6 +17,7 @@ from ros_utils.service_client import ServiceClient, ServiceFailed, ServiceGone
 
 STEP_SERVICE = "/gazebo/step_world"
 TIMEOUT = 10.0  # [s] of wall time
+SLOWEST_TICK = 0.01  # [s] of wall time; one of a very full world
 Commands = Mapping[str, float | Sequence[float]]
 
 
@@ -26,11 +28,12 @@ class StepRefused(ServiceFailed):
 class StepClient:
     """Steps a world over a lasting connection, which is renewed after a restart of the simulator.
 
-    No call takes longer than `timeout` [s] of wall time and the time of its steps. Errors are those of
+    No call takes longer than `timeout` [s] of wall time, and 10 ms for each of its ticks. Errors are those of
     ros_utils.service_client (ServiceGone, ServiceHangs, ServiceFailed), and StepRefused.
     """
 
     def __init__(self, service: str = STEP_SERVICE, timeout: float = TIMEOUT) -> None:
+        self._timeout = timeout
         self._call = ServiceClient(service, StepWorld, persistent=True, timeout=timeout)
 
     def step(
@@ -91,6 +94,7 @@ class StepClient:
         return self._answer(request)
 
     def _answer(self, request: StepWorldRequest, again: bool = False) -> StepWorldResponse:
+        self._call.timeout = self._timeout + time_of(request.ticks)
         try:
             response: Any = self._call(request)
         except ServiceGone:
@@ -104,6 +108,11 @@ class StepClient:
     def close(self) -> None:
         """Gives the connection up; the next call makes a new one."""
         self._call.close()
+
+
+def time_of(ticks: Any) -> float:
+    """The most wall time [s] that steps take; what is no number of ticks is refused elsewhere."""
+    return SLOWEST_TICK * max(0, ticks) if isinstance(ticks, Integral) else 0.0
 
 
 def _request(

@@ -36,22 +36,35 @@ class StepPlan:
         _check_list("joints", names, "velocities", velocities)
         placed: dict[Model, Placing] = {}
         for name, position, velocity in zip(names, request.positions, velocities, strict=True):
-            found = self._sim.world.joint(name)
-            if found is None or found[1] not in found[0].joint_names:
-                raise ControlError(f"there is no movable joint '{name}'")
-            model, joint = found
+            model, joint = self._movable_joint(name)
+            if joint in placed.get(model, ({}, {}))[0]:
+                raise ControlError(f"joints names '{model.name}::{joint}' twice")
             positions, speeds = placed.setdefault(model, ({}, {}))
             positions[joint] = position
             speeds[joint] = velocity
         return placed
+
+    def _movable_joint(self, name: str) -> tuple[Model, str]:
+        """Returns the model and the plain name of the joint of that plain or scoped name."""
+        world = self._sim.world
+        found = world.joint(name)
+        if found is None or found[1] not in found[0].joint_names:
+            raise ControlError(f"there is no movable joint '{name}'")
+        if name == found[1] and sum(name in m.joint_names for m in world.models.values()) > 1:
+            raise ControlError(f"several models have a joint '{name}'; write model::{name}")
+        return found
 
     def _controllers(self, request: StepWorldRequest) -> list[Callable[[], None]]:
         """Each controller takes as many numbers as its command topic does."""
         left = list(request.commands)
         _check_numbers("commands", left)
         commands = []
+        seen: set[int] = set()
         for name in request.controllers:
             controller = self._controller(name)
+            if id(controller) in seen:
+                raise ControlError(f"controllers names one twice: '{name}'")
+            seen.add(id(controller))
             port = _command_port(controller)
             single = port.kind == "Float64"
             count = 1 if single else len(controller.claimed)
@@ -69,8 +82,11 @@ class StepPlan:
 
     def _joints(self, request: StepWorldRequest) -> list[Callable[[], None]]:
         _check_list("commanded_joints", request.commanded_joints, "joint_commands", request.joint_commands)
-        pairs = zip(request.commanded_joints, request.joint_commands, strict=True)
-        return [_commanding(self._free_joint(name), value) for name, value in pairs]
+        joints = [self._free_joint(name) for name in request.commanded_joints]
+        if len({id(joint) for joint in joints}) < len(joints):
+            raise ControlError(f"commanded_joints names one twice: {list(request.commanded_joints)}")
+        pairs = zip(joints, request.joint_commands, strict=True)
+        return [_commanding(joint, value) for joint, value in pairs]
 
     def _controller(self, name: str) -> Controller:
         """Returns the running controller of that plain or full name."""
@@ -90,12 +106,18 @@ class StepPlan:
 
     def _free_joint(self, name: str) -> JointHandle:
         """Returns the controllable joint of that plain or scoped name, if no running controller has it."""
-        for robot in self._sim.robots:
-            for joint in robot.hardware.joints.values():
-                if name in (joint.name, f"{robot.model.name}::{joint.name}"):
-                    _check_free(robot, joint)
-                    return joint
-        raise ControlError(f"no robot has a joint '{name}' with a transmission")
+        found = [
+            (robot, joint)
+            for robot in self._sim.robots
+            for joint in robot.hardware.joints.values()
+            if name in (joint.name, f"{robot.model.name}::{joint.name}")
+        ]
+        if not found:
+            raise ControlError(f"no robot has a joint '{name}' with a transmission")
+        if len(found) > 1:
+            raise ControlError(f"several robots have a joint '{name}'; write model::{name}")
+        _check_free(*found[0])
+        return found[0][1]
 
 
 def _check_ticks(request: StepWorldRequest) -> None:
@@ -107,6 +129,8 @@ def _check_ticks(request: StepWorldRequest) -> None:
         )
     if request.reset > StepWorldRequest.SIMULATION:
         raise ControlError(f"reset is {request.reset}: 0 (none), 1 (world) or 2 (simulation)")
+    if request.seed and request.reset == StepWorldRequest.NONE:
+        raise ControlError(f"seed is {request.seed}, which goes with a reset only")
 
 
 def _check_list(names: str, one: Sequence[str], values: str, other: Sequence[float]) -> None:

@@ -8,7 +8,7 @@ from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.physics.bullet import BulletEngine
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.properties import (
     JointProperties,
@@ -20,7 +20,12 @@ from bullet_gazebo.physics.urdf import parse_urdf
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.robot import Robot
 from bullet_gazebo.simulator import Simulator
-from cartpole.envs.plant import CONTROL_PERIOD, PHYSICS_STEP, ticks_per_action
+from cartpole.envs.plant import (
+    CONTROL_PERIOD,
+    DEFAULT_ENGINE,
+    PHYSICS_STEP,
+    ticks_per_action,
+)
 from cartpole.envs.robot_files import controller_parameters, robot_urdf
 from cartpole.envs.robot_names import (
     CART_JOINT,
@@ -44,18 +49,25 @@ class BulletPlant:
     Args:
         control_period: simulated time [s] of one action.
         height: of the stand above the ground [m].
+        engine: "bullet", or "mujoco"; see `bullet_gazebo.physics.engines`.
 
     Raises:
-        ValueError: if the period isn't a whole number of physics steps.
+        ValueError: if the period isn't a whole number of physics steps, or there is no such
+            engine, or it isn't installed.
         CartpoleError: if the robot's files aren't found.
     """
 
     deterministic = True
 
-    def __init__(self, control_period: float = CONTROL_PERIOD, height: float = 0.0) -> None:
+    def __init__(
+        self,
+        control_period: float = CONTROL_PERIOD,
+        height: float = 0.0,
+        engine: str = DEFAULT_ENGINE,
+    ) -> None:
         self._ticks = ticks_per_action(control_period, PHYSICS_STEP)
         urdf = robot_urdf()
-        self._sim = Simulator(World(BulletEngine(), time_step=PHYSICS_STEP), lockstep=True)
+        self._sim = Simulator(World(make_engine(engine), time_step=PHYSICS_STEP), lockstep=True)
         self._model = self._sim.world.spawn(MODEL, parse_urdf(urdf), Pose((0.0, 0.0, height)))
         hardware = RobotHardware(read_description(urdf))
         self._controller = self._start(hardware)

@@ -65,6 +65,8 @@ class CartPoleEnv(gymnasium.Env[np.ndarray, Any]):
     | `backend`        | `"bullet"` | the robot: in this process, ...                          |
     |                  | `"ros"`    | ... over ROS in lock-step, with the same bits, ...       |
     |                  | `"ros-realtime"` | ... or over ROS in real time, by Gazebo's own services alone |
+    | `engine`         | `"bullet"` | physics in this process: PyBullet, or `"mujoco"` (`./ws extras`); |
+    |                  |            | over ROS it is the simulator's (`physics:=`)              |
     | `control_period` | 0.008      | simulated time of an action [s], whole physics steps     |
     | `noise`          | the task's | of the starting state                                    |
     | `max_steps`      | the task's | length at which an episode is cut off                    |
@@ -113,6 +115,7 @@ class CartPoleEnv(gymnasium.Env[np.ndarray, Any]):
         self._state = self.task.start
         self._set_point = 0.0
         self._steps: int | None = None  # None: no episode is under way
+        self._closed = False
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -130,9 +133,15 @@ class CartPoleEnv(gymnasium.Env[np.ndarray, Any]):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Starts an episode.
 
+        Args:
+            seed: begins the stream of random numbers anew; None goes on with it.
+            options: none are known; there is nothing that they would change.
+
         Raises:
+            gymnasium.error.ClosedEnvironmentError: after `close()`.
             SimulatorError: if the plant doesn't answer.
         """
+        self._check_open()
         super().reset(seed=seed)
         info = self._vary()
         self._state = state = self.plant.reset(self.task.initial_state(self.np_random))
@@ -156,10 +165,12 @@ class CartPoleEnv(gymnasium.Env[np.ndarray, Any]):
 
         Raises:
             gymnasium.error.ResetNeeded: if no episode is under way.
+            gymnasium.error.ClosedEnvironmentError: after `close()`.
             ValueError: if the action isn't one of the task's.
             SimulatorError: if the plant doesn't answer.
         """
         if self._steps is None:
+            self._check_open()
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         task = self.task
         self._set_point = task.next_set_point(self._set_point, action)
@@ -180,9 +191,17 @@ class CartPoleEnv(gymnasium.Env[np.ndarray, Any]):
 
     def close(self) -> None:
         """Closes the plant and the window; may be called twice."""
+        self._closed = True
+        self._steps = None
         if self._window is not None:
             self._window.close()
         self.plant.close()
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise gymnasium.error.ClosedEnvironmentError(
+                "this environment is closed; make another one"
+            )
 
 
 def _metadata(control_period: float) -> dict[str, Any]:

@@ -1,16 +1,15 @@
-"""Environments by name and plain options: what stands behind `gymnasium.make` and `make_vec`."""
+"""Environments by name and plain options: what stands behind `gymnasium.make`."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from cartpole.envs.cartpole_env import CartPoleEnv
-from cartpole.envs.plant import CONTROL_PERIOD, Plant
+from cartpole.envs.plant import CONTROL_PERIOD, DEFAULT_ENGINE, Plant
 from cartpole.envs.sensor import Sensor
 from cartpole.envs.variation import Randomisation
 from cartpole.task import TASKS, Task
-
-if TYPE_CHECKING:
-    from cartpole.envs.vector_env import CartPoleVectorEnv
 
 BACKENDS = ("bullet", "ros", "ros-realtime")
 
@@ -19,10 +18,11 @@ def make_environment(
     task: str,
     backend: str = "bullet",
     *,
+    engine: str = DEFAULT_ENGINE,
     control_period: float = CONTROL_PERIOD,
     noise: float | None = None,
     max_steps: int | None = None,
-    sensor_noise: float | Sequence[float] = 0.0,
+    sensor_noise: float | Sequence[float] | np.ndarray = 0.0,
     sensor_delay: int = 0,
     randomisation: Mapping[str, float] | None = None,
     render_mode: str | None = None,
@@ -36,7 +36,7 @@ def make_environment(
     made = make_task(task, noise, max_steps)
     sensor = Sensor(sensor_noise, sensor_delay)
     drawn = Randomisation(**randomisation) if randomisation else None
-    plant = make_plant(backend, made, control_period)
+    plant = make_plant(backend, made, control_period, engine)
     try:
         return CartPoleEnv(
             plant,
@@ -49,13 +49,6 @@ def make_environment(
     except Exception:
         plant.close()
         raise
-
-
-def make_vector_environment(num_envs: int, **options: Any) -> "CartPoleVectorEnv":
-    """Makes `num_envs` environments that step together; see `CartPoleVectorEnv`."""
-    from cartpole.envs.vector_env import CartPoleVectorEnv
-
-    return CartPoleVectorEnv(num_envs, **options)
 
 
 def make_task(name: str, noise: float | None = None, max_steps: int | None = None) -> Task:
@@ -71,19 +64,29 @@ def make_task(name: str, noise: float | None = None, max_steps: int | None = Non
     return TASKS[name](**chosen)
 
 
-def make_plant(backend: str, task: Task, control_period: float = CONTROL_PERIOD) -> Plant:
+def make_plant(
+    backend: str,
+    task: Task,
+    control_period: float = CONTROL_PERIOD,
+    engine: str = DEFAULT_ENGINE,
+) -> Plant:
     """Makes the robot that an environment of `task` moves.
 
     Raises:
-        ValueError: if there is no such backend, or the control period is no whole number of
-            physics steps.
+        ValueError: if there is no such backend or engine, or the control period is no whole number
+            of physics steps.
         CartpoleError: if the robot can't be brought up.
     """
     if backend == "bullet":
         from cartpole.envs.bullet_plant import BulletPlant
 
-        return BulletPlant(control_period, task.stand_height)
+        return BulletPlant(control_period, task.stand_height, engine)
     if backend in BACKENDS:
+        if engine != DEFAULT_ENGINE:
+            raise ValueError(
+                f"engine {engine!r} is for the backend 'bullet'; over ROS the simulator has its own: "
+                "start it with physics:=mujoco"
+            )
         from cartpole.envs.ros_backend import ros_plant
 
         return ros_plant(backend == "ros-realtime", control_period, task.stand_height)

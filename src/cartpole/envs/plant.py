@@ -7,6 +7,7 @@ from cartpole.task import CartPoleState
 
 CONTROL_PERIOD = 0.008  # [s] of simulated time for each action
 PHYSICS_STEP = 0.001  # [s]
+DEFAULT_ENGINE = "bullet"
 
 
 class Plant(Protocol):

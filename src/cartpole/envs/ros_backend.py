@@ -20,7 +20,7 @@ HEIGHT = max(task.stand_height for task in TASKS.values())  # [m]; a robot there
 def ros_plant(realtime: bool, control_period: float, height: float) -> Plant:
     """Connects to the robot in a simulator; brings up what isn't running.
 
-    What is started here runs until this process ends.
+    What is started here runs until this process ends; where it has died, it is started anew.
 
     Args:
         realtime: whether the world runs by itself, instead of in lock-step.
@@ -33,6 +33,9 @@ def ros_plant(realtime: bool, control_period: float, height: float) -> Plant:
     """
     ticks_per_action(control_period)  # before a simulator is started for it
     _session(realtime)
+    if not ros_robot.simulator_answers():
+        _session.cache_clear()  # the old session still ends, with this process, what is left of it
+        _session(realtime)
     ros_robot.check_height(height)
     ticks = ticks_per_action(control_period, _physics_step())
     return RealtimePlant(control_period) if realtime else LockstepPlant(ticks)

@@ -76,6 +76,7 @@ class LockstepPlant:
 
     def __init__(self, ticks: int | None = None) -> None:
         from cartpole.srv import StepWorld, StepWorldRequest
+        from ros_utils.step_client import time_of
 
         self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True)
         self._begin = StepWorldRequest(
@@ -84,6 +85,7 @@ class LockstepPlant:
         self._advance = StepWorldRequest(
             ticks=ticks or ticks_per_action(), controllers=[CONTROLLER]
         )
+        self._step.timeout += time_of(self._advance.ticks)
         self._variation = RosVariation()
 
     def reset(self, state: CartPoleState) -> CartPoleState:
@@ -187,14 +189,20 @@ class RealtimePlant:
             due = self._due()
         self._command.publish(set_point)
         with self._arrived:
-            self._arrived.wait_for(lambda: self._is_there(due), STATE_TIMEOUT)
+            return read_state(self._wait_until(due))
+
+    def _wait_until(self, due: float | None) -> JointState:
+        """A long control period takes its time, as long as joint states come."""
+        while True:
+            there = self._arrived.wait_for(lambda: self._is_there(due), STATE_TIMEOUT)
             newest = self._newest
-        if newest is None or time.monotonic() - newest[1] > STATE_TIMEOUT:
-            raise SimulatorError(
-                f"no joint state on /joint_states for {STATE_TIMEOUT:g} s; is the world running "
-                "and joint_state_controller started?"
-            )
-        return read_state(newest[0])
+            if newest is None or time.monotonic() - newest[1] > STATE_TIMEOUT:
+                raise SimulatorError(
+                    f"no joint state on /joint_states for {STATE_TIMEOUT:g} s; is the world running "
+                    "and joint_state_controller started?"
+                )
+            if there:
+                return newest[0]
 
     def _due(self) -> float | None:
         """Simulated time [s] of the joint state to wait for; None: any will do."""

@@ -24,15 +24,17 @@ class Sensor:
         ValueError: if the noise is negative or not finite, or the delay no number of steps.
     """
 
-    def __init__(self, noise: float | Sequence[float] = 0.0, delay: int = 0) -> None:
-        sizes = tuple(noise) if isinstance(noise, Sequence) else (float(noise),) * 4
+    def __init__(
+        self, noise: float | Sequence[float] | np.ndarray = 0.0, delay: int = 0
+    ) -> None:
+        sizes = tuple(np.ravel(noise).tolist()) * (1 if np.ndim(noise) else 4)
         if len(sizes) != 4 or not all(math.isfinite(size) and size >= 0.0 for size in sizes):
             raise ValueError(f"sensor noise must be one or four numbers >= 0, not {noise}")
-        if not 0 <= delay <= MOST_DELAY:
+        if not 0 <= delay <= MOST_DELAY or delay != int(delay):
             raise ValueError(f"sensor delay must lie in [0, {MOST_DELAY}] steps, not {delay}")
         self._noise = sizes
         self.is_noisy = any(sizes)
-        self._seen: deque[CartPoleState] = deque(maxlen=delay + 1)
+        self._seen: deque[CartPoleState] = deque(maxlen=int(delay) + 1)
 
     def begin(self, state: CartPoleState, rng: np.random.Generator) -> CartPoleState:
         """Returns the first measurement of an episode that starts in `state`."""

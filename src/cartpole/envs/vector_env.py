@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from gymnasium.error import ClosedEnvironmentError
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
@@ -107,8 +108,10 @@ class CartPoleVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
 
         Raises:
             ValueError: if there are not as many seeds or flags as environments.
+            gymnasium.error.ClosedEnvironmentError: after `close()`.
             SimulatorError: if a worker has died.
         """
+        self._check_open()
         options = dict(options or {})
         mask = options.pop("reset_mask", None)
         flags = None if mask is None else check_resettable(self, mask)
@@ -129,11 +132,16 @@ class CartPoleVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     ) -> Infos:
         if self._worlds is not None:
             return self._worlds.reset(seeds, options, flags)
+        parts = []
         for worker in self._workers:
             begin, end = worker.range
             part = None if flags is None else flags[begin:end]
-            worker.ask("reset", seeds[begin:end], options, part)
-        return self._answers()
+            parts.append((seeds[begin:end], options, part))
+        return self._exchange("reset", parts)
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise ClosedEnvironmentError("this vector environment is closed; make another one")
 
     def step(self, actions: np.ndarray) -> Results:
         """Carries out one action in each environment.
@@ -145,12 +153,16 @@ class CartPoleVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             ValueError: if there are not as many actions as environments, or one is wrong.
             SimulatorError: if a worker has died.
         """
+        self._check_open()
         arrays = self._arrays
         if np.shape(actions) != arrays.actions.shape:
             raise ValueError(
                 f"actions must have the shape {arrays.actions.shape}, not {np.shape(actions)}"
             )
-        arrays.actions[:] = actions
+        try:
+            np.copyto(arrays.actions, actions, casting="same_kind")
+        except TypeError as error:  # a fraction, or NaN, isn't cut off to a whole number
+            raise ValueError(f"an action isn't of {self.single_action_space}: {error}") from error
         infos = self._worlds.step() if self._worlds is not None else self._ask("step")
         return (
             arrays.observations.copy(),
@@ -161,9 +173,19 @@ class CartPoleVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         )
 
     def _ask(self, name: str, *arguments: Any) -> list[Any]:
-        for worker in self._workers:
-            worker.ask(name, *arguments)
-        return self._answers()
+        return self._exchange(name, [arguments] * len(self._workers))
+
+    def _exchange(self, name: str, arguments: Sequence[tuple[Any, ...]]) -> list[Any]:
+        """Asks each worker with its own arguments; returns all of their answers."""
+        try:
+            for worker, own in zip(self._workers, arguments, strict=True):
+                worker.ask(name, *own)
+            return self._answers()
+        except Exception:
+            raise
+        except BaseException:  # Ctrl-C: the next call would take what is unread for its own answers
+            self.close()
+            raise
 
     def _answers(self) -> list[Any]:
         """All of the workers' answers in one list; each is read, also behind one that is an error."""

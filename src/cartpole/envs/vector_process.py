@@ -88,7 +88,11 @@ class WorkerProcess:
         try:
             answer = self._connection.recv()
         except BlockingIOError as error:
-            raise SimulatorError(f"{self._name} gave no answer within {self._limit:g} s") from error
+            self._process.kill()  # a late answer would be taken for the next one
+            raise SimulatorError(
+                f"{self._name} gave no answer within {self._limit:g} s, and was ended; make the vector "
+                "environment anew"
+            ) from error
         except (EOFError, OSError) as error:
             raise self._death() from error
         if isinstance(answer, Exception):

@@ -79,9 +79,7 @@ class Observer(Protocol):
     def episode_done(self, record: EpisodeRecord) -> None: ...
 
 
-def run_episode(
-    env: CartPoleEnv, agent: Agent, should_stop: Callable[[], bool]
-) -> Episode | None:
+def run_episode(env: CartPoleEnv, agent: Agent, should_stop: Callable[[], bool]) -> Episode | None:
     """Runs one episode with the agent's own, random choice of actions.
 
     Returns:

@@ -1,0 +1,68 @@
+"""The command dqn_train.py: errors in one line, exit codes."""
+
+import contextlib
+import sys
+from pathlib import Path
+from typing import Any
+
+from cartpole.envs import ros_node
+from cartpole.errors import CartpoleError
+from cartpole.training import run_folder
+from cartpole.training.dqn_settings import Choice, choose
+from cartpole.training.interrupt import Interrupt
+
+NODE = "dqn_train"
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Trains as the arguments say; returns the process's exit code."""
+    argv = sys.argv[1:] if argv is None else argv
+    interrupt = Interrupt().install()
+    try:
+        flags = ros_node.plain_arguments(argv)
+        choose(flags, {})  # wrong flags and --help need no master
+        return run(choose(flags, _parameters(argv)), interrupt)
+    except CartpoleError as error:
+        print(f"{NODE}: {error}", file=sys.stderr, flush=True)
+        return interrupt.exit_code or 1
+    except KeyboardInterrupt:
+        print(f"{NODE}: interrupted before the training began", file=sys.stderr)
+        return interrupt.exit_code or 130
+
+
+def _parameters(argv: list[str]) -> dict[str, Any]:
+    """Private rosparams; only roslaunch's nodes need a master for them."""
+    try:
+        return ros_node.private_parameters(ros_node.full_name(argv, NODE))
+    except CartpoleError:
+        if any(argument.startswith("__name:=") for argument in argv):
+            raise
+        return {}
+
+
+def run(choice: Choice, interrupt: Interrupt) -> int:
+    """Trains, or goes on with a training; returns the exit code.
+
+    Raises:
+        CartpoleError: if something fails that the user can mend; what was learned is saved.
+    """
+    from cartpole.training.dqn_run import DQNTraining  # slow to import; --help needs none of it
+
+    name = choice.run.env_id.replace("/", "-").replace(":", "-")
+    folder = choice.resume or run_folder.create(
+        choice.run.run_dir or None, name, choice.run.exp_name, choice.run.seed
+    )
+    try:
+        with run_folder.held(folder):
+            training = DQNTraining(choice, folder.resolve(), interrupt)
+            interrupt.defer()
+            training.run()
+    finally:
+        interrupt.defer()
+        _remove_if_empty(folder)
+    return interrupt.exit_code
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        folder.rmdir()

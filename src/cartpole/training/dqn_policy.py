@@ -1,0 +1,57 @@
+"""Agents for environments: new ones, and those that a training left in its folder."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium
+
+from cartpole.agents.dqn.agent import DQNAgent
+from cartpole.agents.dqn.settings import DQNSettings
+from cartpole.errors import CartpoleError
+from cartpole.training.dqn_settings import RunSettings, from_config
+from cartpole.training.environments import discrete_actions, make_environment
+from cartpole.training.run_checkpoints import BEST, LAST, read
+
+
+class Policy(NamedTuple):
+    """A learned agent and an environment of the kind it learned in; the caller closes that."""
+
+    agent: DQNAgent
+    env: gymnasium.Env[Any, Any]
+    run: RunSettings
+    steps: int  # that it had learned from
+
+
+def make_agent(run: RunSettings, dqn: DQNSettings, env: gymnasium.Env[Any, Any]) -> DQNAgent:
+    """A new agent for an environment.
+
+    Raises:
+        CartpoleError: if the environment's actions don't suit DQN, or torch lacks the device.
+    """
+    actions = discrete_actions(env, run.env_id, "DQN")
+    shape = env.observation_space.shape or (0,)
+    try:
+        return DQNAgent(dqn, shape[0], actions, run.seed, run.device)
+    except (RuntimeError, AssertionError) as error:
+        text = str(error).splitlines()[0]
+        raise CartpoleError(f"torch can't use the device {run.device!r}: {text}") from error
+
+
+def load_policy(path: Path, **env_options: Any) -> Policy:
+    """The agent of a checkpoint; of a run folder the best one, or else the last.
+
+    Args:
+        path: a checkpoint or a run folder.
+        env_options: further options of the environment, as `render_mode`.
+
+    Raises:
+        CartpoleError: if it can't be read, or its environment can't be made.
+    """
+    if path.is_dir():
+        path = path / BEST if (path / BEST).exists() else path / LAST
+    content = read(path)
+    run, dqn = from_config(content.get("config"), str(path))
+    env = make_environment(run.env_id, {**run.env_kwargs, **env_options})
+    agent = make_agent(run, dqn, env)
+    agent.load_policy_state(content)
+    return Policy(agent, env, run, content["steps"])

@@ -1,0 +1,257 @@
+"""One DQN training: settings and a folder in; networks, figures and a summary out."""
+
+import json
+import shlex
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from cartpole.errors import CartpoleError
+from cartpole.training import run_folder
+from cartpole.training.dqn_loop import History, Loop, Observer
+from cartpole.training.dqn_policy import make_agent
+from cartpole.training.dqn_progress import DQNProgress
+from cartpole.training.dqn_settings import CONFIG_RECORD, Choice, config
+from cartpole.training.environments import make_environment
+from cartpole.training.episode_tape import EpisodeTape
+from cartpole.training.evaluation import run_greedily
+from cartpole.training.interrupt import Interrupt
+from cartpole.training.plots import learning_curve
+from cartpole.training.random_states import random_states, restore_random_states, seed_all
+from cartpole.training.run_checkpoints import Checkpoints, read_newest
+from cartpole.training.scalar_log import Figures, ScalarLog
+
+EVALUATION_SEED = 1_000_000  # added to the training's: other episodes than those learned from
+LAST = 100  # [episodes] over which the summary reports a mean
+
+
+def say(text: str) -> None:
+    """Tells the user, at once also when the output is a pipe."""
+    print(text, flush=True)
+
+
+class DQNTraining:
+    """The training proper; new, or resumed from its folder.
+
+    Args:
+        choice: what the user chose.
+        folder: an empty folder for all results, or the one of the resumed training.
+        interrupt: tells when to stop.
+
+    Raises:
+        CartpoleError: if the environment can't be made or doesn't suit, or there is nothing
+            to resume from.
+    """
+
+    def __init__(self, choice: Choice, folder: Path, interrupt: Interrupt) -> None:
+        torch.set_num_threads(1)  # networks this small only lose by more
+        self._run, self._dqn = choice.run, choice.dqn
+        self._folder, self._interrupt = folder, interrupt
+        self._checkpoints = Checkpoints(folder, self._run.keep_checkpoints)
+        self._resumed = read_newest(folder, say) if choice.resume else None
+        seed_all(self._run.seed)
+        self._env = make_environment(self._run.env_id, self._run.env_kwargs)
+        self._agent = make_agent(self._run, self._dqn, self._env)
+        self._judge = self._env  # where nothing is evaluated, a second robot would be in the way
+        if self._run.eval_frequency:
+            self._judge = make_environment(self._run.env_id, self._run.env_kwargs)
+        self._history = History()
+        self._saved_at = -1  # [steps]
+        self._log: ScalarLog
+        self._loop: Loop
+
+    def run(self) -> None:
+        """Trains and writes everything; what was learned is saved also when it fails.
+
+        Raises:
+            CartpoleError: if the disk, the environment or the arithmetic fails.
+        """
+        failure: CartpoleError | None = None
+        try:
+            self._train()
+        except CartpoleError as error:
+            failure = error
+        except OSError as error:
+            place = error.filename or self._folder
+            failure = CartpoleError(f"can't write {place}: {error.strerror}")
+        finally:
+            self._env.close()
+            self._judge.close()
+        self._finish(failure)
+
+    def _train(self) -> None:
+        tape = EpisodeTape(self._env, self._run.seed)
+        self._restore_counters()
+        self._log = self._open_log()
+        shown = DQNProgress(self._dqn.total_timesteps, self._agent.steps, self._history)
+        observers: list[Observer] = [Figures(self._log), shown]
+        self._loop = Loop(tape, self._agent, self._history, observers, self._run.log_frequency)
+        try:
+            self._restore_episode(shown)
+            while not (self._is_complete() or self._interrupt.requested()):
+                self._loop.step()
+                self._follow_up()
+            self._save()
+        except CartpoleError:
+            self._checkpoints.save_failure(self._content())
+            raise
+        finally:
+            shown.close()
+            self._log.close()
+
+    def _restore_counters(self) -> None:
+        if self._resumed:
+            self._agent.load_state_dict(self._resumed)
+            self._history.load_state_dict(self._resumed["history"])
+
+    def _open_log(self) -> ScalarLog:
+        settings = {**asdict(self._run), **asdict(self._dqn)}
+        length = self._resumed["log_bytes"] if self._resumed else 0
+        return ScalarLog(self._folder, settings, length)
+
+    def _restore_episode(self, shown: DQNProgress) -> None:
+        self._record()
+        if not self._resumed:
+            say(f"training DQN in {self._run.env_id} with seed {self._run.seed}: {self._folder}")
+            return
+        self._loop.load_state_dict(self._resumed["loop"], shown.say)
+        restore_random_states(self._resumed["random"])
+        say(f"going on at step {self._agent.steps} of {self._dqn.total_timesteps}: {self._folder}")
+        self._resumed = None  # a replay buffer's worth of memory
+        if self._agent.steps:
+            self._evaluate()  # the interruption may have come before it
+
+    def _record(self) -> None:
+        """Writes config.json; of a resumed training, whose length may be new, the rest stays."""
+        path = self._folder / CONFIG_RECORD
+        record: dict[str, Any] = {"versions": run_folder.versions(), "began": time.time()}
+        if self._resumed:
+            record = json.loads(path.read_text(encoding="utf-8"))
+        run_folder.write_summary(path, {**record, **config(self._run, self._dqn)})
+
+    def _is_complete(self) -> bool:
+        run, history = self._run, self._history
+        return (
+            self._agent.steps >= self._dqn.total_timesteps
+            or bool(run.episodes and len(history.returns) >= run.episodes)
+            or (run.stop_at_return is not None and self._best_return() >= run.stop_at_return)
+        )
+
+    def _best_return(self) -> float:
+        return self._history.best[1] if self._history.best else float("-inf")
+
+    def _follow_up(self) -> None:
+        """What is due at this step: an evaluation, a checkpoint."""
+        self._evaluate()
+        every = self._run.checkpoint_frequency
+        if every and self._agent.steps % every == 0:
+            self._save()
+
+    def _evaluate(self) -> None:
+        """Evaluates the policy, if that is due and wasn't done at this step already."""
+        steps, every = self._agent.steps, self._run.eval_frequency
+        evaluations = self._history.evaluations
+        if not every or steps % every or (evaluations and evaluations[-1][0] == steps):
+            return
+        mean = self._mean_return(self._run.eval_episodes, 0)
+        if mean is None:
+            return
+        confirmed = self._confirmed(mean)
+        if confirmed is None:
+            return
+        self._log.add(steps, {"eval/mean_reward": mean})
+        evaluations.append((steps, mean))
+        if confirmed > self._best_return():
+            self._log.add(steps, {"eval/confirmed_reward": confirmed})
+            self._history.best = (steps, confirmed)
+            self._save(best=True)
+
+    def _confirmed(self, mean: float) -> float | None:
+        """The mean over many more episodes, for a policy that seems to be the best so far.
+
+        A policy that is perfect in ten episodes may well fall in the next ninety.
+        """
+        if mean <= self._best_return():
+            return mean
+        return self._mean_return(self._run.confirm_episodes, 1)
+
+    def _mean_return(self, episodes: int, stream: int) -> float | None:
+        """Of greedy episodes in an environment of their own; None if interrupted."""
+        seed = self._run.seed + EVALUATION_SEED * (1 + stream)
+        act, stop = self._agent.act_greedily, self._interrupt.requested
+        result = run_greedily(self._judge, act, seed, episodes, stop)
+        return None if result is None else result.mean_return
+
+    def _save(self, best: bool = False) -> None:
+        """Writes a checkpoint, unless this step has one already."""
+        steps = self._agent.steps
+        if steps == self._saved_at:
+            return
+        self._checkpoints.save(steps, self._content(), best)
+        self._saved_at = steps
+
+    def _content(self) -> dict[str, Any]:
+        self._loop.update_clock()
+        return {
+            **self._agent.state_dict(),
+            "config": config(self._run, self._dqn),
+            "history": self._history.state_dict(),
+            "loop": self._loop.state_dict(),
+            "random": random_states(),
+            "log_bytes": self._log.sync(),
+        }
+
+    def _finish(self, failure: CartpoleError | None) -> None:
+        """Draws and tells; then passes a failure on, unless the user had stopped anyway."""
+        try:
+            self._draw()
+            run_folder.write_summary(self._folder / "summary.json", self._summary(failure))
+        except OSError as error:
+            failure = failure or CartpoleError(f"can't write to {self._folder}: {error.strerror}")
+        self._tell()
+        if failure and not self._interrupt.requested():
+            raise CartpoleError(
+                f"{failure}; stopped after {self._agent.steps} of {self._dqn.total_timesteps} "
+                f"steps; --resume {shlex.quote(str(self._folder))} goes on from the last checkpoint"
+            )
+
+    def _draw(self) -> None:
+        if self._history.returns:
+            title = f"DQN, {self._run.env_id}, seed {self._run.seed}"
+            path = self._folder / "learning_curve.png"
+            learning_curve(path, self._history.lengths, self._history.returns, title)
+
+    def _summary(self, failure: CartpoleError | None) -> dict[str, Any]:
+        history = self._history
+        return {
+            **config(self._run, self._dqn),
+            "versions": run_folder.versions(),
+            "failure": str(failure) if failure else None,
+            "complete": self._is_complete(),
+            "interrupted": self._interrupt.requested(),
+            "episodes": len(history.returns),
+            "steps": self._agent.steps,
+            "seconds": round(history.seconds, 3),
+            f"mean_return_last_{LAST}": _mean(history.returns[-LAST:]),
+            "best": history.best,
+            "evaluations": history.evaluations,
+            "lengths": history.lengths,
+            "returns": history.returns,
+        }
+
+    def _tell(self) -> None:
+        history = self._history
+        line = f"trained {len(history.returns)} episodes, {self._agent.steps} steps in "
+        line += f"{history.seconds:.1f} s"
+        if history.best:
+            line += f"; best evaluation {history.best[1]:.1f} at step {history.best[0]}"
+        say(line)
+        say(f"everything lies in {self._folder}")
+        say(f"watch: tensorboard --logdir {shlex.quote(str(self._folder))}")
+
+
+def _mean(values: list[float]) -> float | None:
+    return sum(values) / len(values) if values else None

@@ -1,0 +1,177 @@
+"""What one DQN training can be told: flags, rosparams, a YAML section and KEY=VALUE."""
+
+import argparse
+import json
+import shlex
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from cartpole.agents.dqn.settings import DQNSettings
+from cartpole.errors import CartpoleError
+from cartpole.option import check_options, option
+from cartpole.training.config_file import default_file, read_section
+from cartpole.training.options import Options, key_values, unknown
+
+COMMAND = "dqn_train.py"
+CONFIG = "dqn.yaml"
+CONFIG_RECORD = "config.json"  # in the run folder
+DESCRIPTION = """\
+Trains an agent by DQN in any Gymnasium environment with single actions.
+
+What isn't given comes from config/dqn.yaml: the section of --preset, or else that of the
+environment. Every flag is a private rosparam too (~env_id, ~total_timesteps, ...). The command
+line wins over rosparams, these over --params, and all of them over the file.
+Ctrl-C saves everything and exits with 130 (SIGTERM: 143); --resume goes on from there, to the
+same bits as a training that was never interrupted.
+Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """One training around the algorithm: where, how long, and what it leaves behind.
+
+    Raises:
+        CartpoleError: if a value is beyond its limits.
+    """
+
+    env_id: str = option("CartPole-v1", "Gymnasium's id of the environment")
+    env_kwargs: dict[str, Any] = option({}, "options of the environment, KEY=VALUE with commas")
+    seed: int = option(0, "of weights, exploration, batches, environment, evaluation", 0, 2**31 - 1)
+    episodes: int = option(
+        0, "the training's length in episodes, if that comes first; 0: any", 0, 2**53
+    )
+    device: str = option("cpu", "torch's, as in cpu or cuda")
+    exp_name: str = option("dqn", "in the run folder's name")
+    run_dir: str = option("", "a new or empty folder for all results (runs/ENV__EXP__SEED__TIME)")
+    eval_frequency: int = option(1_000, "steps between two evaluations; 0: never", 0, 2**53)
+    eval_episodes: int = option(10, "greedy episodes of an evaluation", 1, 10**6)
+    confirm_episodes: int = option(
+        100, "greedy episodes that a policy needs to become the best one", 1, 10**6
+    )
+    stop_at_return: float | None = option(
+        None, "ends the training when a confirmed mean return reaches it", -1e18, 1e18
+    )
+    checkpoint_frequency: int = option(
+        5_000, "steps between two checkpoints; 0: at the end only", 0, 2**53
+    )
+    keep_checkpoints: int = option(3, "the newest ones are kept; 0: all", 0, 10**6)
+    log_frequency: int = option(500, "steps between two points of losses/", 1, 2**53)
+
+    def __post_init__(self) -> None:
+        check_options(self)
+        if not self.env_id:
+            raise CartpoleError("env_id names an environment")
+
+
+class Choice(NamedTuple):
+    """What the user wants: a new training by these settings, or an old one resumed."""
+
+    run: RunSettings
+    dqn: DQNSettings
+    resume: Path | None
+
+
+OPTIONS = Options(RunSettings, DQNSettings)
+EXTENDING = ("total_timesteps", "episodes", "device")  # may be changed when resuming
+SPECIAL = ("config", "preset", "params", "resume")
+
+
+def parser() -> argparse.ArgumentParser:
+    """All flags; none has a default of its own."""
+    result = argparse.ArgumentParser(
+        COMMAND,
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+        argument_default=argparse.SUPPRESS,
+    )
+    result.add_argument("--config", metavar="FILE", help="options in YAML (config/dqn.yaml)")
+    result.add_argument("--preset", metavar="NAME", help="a section of that file, as in: tutorial")
+    result.add_argument("--params", nargs="+", metavar="KEY=VALUE", help="options by name")
+    result.add_argument("--resume", metavar="RUN_DIR", help="go on with an interrupted training")
+    OPTIONS.add_flags(result)
+    return result
+
+
+def choose(flags: list[str], parameters: dict[str, Any]) -> Choice:
+    """Defaults, overridden by the file, --params, rosparams and flags, in this order.
+
+    Raises:
+        SystemExit: with code 2 and a usage line, if a flag is wrong; with 0 after --help.
+        CartpoleError: if a name is unknown or a value wrong anywhere else.
+    """
+    given = _given(flags, parameters)
+    special = {name: given.pop(name) for name in SPECIAL if name in given}
+    if special.get("resume"):
+        return _resumed(Path(special["resume"]), given, special)
+    origin = f"--config {special['config']}" if "config" in special else f"config/{CONFIG}"
+    path = Path(special["config"]) if "config" in special else default_file(CONFIG)
+    wanted = given.get("env_id", None if special.get("preset") else RunSettings().env_id)
+    section = read_section(path, wanted, special.get("preset"))
+    merged = {"env_id": wanted} if wanted else {}
+    merged |= OPTIONS.read(section, origin) | given
+    return Choice(OPTIONS.make(RunSettings, merged), OPTIONS.make(DQNSettings, merged), None)
+
+
+def _given(flags: list[str], parameters: dict[str, Any]) -> dict[str, Any]:
+    """What somebody gave: --params, overridden by rosparams, overridden by flags."""
+    from_flags = vars(parser().parse_args(flags))
+    for name in parameters:
+        if name not in (*SPECIAL, *OPTIONS.names):
+            raise CartpoleError(unknown("parameter ~", name, [*SPECIAL, *OPTIONS.names]))
+    special = {name: str(parameters[name]) for name in SPECIAL if parameters.get(name)}
+    own = {name: value for name, value in parameters.items() if name not in SPECIAL}
+    pairs = [*shlex.split(special.pop("params", "")), *from_flags.pop("params", [])]
+    listed = OPTIONS.read(key_values(pairs, "--params"), "--params")
+    return listed | OPTIONS.read(own, "rosparam") | special | from_flags
+
+
+def _resumed(folder: Path, given: dict[str, Any], special: dict[str, Any]) -> Choice:
+    others = [name for name in given if name not in EXTENDING]
+    others += [name for name in special if name != "resume"]
+    if others:
+        raise CartpoleError(
+            f"a resumed training keeps its settings: --resume allows no {_flag(others[0])}, "
+            f"only {', '.join(_flag(name) for name in EXTENDING)}"
+        )
+    run, dqn = read_config(folder)
+    merged = asdict(run) | asdict(dqn) | given
+    return Choice(OPTIONS.make(RunSettings, merged), OPTIONS.make(DQNSettings, merged), folder)
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def config(run: RunSettings, dqn: DQNSettings) -> dict[str, Any]:
+    """Both as plain values, for config.json and checkpoints."""
+    return {"algorithm": "dqn", "run": asdict(run), "dqn": asdict(dqn)}
+
+
+def from_config(content: Any, origin: str) -> tuple[RunSettings, DQNSettings]:
+    """What `config` gave, also after JSON.
+
+    Raises:
+        CartpoleError: if it is something else.
+    """
+    if not isinstance(content, dict) or content.get("algorithm") != "dqn":
+        raise CartpoleError(f"{origin} isn't the configuration of a DQN training")
+    values = OPTIONS.read({**content["run"], **content["dqn"]}, origin)
+    return OPTIONS.make(RunSettings, values), OPTIONS.make(DQNSettings, values)
+
+
+def read_config(folder: Path) -> tuple[RunSettings, DQNSettings]:
+    """The settings of a training, from its folder.
+
+    Raises:
+        CartpoleError: if there is none.
+    """
+    path = folder / CONFIG_RECORD
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CartpoleError(f"{folder} is no run folder: {path}: {error.strerror}") from error
+    except ValueError as error:
+        raise CartpoleError(f"{path} isn't JSON: {error}") from error
+    return from_config(content, str(path))

@@ -1,0 +1,128 @@
+"""Checkpoints of a training that can be resumed: whole or absent, checked when read.
+
+    RUN_DIR/checkpoints/step_000005000.pt   the newest few
+    RUN_DIR/last.pt, RUN_DIR/best.pt        further names of two of them
+
+Each holds everything; `last.pt` is the newest, `best.pt` the one of the best evaluation.
+"""
+
+import contextlib
+import os
+import pickle
+import shutil
+import zipfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from cartpole.errors import CartpoleError
+from cartpole.training.checkpoints import write_atomically
+
+LAST, BEST, FAILURE = "last.pt", "best.pt", "failure.pt"
+FOLDER = "checkpoints"
+FORMAT = "cartpole 1"  # changes when older files can't be read any more
+_DAMAGED = (RuntimeError, pickle.UnpicklingError, EOFError, ValueError, KeyError, TypeError,
+            AttributeError, IndexError, zipfile.BadZipFile)  # fmt: skip
+
+
+class Checkpoints:
+    """Writes the checkpoints of one run.
+
+    Args:
+        run: the run's folder.
+        keep: how many of the newest stay; 0: all.
+    """
+
+    def __init__(self, run: Path, keep: int) -> None:
+        self._run = run
+        self._keep = keep
+
+    def save(self, step: int, content: dict[str, Any], best: bool = False) -> None:
+        """Writes a checkpoint, and makes it the last one and, if so told, the best one.
+
+        Raises:
+            OSError: if the disk refuses; the earlier checkpoints are untouched.
+        """
+        path = self._run / FOLDER / f"step_{step:09d}.pt"
+        path.parent.mkdir(exist_ok=True)
+        write_atomically(path, partial(torch.save, {"format": FORMAT, **content}))
+        for name in (LAST, BEST) if best else (LAST,):
+            _name(path, self._run / name)
+        if self._keep:
+            for old in _numbered(self._run)[self._keep :]:
+                if old != path:
+                    old.unlink()
+
+    def save_failure(self, content: dict[str, Any]) -> None:
+        """Writes `failure.pt`: what was learned until something failed, in the midst of a step.
+
+        No training goes on from it: from `last.pt` it comes to the same place again, exactly.
+        """
+        path = self._run / FAILURE
+        with contextlib.suppress(OSError):  # a full disk may well be the failure
+            write_atomically(path, partial(torch.save, {"format": FORMAT, **content}))
+
+
+def _name(path: Path, name: Path) -> None:
+    """Gives a file a second name, in one step; a copy where the disk knows no second names."""
+    temporary = name.with_name(f".{name.name}.new")
+    temporary.unlink(missing_ok=True)
+    try:
+        os.link(path, temporary)
+    except OSError:
+        shutil.copyfile(path, temporary)
+    os.replace(temporary, name)
+
+
+def _numbered(run: Path) -> list[Path]:
+    """The checkpoints of a run by number, the newest first."""
+    return sorted((run / FOLDER).glob("step_*.pt"), reverse=True)
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Reads one checkpoint into main memory, safely: it can't run code.
+
+    Raises:
+        CartpoleError: if there is none, or it is damaged or something else.
+    """
+    try:
+        # torch doesn't look at the check sums of a file that it reads.
+        with zipfile.ZipFile(path) as archive:
+            bad = archive.testzip()
+        if bad:
+            raise CartpoleError(f"{path} is damaged")
+        content = torch.load(path, map_location="cpu", weights_only=True)
+    except OSError as error:
+        raise CartpoleError(f"can't read {path}: {error.strerror or error}") from error
+    except _DAMAGED as error:
+        raise CartpoleError(f"{path} is damaged, or no checkpoint") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise CartpoleError(f"{path} is no checkpoint of this version")
+    return content
+
+
+def read_newest(run: Path, say: Callable[[str], None]) -> dict[str, Any]:
+    """The last checkpoint, or the newest before it that can be read; says what is passed over.
+
+    Raises:
+        CartpoleError: if there is none.
+    """
+    for path in _candidates(run):
+        try:
+            return read(path)
+        except CartpoleError as error:
+            say(f"{error}; looking for an earlier one")
+    raise CartpoleError(f"{run} holds no checkpoint to go on from")
+
+
+def _candidates(run: Path) -> list[Path]:
+    """last.pt, the numbered ones, best.pt; each file once, whatever its names."""
+    found: dict[tuple[int, int], Path] = {}
+    for path in (run / LAST, *_numbered(run), run / BEST):
+        with contextlib.suppress(FileNotFoundError):
+            status = path.stat()
+            found.setdefault((status.st_dev, status.st_ino), path)
+    return list(found.values())
