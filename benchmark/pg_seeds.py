@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 LAST = 60  # [episodes]
+RECENT = 20  # [episodes]; the training's own, for --stop-at
 SOLVED = 2400  # [steps] of 3000
 
 
@@ -51,7 +52,9 @@ def result(seed: int, summary: dict) -> dict:
     lengths, greedy = summary["lengths"], summary["evaluation"]["lengths"]
     return {
         "seed": seed,
+        "episodes": len(lengths),
         "mean_length_last_60": round(float(np.mean(lengths[-LAST:])), 1),
+        "mean_length_last_20": round(float(np.mean(lengths[-RECENT:])), 1),
         "first_20_episodes_above_1000": first_above(lengths, 1000),
         "greedy_mean_length": round(float(np.mean(greedy)), 1),
         "steps": summary["steps"],
@@ -73,9 +76,12 @@ def table(rows: list[dict]) -> str:
     columns = [name for name in rows[0] if name != "lengths"]
     lines = [" | ".join(columns), " | ".join("---" for _ in columns)]
     lines += [" | ".join(str(row[name]) for name in columns) for row in rows]
-    above = sum(row["mean_length_last_60"] > SOLVED for row in rows)
     text = "\n".join(f"| {line} |" for line in lines)
-    return f"{text}\n{above} of {len(rows)} seeds above {SOLVED} of 3000 steps"
+    counts = [
+        f"{sum(row[name] >= SOLVED for row in rows)} of {len(rows)} seeds: {name} at least {SOLVED} of 3000"
+        for name in ("mean_length_last_60", "mean_length_last_20")
+    ]
+    return "\n".join([text, *counts])
 
 
 def main() -> int:

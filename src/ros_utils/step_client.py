@@ -112,7 +112,7 @@ class StepClient:
 
 def time_of(ticks: Any) -> float:
     """The most wall time [s] that steps take; what is no number of ticks is refused elsewhere."""
-    return SLOWEST_TICK * max(0, ticks) if isinstance(ticks, Integral) else 0.0
+    return SLOWEST_TICK * max(0, int(ticks)) if isinstance(ticks, Integral) else 0.0
 
 
 def _request(

@@ -2,12 +2,17 @@
 """The conformance suite of the environments over ROS: in lock-step, or in real time."""
 
 import importlib.util
+import os
+import signal
 import sys
 import unittest
+import xmlrpc.client
 from pathlib import Path
+from unittest import mock
 
 import gymnasium
 import numpy as np
+import rosgraph
 import rospy
 import rosservice
 import rostest
@@ -19,7 +24,8 @@ from environment_conformance import IDS, RICH, EnvironmentConformance, rollout
 from gymnasium.utils.env_checker import data_equivalence as same
 
 import cartpole  # noqa: F401 - registers the environments
-from cartpole.errors import CartpoleError
+from cartpole.envs import ros_plants
+from cartpole.errors import CartpoleError, SimulatorError
 from ros_utils import ros_gazebo
 
 BACKEND = next((argument for argument in sys.argv if argument in ("ros", "ros-realtime")), "ros")
@@ -84,6 +90,17 @@ class Lockstep(unittest.TestCase):
         self.assertEqual(ask("cartpole::pole"), before)
         self.compare("cartpole/Balance-v0", 100)
 
+    def test_a_simulator_that_is_killed_is_an_error_and_the_next_environment_starts_another(self):
+        env = gymnasium.make("cartpole/Classic-v0", backend="ros")
+        env.reset(seed=1)
+        node = rosgraph.Master("/environments").lookupNode("/gazebo")
+        os.kill(xmlrpc.client.ServerProxy(node).getPid("/environments")[2], signal.SIGKILL)
+        for call in (lambda: env.step(1), env.reset):
+            with self.assertRaisesRegex(SimulatorError, "its node has ended"):
+                call()
+        env.close()
+        self.compare("cartpole/Classic-v0", 50)
+
     def test_the_control_period_counts_the_simulators_own_steps(self):
         env = gymnasium.make("cartpole/Balance-v0", backend="ros")
         ros_gazebo.gazebo_set_time_step(0.004)
@@ -122,6 +139,18 @@ class Realtime(unittest.TestCase):
             env.step(step % 2)
         end = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
         self.assertGreaterEqual(end - begin, 0.49)
+        env.close()
+
+    def test_a_control_period_longer_than_the_patience_is_waited_for(self):
+        env = gymnasium.make("cartpole/Balance-v0", backend="ros-realtime", control_period=0.5)
+        env.reset(seed=0)
+        plant = env.unwrapped.plant
+        plant.act(0.0)
+        begin = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
+        with mock.patch.object(ros_plants, "STATE_TIMEOUT", 0.1):  # joint states come every 20 ms
+            plant.act(0.0)
+        end = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
+        self.assertGreaterEqual(end - begin, 0.45)
         env.close()
 
     def test_two_environments_of_one_process_share_the_robot(self):

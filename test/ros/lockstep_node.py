@@ -87,6 +87,7 @@ class LockstepTest(unittest.TestCase):
             ((-1, [], []), "ticks is -1"),
             ((2_000_000, [], []), "ticks is 2000000"),
             ({"ticks": 1, "reset": 7}, "reset is 7"),
+            ({"ticks": 1, "seed": 7}, "seed is 7, which goes with a reset only"),
             ({"ticks": 0, "joints": ["elbow"], "positions": [0.0]}, "no movable joint 'elbow'"),
             ({"ticks": 0, "joints": ["cart_pole"], "positions": []}, "1 joints but 0 positions"),
             ({"ticks": 0, "joints": ["cart_pole"] * 2, "positions": [0, 1]}, "names one twice"),

@@ -109,6 +109,25 @@ class StepClientTest(unittest.TestCase):
                 with self.assertRaises(ServiceGone):
                     client.step(8, {CART: 0.1})
 
+    def test_a_reset_goes_to_the_restarted_simulator_without_an_error(self):
+        port = reserved_port()
+        client = None
+        for angle in (0.1, 0.2):
+            simulation = self.simulate(port=port)
+            with simulation.active():
+                add_cartpole()
+                client = client or self.client()
+                self.assertEqual(client.reset({"cart_pole": angle}).joint_states.position[0], angle)
+            simulation.close()
+
+    def test_a_long_step_is_given_its_time(self):
+        with self.simulate().active():
+            add_cartpole()
+            client = self.client(timeout=0.2)
+            begin = time.monotonic()
+            self.assertAlmostEqual(client.step(100_000).sim_time, 100.0, places=6)
+            self.assertGreater(time.monotonic() - begin, 0.4)
+
     def test_a_simulator_that_hangs_is_an_error_in_time(self):
         simulation = self.simulate()
         with simulation.active():

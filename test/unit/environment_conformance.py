@@ -4,6 +4,8 @@ As dm_env's mixin: the same tests for each backend, and for each task.
 """
 
 import contextlib
+import copy
+import pickle
 import warnings
 from collections.abc import Iterator
 from typing import Any, ClassVar
@@ -118,8 +120,12 @@ class EnvironmentConformance:
     def test_wrong_actions_are_refused_and_move_nothing(self) -> None:
         env = self.make().unwrapped
         env.reset(seed=1)
-        discrete = isinstance(env.action_space, gymnasium.spaces.Discrete)
-        wrong = [2, -1] if discrete else [np.array([1.5]), np.array([float("nan")])]
+        nan = float("nan")
+        wrong: list[Any] = [nan, None, "1", np.zeros(2), np.zeros((1, 1))]
+        if isinstance(env.action_space, gymnasium.spaces.Discrete):
+            wrong += [2, -1, np.int64(2), np.array([1])]
+        else:
+            wrong += [0.5, np.float32(0.5), np.array([1.5]), np.array([nan])]
         for action in wrong:
             try:
                 env.step(action)
@@ -129,6 +135,28 @@ class EnvironmentConformance:
                 raise AssertionError(f"{action} was carried out")
         env.step(self.gentle(env, 0))
         env.close()
+
+    def test_a_closed_environment_says_so(self) -> None:
+        env = self.make().unwrapped
+        env.reset(seed=1)
+        env.close()
+        env.close()
+        for call in (env.reset, lambda: env.step(self.gentle(env, 0))):
+            try:
+                call()
+            except gymnasium.error.ClosedEnvironmentError as error:
+                assert "make another one" in str(error)
+            else:
+                raise AssertionError("a closed environment went on")
+
+    def test_what_it_was_made_of_can_be_copied_sent_and_made_again(self) -> None:
+        env = self.make(max_steps=7, sensor_noise=[0.1, 0.0, 0.1, 0.0])
+        first = env.reset(seed=1)[0]
+        spec = pickle.loads(pickle.dumps(copy.deepcopy(env.spec)))
+        env.close()
+        again = gymnasium.make(spec)
+        assert np.array_equal(again.reset(seed=1)[0], first)
+        again.close()
 
     def test_a_control_period_of_broken_steps_is_refused_with_both_numbers(self) -> None:
         try:

@@ -17,8 +17,10 @@ FORBIDDEN = [
     ("bullet_gazebo/control", ("bullet_gazebo.physics", "bullet_gazebo.ros", "bullet_gazebo.simulator",
                                "pybullet")),
     ("ros_utils", ("bullet_gazebo", "cartpole", "pybullet", "torch")),
-    ("cartpole/agents", ("gymnasium", "cartpole.envs", "cartpole.training", "ros_utils")),
-    ("cartpole/envs", ("torch", "cartpole.agents", "cartpole.training")),
+    ("cartpole/agents", ("gymnasium", "cartpole.envs", "cartpole.training", "cartpole.workbench",
+                         "ros_utils")),
+    ("cartpole/envs", ("torch", "cartpole.agents", "cartpole.training", "cartpole.workbench")),
+    ("cartpole/training", ("cartpole.workbench", "stable_baselines3", "optuna")),
     ("cartpole/task.py", ("cartpole.envs", "cartpole.agents", "cartpole.training", "torch")),
 ]  # fmt: skip
 ROS_ROOMS = ("bullet_gazebo/ros", "ros_utils", "cartpole/envs")

@@ -78,6 +78,12 @@ def test_the_height_of_the_stand_does_not_matter():
     assert run(BulletPlant(height=0.5)) == run(BulletPlant())
 
 
+@pytest.mark.extras("mujoco")
+def test_on_mujoco_it_moves_the_same_but_not_to_the_bit():
+    runs = [np.array(run(BulletPlant(engine=name))) for name in ("bullet", "mujoco")]
+    assert 0.0 < np.abs(runs[0] - runs[1]).max() < 1e-9
+
+
 def test_a_variation_is_felt_and_leaves_no_trace(plant):
     nominal = run(plant)
     plant.vary(HEAVY)
@@ -106,6 +112,13 @@ def test_friction_brakes(plant):
     plant.vary(Variation(pole_friction=0.05))
     plant.reset(UPRIGHT._replace(pole_angle=math.pi, pole_velocity=1.0))
     assert abs([plant.act(0.0) for _ in range(500)][-1].pole_velocity) < 0.05
+
+
+def test_friction_of_the_rail_slows_the_cart(plant):
+    free = run(plant, UPRIGHT, 5)
+    plant.vary(Variation(cart_friction=10.0))
+    braked = run(plant, UPRIGHT, 5)
+    assert 0.0 < braked[-1].cart_position < free[-1].cart_position
 
 
 def test_figures_of_a_varied_rod():

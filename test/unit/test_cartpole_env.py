@@ -10,6 +10,7 @@ from unit.learning_fakes import FakePlant
 
 from cartpole.envs.cartpole_env import CartPoleEnv
 from cartpole.envs.plant import ticks_per_action
+from cartpole.envs.sensor import Sensor
 from cartpole.task import BalanceTask, CartPoleState
 
 
@@ -108,3 +109,12 @@ def test_a_control_period_of_whole_steps() -> None:
 def test_a_broken_control_period_is_refused_with_both_numbers(period: float) -> None:
     with pytest.raises(ValueError, match=rf"{period} s .* 0.001 s"):
         ticks_per_action(period, 0.001)
+
+
+def test_reward_and_end_go_by_the_truth_not_by_what_is_measured() -> None:
+    runs = []
+    for sensor in (None, Sensor(noise=5.0, delay=3)):
+        env = CartPoleEnv(FakePlant(), BalanceTask(), sensor=sensor)
+        env.reset(seed=1)
+        runs.append([env.step(1)[1:4] for _ in range(3)])
+    assert runs[0] == runs[1]

@@ -1,7 +1,9 @@
 """The conformance suite over all tasks, in-process; and what only registration can get wrong."""
 
+import importlib.util
 import subprocess
 import sys
+from typing import Any, ClassVar
 
 import gymnasium
 import pytest
@@ -48,6 +50,8 @@ def test_importing_the_package_loads_no_engine_no_ros_and_no_torch():
             {"backend": "gazebo"},
             "there is no backend 'gazebo'; there are bullet, ros, ros-realtime",
         ),
+        ({"engine": "havok"}, "physics engine 'havok' is not known"),
+        ({"engine": "mujoco", "backend": "ros"}, "start it with physics:=mujoco"),
         ({"noise": 0.5}, "noise must lie in"),
         ({"max_steps": 0}, "max_steps must be at least 1"),
         ({"sensor_noise": -1.0}, "sensor noise must be"),
@@ -87,6 +91,18 @@ def test_a_plant_that_got_no_environment_is_closed(monkeypatch):
     with pytest.raises(ValueError, match="render_mode"):
         gymnasium.make("cartpole/Balance-v0", render_mode="ansi")
     assert len(closed) == 1
+
+
+def test_an_engine_that_is_not_installed_is_named_with_the_command_that_installs_it(monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(ValueError, match="'mujoco' is not installed; './ws extras'"):
+        gymnasium.make("cartpole/Balance-v0", engine="mujoco")
+
+
+@pytest.mark.extras("mujoco")
+class TestMujoco(EnvironmentConformance):
+    identifier = "cartpole/Classic-v0"
+    options: ClassVar[dict[str, Any]] = {"engine": "mujoco"}
 
 
 def test_the_control_period_is_that_of_the_physics():

@@ -23,21 +23,22 @@ def test_measurements_arrive_late_and_episodes_do_not_mix():
         assert seen == [STATES[0]] * 3 + STATES[1:-2]
 
 
-def test_noise_has_the_size_asked_for_in_each_number():
-    rng, sizes = np.random.default_rng(1), [0.1, 0.0, 2.0, 0.5]
+@pytest.mark.parametrize("kind", [list, np.array])
+def test_noise_has_the_size_asked_for_in_each_number(kind):
+    rng, sizes = np.random.default_rng(1), kind([0.1, 0.0, 2.0, 0.5])
     sensor = Sensor(noise=sizes)
     seen = np.array([sensor.measure(STATES[3], rng) for _ in range(4000)])
     assert seen.std(axis=0) == pytest.approx(sizes, rel=0.05)
     assert seen.mean(axis=0) == pytest.approx(STATES[3], abs=0.1)
 
 
-@pytest.mark.parametrize("noise", [-0.1, float("nan"), float("inf"), [0.1, 0.2]])
+@pytest.mark.parametrize("noise", [-0.1, float("nan"), float("inf"), [0.1, 0.2], []])
 def test_impossible_noise_is_refused(noise):
     with pytest.raises(ValueError, match="sensor noise"):
         Sensor(noise=noise)
 
 
-@pytest.mark.parametrize("delay", [-1, 1001])
+@pytest.mark.parametrize("delay", [-1, 1001, 1.5, float("nan")])
 def test_impossible_delays_are_refused(delay):
     with pytest.raises(ValueError, match="sensor delay"):
         Sensor(delay=delay)

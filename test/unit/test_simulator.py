@@ -225,3 +225,24 @@ def test_a_slow_rate_can_be_changed_and_stopped_at_once():
     thread.join(BOUND)
     assert not thread.is_alive()
     sim.world.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "rate", "paused", "outruns"),
+    [
+        ({"lockstep": True}, 1000.0, False, True),
+        ({}, 1000.0, False, False),
+        ({}, 500.0, False, False),
+        ({}, 2000.0, False, True),
+        ({}, 0.0, False, True),
+        ({}, 1000.0, True, True),  # only gz world moves it then
+    ],
+)
+def test_it_knows_when_it_is_faster_than_the_clock(options, rate, paused, outruns):
+    sim = Simulator(World(BulletEngine()), **options)
+    assert sim.outruns_the_clock == sim.lockstep
+    sim.max_update_rate = rate
+    if paused:
+        sim.pause()
+    assert sim.outruns_the_clock == outruns
+    sim.world.close()

@@ -62,6 +62,7 @@ def test_initial_noise_is_seeded_at_rest_and_within_bounds() -> None:
     assert len(set(states)) == 100
     for state in states:
         assert state.cart_velocity == state.pole_velocity == 0.0
+        assert state.cart_position != state.pole_angle
         assert max(abs(state.cart_position), abs(state.pole_angle)) <= 0.02 < POSITION_LIMIT
 
 

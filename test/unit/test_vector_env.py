@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import threading
 import time
 
@@ -81,6 +82,17 @@ def test_only_the_masked_worlds_are_reset(ours):
 
 
 @pytest.mark.parametrize("ours", OURS)
+def test_a_reset_right_after_an_end_is_the_only_one(ours):
+    vector = gymnasium.make_vec("cartpole/Classic-v0", 2, max_steps=1, **ours)
+    for _ in range(2):
+        vector.reset(seed=1)
+        _, rewards, _, truncations, _ = vector.step(np.ones(2, int))
+        assert rewards.tolist() == [1.0, 1.0]  # a step that starts an episode has none
+        assert truncations.all()
+    vector.close()
+
+
+@pytest.mark.parametrize("ours", OURS)
 def test_pictures_and_attributes_of_all(ours):
     vector = gymnasium.make_vec("cartpole/SwingUp-v0", 3, render_mode="rgb_array", **ours)
     vector.reset(seed=1)
@@ -131,6 +143,9 @@ def test_a_bad_call_is_refused_and_the_next_one_works(ours):
     vector.reset(seed=1)
     with pytest.raises(ValueError, match="shape"):
         vector.step(np.ones(3, int))
+    for fractions in ([0, 1, 0, 0.7], [0, 1, 0, float("nan")]):
+        with pytest.raises(ValueError, match="an action isn't of Discrete"):
+            vector.step(np.array(fractions))
     with pytest.raises(ValueError, match="an action is 0 or 1, not 7"):
         vector.step(np.array([0, 1, 0, 7]))
     vector.reset(seed=1)
@@ -158,10 +173,23 @@ def test_a_worker_that_hangs_is_an_error(monkeypatch):
     os.kill(vector.workers[0], signal.SIGSTOP)
     vector._workers[0].limit(0.2)
     try:
-        with pytest.raises(SimulatorError, match=r"gave no answer within 0.2 s"):
+        with pytest.raises(SimulatorError, match=r"gave no answer within 0.2 s, and was ended"):
+            vector.reset(seed=0)
+        with pytest.raises(SimulatorError, match="was killed by SIGKILL"):  # no late answer is taken
             vector.reset(seed=0)
     finally:
         vector.close()
+
+
+def test_a_default_timeout_of_sockets_as_rospys_does_no_harm():
+    before = socket.getdefaulttimeout()
+    socket.setdefaulttimeout(5.0)
+    try:
+        vector = gymnasium.make_vec("cartpole/Balance-v0", 4, workers=2)
+        vector.reset(seed=0)
+        vector.close()
+    finally:
+        socket.setdefaulttimeout(before)
 
 
 def test_closing_ends_all_workers_and_may_be_done_twice():
@@ -170,6 +198,32 @@ def test_closing_ends_all_workers_and_may_be_done_twice():
     vector.close()
     vector.close()
     assert all(map(gone, pids))
+
+
+def test_an_interrupted_call_leaves_nothing_that_the_next_one_could_mistake(monkeypatch):
+    vector = gymnasium.make_vec("cartpole/Balance-v0", 4, workers=2)
+    vector.reset(seed=0)
+    pids = vector.workers
+
+    def interrupt():
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(vector.unwrapped._workers[1], "answer", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            vector.step(np.ones(4, int))
+    for call in (vector.reset, lambda: vector.step(np.ones(4, int))):
+        with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="make another one"):
+            call()
+    assert all(map(gone, pids))
+
+
+@pytest.mark.parametrize("ours", OURS)
+def test_a_closed_one_says_so(ours):
+    vector = gymnasium.make_vec("cartpole/Balance-v0", 2, **ours)
+    vector.close()
+    with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="make another one"):
+        vector.reset()
 
 
 def test_workers_end_with_a_parent_that_is_killed(tmp_path):

@@ -21,14 +21,15 @@ Placing = tuple[dict[str, float], dict[str, float]]
 
 
 class StepPlan:
-    """Joints to place, by model, and commands to carry out."""
+    """Joints to place, by model, commands to controllers, and those to joints, to be held."""
 
     def __init__(self, sim: Simulator, request: StepWorldRequest) -> None:
         """The caller holds the simulator's lock. Errors: ControlError says what is wrong."""
         self._sim = sim
         _check_ticks(request)
         self.placed = self._placing(request)
-        self.commands = [*self._controllers(request), *self._joints(request)]
+        self.commands = self._controllers(request)
+        self.held = self._joints(request)
 
     def _placing(self, request: StepWorldRequest) -> dict[Model, Placing]:
         names, velocities = request.joints, request.velocities or [0.0] * len(request.joints)

@@ -1,6 +1,7 @@
 """step_world: resets, commands and moves a world in lock-step, and answers with its state."""
 
 import threading
+from collections.abc import Callable, Sequence
 
 import rospy
 from sensor_msgs.msg import JointState
@@ -31,7 +32,7 @@ class StepService:
                 self._begin(request, plan)  # what is left to fail is a user's controller
             except ControlError as error:
                 return self._answer(request, f"StepWorld: {error}")
-            self._advance(request.ticks)
+            self._advance(request.ticks, plan.held)
             return self._answer(request)
 
     def _begin(self, request: StepWorldRequest, plan: StepPlan) -> None:
@@ -42,16 +43,25 @@ class StepService:
             sim.reset(everything=request.reset == StepWorldRequest.SIMULATION)
         for model, (positions, velocities) in plan.placed.items():
             sim.set_joint_states(model, positions, velocities)
-        for command in plan.commands:
+        for command in (*plan.commands, *plan.held):
             command()
 
-    def _advance(self, ticks: int) -> None:
+    def _advance(self, ticks: int, held: Sequence[Callable[[], None]]) -> None:
         while ticks > SLICE:
-            self._sim.advance(SLICE)
+            self._pass(SLICE, held)
             ticks -= SLICE
             self._sim.lock.yield_turn()
         if ticks:
+            self._pass(ticks, held)
+
+    def _pass(self, ticks: int, held: Sequence[Callable[[], None]]) -> None:
+        if not held:
             self._sim.advance(ticks)
+            return
+        for _ in range(ticks):  # limits clip a command in place, to what one tick can do of it
+            for command in held:
+                command()
+            self._sim.advance(1)
 
     def _answer(self, request: StepWorldRequest, fault: str = "") -> StepWorldResponse:
         response = StepWorldResponse(

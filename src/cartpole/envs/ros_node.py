@@ -58,7 +58,8 @@ def _is_local(uri: str) -> bool:
 
 def _ask_master(method: str, *arguments: Any) -> Any:
     master = rosgraph.Master(_CALLER)
-    return run_limited(lambda: getattr(master, method)(*arguments), MASTER_TIMEOUT)
+    with master.handle:  # its connection would stay open
+        return run_limited(lambda: getattr(master, method)(*arguments), MASTER_TIMEOUT)
 
 
 def service_is_registered(name: str) -> bool:

@@ -1,0 +1,11 @@
+#!/usr/bin/env python3
+"""Evaluates, shows, draws and compares trainings, and searches options; see --help."""
+
+import sys
+
+if __name__ == "__main__":
+    try:
+        from cartpole.workbench.cli import main
+    except KeyboardInterrupt:  # Ctrl-C while it is still being read; main() sees to the rest
+        sys.exit(130)
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The subcommands of workbench.py: flags, and what they call."""

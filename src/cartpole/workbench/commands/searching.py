@@ -1,0 +1,60 @@
+"""train and sweep: new trainings, with Stable-Baselines3 and in search of options."""
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+from cartpole.training.interrupt import Interrupt
+from cartpole.workbench import sb3_settings
+from cartpole.workbench.commands.shared import number
+from cartpole.workbench.extras import need
+from cartpole.workbench.sweep import Sweep, run_sweep
+from cartpole.workbench.sweep_ranges import read_ranges
+from cartpole.workbench.sweep_trainers import DQN, names_of, trainer
+
+
+def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
+    """Flags of one of the two."""
+    if command == "train":
+        sb3_settings.add_flags(parser)
+        return
+    add = parser.add_argument
+    add("--algo", choices=(DQN, *sb3_settings.CLASSES), default=DQN, help="default dqn")
+    add("--env-id", default="CartPole-v1", metavar="ID", help="default CartPole-v1")
+    add("--ranges", type=Path, metavar="FILE", help="what is searched (config/sweep.yaml)")
+    add("--trials", type=number(1), default=20, metavar="N", help="in all (default 20)")
+    add("--seeds", type=number(1), default=1, metavar="N", help="trainings a trial (default 1)")
+    add("--seed", type=number(0), default=0, metavar="N", help="of the search (default 0)")
+    add("--total-timesteps", type=number(1), metavar="N", help="of each training")
+    add("--out", type=Path, metavar="FOLDER",
+        help="of the study; one that exists is gone on with (runs/sweep__ENV__ALGO__TIME)")  # fmt: skip
+
+
+def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
+    """One of the two.
+
+    Raises:
+        CartpoleError: if something fails that the user can mend.
+    """
+    if arguments.command == "sweep":
+        _sweep(arguments, interrupt)
+        return
+    need("stable_baselines3", "Stable-Baselines3", "train")
+    from cartpole.workbench.sb3_training import train
+
+    train(sb3_settings.choose(arguments), interrupt)
+
+
+def _sweep(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
+    need("optuna", "Optuna", "sweep")
+    algorithm, env_id = arguments.algo, arguments.env_id
+    ranges = read_ranges(arguments.ranges, algorithm, env_id, names_of(algorithm))
+    fixed: dict[str, Any] = {"env_id": env_id}
+    if arguments.total_timesteps:
+        fixed["total_timesteps"] = arguments.total_timesteps
+    section = env_id if algorithm == DQN else f"{algorithm} {env_id}"
+    place = f"runs/sweep__{env_id.replace('/', '-')}__{algorithm}__{int(time.time())}"
+    folder = arguments.out or Path(place)
+    sweep = Sweep(folder, section, ranges, arguments.trials, arguments.seeds, arguments.seed)
+    run_sweep(sweep, trainer(algorithm, fixed), interrupt)

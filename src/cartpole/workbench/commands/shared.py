@@ -1,0 +1,48 @@
+"""Flags that several subcommands have."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from cartpole.errors import CartpoleError
+from cartpole.training.options import key_values
+from cartpole.workbench.players import WHICH
+
+
+def add_policy_flags(parser: argparse.ArgumentParser) -> None:
+    """Which policy of which run, and where it acts."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
+    parser.add_argument("--checkpoint", choices=WHICH, default="best",
+                        help="by evaluation, or the newest (default best)")  # fmt: skip
+    parser.add_argument("--seed", type=number(0), default=0, metavar="N",
+                        help="of the episodes (default 0)")  # fmt: skip
+    parser.add_argument("--env-kwargs", nargs="+", default=[], metavar="KEY=VALUE",
+                        help="options of the environment, as backend=ros")  # fmt: skip
+
+
+def env_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The environment's options as values.
+
+    Raises:
+        CartpoleError: if one isn't KEY=VALUE.
+    """
+    import yaml
+
+    pairs = key_values(arguments.env_kwargs, "--env-kwargs")
+    try:
+        return {name: yaml.safe_load(text) for name, text in pairs.items()}
+    except yaml.YAMLError as error:
+        raise CartpoleError(f"--env-kwargs: {' '.join(str(error).split())}") from error
+
+
+def number(lowest: int) -> Any:
+    """An argparse type: a whole number from `lowest` on."""
+
+    def whole(text: str) -> int:
+        value = int(text)
+        if not lowest <= value < 2**31:
+            raise argparse.ArgumentTypeError(f"must be at least {lowest} and below 2^31: {text}")
+        return value
+
+    whole.__name__ = "whole number"  # argparse's word for it
+    return whole

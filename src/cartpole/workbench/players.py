@@ -1,0 +1,138 @@
+"""What a training learned, ready to act: one `Player` for every kind of run."""
+
+import re
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+import torch
+
+from cartpole.errors import CartpoleError
+from cartpole.training.dqn_policy import load_policy
+from cartpole.training.environments import make_environment
+from cartpole.training.run_checkpoints import BEST, FOLDER, LAST, read
+from cartpole.workbench.runs import POLICY_GRADIENT, Run
+
+WHICH = ("best", "last")
+PG_LAST = "policy_network.pth"
+PG_NUMBERED = re.compile(r"policy_network_episode_(\d+)\.pth")
+_DAMAGED = (RuntimeError, KeyError, ValueError, EOFError, TypeError, AttributeError)
+
+
+class Player(NamedTuple):
+    """A learned policy, and an environment of the kind it learned in; the caller closes that."""
+
+    act: Callable[[np.ndarray], Any]  # greedily, for one observation (D,)
+    preference: Callable[[np.ndarray], np.ndarray]  # of (N, D): (N,), see meaning
+    meaning: str  # of the preference: positive is the last action, or a push to the right
+    env: gymnasium.Env[Any, Any]
+    checkpoint: Path
+
+
+def warn(text: str) -> None:
+    """Tells the user beside the results."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def load_player(
+    run: Run,
+    which: str = "best",
+    env_options: Mapping[str, Any] | None = None,
+    say: Callable[[str], None] = warn,
+) -> Player:
+    """The policy of a run's best or last checkpoint, or of the one before it if that is damaged.
+
+    Args:
+        env_options: of the environment, on top of the training's own; such as `render_mode`.
+        say: is told of what is passed over.
+
+    Raises:
+        CartpoleError: if there is no checkpoint that can be read, or no such environment.
+    """
+    load = _loader(run)
+    options = {**run.env_kwargs, **(env_options or {})}
+    paths = candidates(run, which)
+    for path in paths:
+        try:
+            state = _read(run, path)
+        except CartpoleError as error:
+            say(f"{error}; taking an earlier one")
+            continue
+        return load(run, path, state, options)
+    reason = "none of its checkpoints can be read" if paths else "it has no checkpoint yet"
+    raise CartpoleError(f"{run.folder} has no policy: {reason}")
+
+
+def _loader(run: Run) -> Callable[[Run, Path, dict[str, Any], dict[str, Any]], Player]:
+    if run.algorithm == "dqn":
+        return _dqn
+    if run.algorithm == POLICY_GRADIENT:
+        return _policy_gradient
+    from cartpole.workbench.sb3_player import load_sb3  # the extra may not be there
+
+    return load_sb3
+
+
+def candidates(run: Run, which: str) -> list[Path]:
+    """Checkpoints in the order in which they are tried; only those that exist."""
+    if run.algorithm == POLICY_GRADIENT:
+        return _policy_networks(run.folder)
+    numbered = sorted((run.folder / FOLDER).glob("step_*.pt"), reverse=True)
+    best, last = run.folder / BEST, run.folder / LAST
+    order = [best, last, *numbered] if which == "best" else [last, *numbered, best]
+    return [path for path in order if path.exists()]
+
+
+def _policy_networks(folder: Path) -> list[Path]:
+    numbered = {
+        int(match[1]): path
+        for path in folder.iterdir()
+        if (match := PG_NUMBERED.fullmatch(path.name))
+    }
+    paths = [folder / PG_LAST, *(numbered[key] for key in sorted(numbered, reverse=True))]
+    return [path for path in paths if path.exists()]
+
+
+def _read(run: Run, path: Path) -> dict[str, Any]:
+    if run.algorithm != POLICY_GRADIENT:
+        return read(path)
+    try:
+        state: dict[str, Any] = torch.load(path, weights_only=True)
+        if set(state) != {"fc.weight", "fc.bias"}:
+            raise ValueError("other weights")
+    except OSError as error:
+        raise CartpoleError(f"can't read {path}: {error.strerror or error}") from error
+    except _DAMAGED as error:
+        raise CartpoleError(f"{path} is damaged, or no policy network") from error
+    return state
+
+
+def _dqn(run: Run, path: Path, state: dict[str, Any], options: dict[str, Any]) -> Player:
+    policy = load_policy(path, **options)
+    agent = policy.agent
+
+    def preference(observations: np.ndarray) -> np.ndarray:
+        values = agent.q_values(observations)
+        return np.asarray(values[:, -1] - values[:, 0])
+
+    return Player(agent.act_greedily, preference, "Q(right) - Q(left)", policy.env, path)
+
+
+def _policy_gradient(
+    run: Run, path: Path, state: dict[str, Any], options: dict[str, Any]
+) -> Player:
+    from cartpole.training.pg_run import make_agent  # it draws and logs: slow to import
+    from cartpole.training.pg_settings import Settings
+
+    agent: Any = make_agent(Settings(**run.config["settings"]))
+    agent.policy.load_state_dict(state)
+    agent.sync()
+
+    def preference(observations: np.ndarray) -> np.ndarray:
+        return np.array([1.0 - 2.0 * agent.probability_of_zero(each) for each in observations])
+
+    env = make_environment(run.env_id, options)
+    return Player(agent.act_greedily, preference, "P(right) - P(left)", env, path)

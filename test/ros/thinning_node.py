@@ -1,0 +1,143 @@
+#!/usr/bin/env python3
+"""Beyond real time topics are thinned, and the last message before a pause always comes; else all come."""
+
+import threading
+import unittest
+
+import rospy
+import rosservice
+import rostest
+from controller_manager_msgs.srv import LoadController, SwitchController
+from gazebo_msgs.msg import ModelStates
+from gazebo_msgs.srv import (
+    GetPhysicsProperties,
+    GetWorldProperties,
+    SetPhysicsProperties,
+    SpawnModel,
+    SpawnModelRequest,
+)
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Empty
+
+from ros_utils import ros_gazebo
+from ros_utils.service_client import ServiceGone
+from ros_utils.step_client import StepClient
+
+BOUND = 20.0  # [s of wall time]
+MILLISECOND = 1_000_000  # [ns]
+REAL_TIME, UNLIMITED = 1000.0, 0.0  # [Hz]
+
+
+def call(name, kind, *args):
+    rospy.wait_for_service(name, BOUND)
+    return rospy.ServiceProxy(name, kind)(*args)
+
+
+class Stamps:
+    """The times [ns] of a topic's messages."""
+
+    def __init__(self, name, kind, read):
+        self.got = []
+        self._news = threading.Condition()
+        self._read = read
+        self._subscriber = rospy.Subscriber(name, kind, self._receive, tcp_nodelay=True)
+
+    def _receive(self, message):
+        with self._news:
+            self.got.append(self._read(message))
+            self._news.notify_all()
+
+    def wait_for(self, condition):
+        with self._news:
+            return self._news.wait_for(lambda: condition(self.got), BOUND)
+
+    def close(self):
+        self._subscriber.unregister()
+
+
+class ThinningTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        xml = rospy.get_param("/robot_description")
+        request = SpawnModelRequest(model_name="cartpole", model_xml=xml, robot_namespace="/")
+        assert call("/gazebo/spawn_urdf_model", SpawnModel, request).success
+        name = "joint_state_controller"
+        assert call("/controller_manager/load_controller", LoadController, name).ok
+        assert call(
+            "/controller_manager/switch_controller", SwitchController, [name], [], 2, False, 0.0
+        ).ok
+        cls.clock = Stamps("/clock", Clock, lambda message: message.clock.to_nsec())
+        cls.joints = Stamps("/joint_states", JointState, lambda m: m.header.stamp.to_nsec())
+        cls.models = Stamps("/gazebo/model_states", ModelStates, lambda message: len(message.name))
+        assert ros_gazebo.gazebo_step_physics(1)  # all three have found their publisher when it shows
+        while not (cls.clock.got and cls.joints.got and cls.models.got):
+            assert ros_gazebo.gazebo_step_physics(1)
+
+    @classmethod
+    def tearDownClass(cls):
+        for topic in (cls.clock, cls.joints, cls.models):
+            topic.close()
+
+    def tearDown(self):
+        call("/gazebo/pause_physics", Empty)
+        self.set_rate(REAL_TIME)
+
+    def set_rate(self, rate):
+        now = call("/gazebo/get_physics_properties", GetPhysicsProperties)
+        answer = call("/gazebo/set_physics_properties", SetPhysicsProperties,
+                      now.time_step, rate, now.gravity, now.ode_config)  # fmt: skip
+        self.assertTrue(answer.success, answer.status_message)
+
+    def time(self):
+        return round(call("/gazebo/get_world_properties", GetWorldProperties).sim_time * 1e9)
+
+    def assert_last_is(self, time):
+        for topic in (self.clock, self.joints):
+            self.assertTrue(topic.wait_for(lambda got: got[-1] == time), (topic.got[-1], time))
+
+    def run_until(self, time):
+        begin = len(self.clock.got)
+        call("/gazebo/unpause_physics", Empty)
+        self.assertTrue(self.clock.wait_for(lambda got: got[-1] >= time))
+        call("/gazebo/pause_physics", Empty)
+        self.assert_last_is(self.time())
+        return self.clock.got[begin:]
+
+    def test_as_fast_as_it_can_less_comes_but_the_last_before_each_pause(self):
+        self.set_rate(UNLIMITED)
+        for _ in range(5):
+            begin = self.time()
+            seen = self.run_until(begin + 1000 * MILLISECOND)
+            self.assertLess(len(seen), (seen[-1] - begin) / MILLISECOND / 2)
+
+    def test_a_change_of_the_rate_at_run_time_counts_at_once(self):
+        self.set_rate(UNLIMITED)
+        call("/gazebo/unpause_physics", Empty)
+        self.assertTrue(self.clock.wait_for(lambda got: got[-1] > 100 * MILLISECOND))
+        self.set_rate(REAL_TIME)
+        begin = self.time()
+        self.assertTrue(self.clock.wait_for(lambda got: got[-1] > begin + 200 * MILLISECOND))
+        call("/gazebo/pause_physics", Empty)
+        self.assert_last_is(self.time())
+        seen = [stamp for stamp in self.clock.got if stamp > begin]
+        self.assertEqual(
+            {after - before for before, after in zip(seen, seen[1:], strict=False)}, {MILLISECOND}
+        )
+
+    def test_steps_of_gz_world_end_with_their_last_message(self):
+        for ticks in (1, 2, 3, 500):
+            begin, models = self.time(), len(self.models.got)
+            self.assertTrue(ros_gazebo.gazebo_step_physics(ticks))
+            self.assert_last_is(begin + ticks * MILLISECOND)
+            self.assertTrue(self.models.wait_for(lambda got, before=models: len(got) > before))
+
+    def test_the_step_service_is_not_there(self):
+        self.assertNotIn("/gazebo/step_world", rosservice.get_service_list())
+        with self.assertRaisesRegex(ServiceGone, "/gazebo/step_world: nobody offers this service"):
+            StepClient().step(1)
+
+
+if __name__ == "__main__":
+    rospy.init_node("thinning_test")
+    rostest.rosrun("cartpole", "thinning", ThinningTest)

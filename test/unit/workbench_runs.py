@@ -1,0 +1,52 @@
+"""Small trainings of every kind, for the tests of the workbench."""
+
+import argparse
+import json
+from pathlib import Path
+
+from unit.dqn_runs import SMALL
+from unit.learning_fakes import FakePlant
+
+from cartpole.training.dqn_run import DQNTraining
+from cartpole.training.dqn_settings import choose
+from cartpole.training.interrupt import Interrupt
+from cartpole.training.pg_run import Training
+from cartpole.training.pg_settings import Settings
+
+PPO = {"n_steps": 64, "batch_size": 64, "total_timesteps": 256, "eval_frequency": 128,
+       "eval_episodes": 2}  # fmt: skip
+
+
+def dqn(folder: Path, **changed: object) -> Path:
+    folder.mkdir(parents=True)
+    options = {name: str(value) for name, value in (SMALL | changed).items()}
+    DQNTraining(choose([], options), folder, Interrupt()).run()
+    return folder
+
+
+def policy_gradient(folder: Path, **choices: object) -> Path:
+    folder.mkdir(parents=True)
+    settings = Settings(**{"episodes": 4, "save_every": 2, "backend": "bullet", **choices})
+    Training(settings, folder, FakePlant(), Interrupt()).run()
+    return folder
+
+
+def sb3(folder: Path, algorithm: str = "ppo", **changed: object) -> Path:
+    from cartpole.workbench.sb3_settings import choose as choose_sb3
+    from cartpole.workbench.sb3_training import train
+
+    options = {"env_id": "CartPole-v1", **PPO, "run_dir": folder, **changed}
+    pairs = [f"{name}={value}" for name, value in options.items() if value is not None]
+    arguments = argparse.Namespace(algo=algorithm, config=None, params=pairs)
+    return train(choose_sb3(arguments), Interrupt())
+
+
+def record(folder: Path, returns: list[float], **run: object) -> Path:
+    """A run folder with figures alone, as if its checkpoints were lost."""
+    folder.mkdir(parents=True)
+    settings = {"exp_name": "dqn", "env_id": "CartPole-v1", "env_kwargs": {}, "seed": 0, **run}
+    (folder / "config.json").write_text(json.dumps({"algorithm": "dqn", "run": settings}))
+    rows = ["step,tag,value,wall_time"]
+    rows += [f"{10 * i + 10},charts/episodic_return,{value},0" for i, value in enumerate(returns)]
+    (folder / "scalars.csv").write_text("\n".join(rows) + "\n")
+    return folder
