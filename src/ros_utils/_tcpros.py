@@ -41,6 +41,7 @@ class Connection:
             TimeoutError: no answer in time.
         """
         self._kind = kind
+        self._timeout = 0.0  # [s] of the blocking socket; not set yet
         try:
             host, port = rospy.core.parse_rosrpc_uri(address)
             self._socket = socket.create_connection((host, port), timeout)
@@ -77,11 +78,12 @@ class Connection:
         """
         payload = _serialized(message)
         try:
-            self._socket.settimeout(timeout)
+            if timeout != self._timeout:
+                self._set_timeout(timeout)
             self._socket.sendall(payload)
             ok, answer = self._receive()
-        except TimeoutError:
-            raise
+        except BlockingIOError as fault:
+            raise TimeoutError from fault
         except OSError as fault:
             raise ConnectionEnded(str(fault)) from fault
         if not ok:
@@ -93,6 +95,14 @@ class Connection:
         except genpy.DeserializationError as fault:
             raise CallFailed(f"its answer can't be read: {fault}") from fault
         return response
+
+    def _set_timeout(self, timeout: float) -> None:
+        """Lets the kernel see to the time limit: Python's own costs a system call more for each wait."""
+        limit = struct.pack("@ll", int(timeout), int(timeout % 1.0 * 1e6))
+        self._socket.settimeout(None)
+        for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
+            self._socket.setsockopt(socket.SOL_SOCKET, option, limit)
+        self._timeout = timeout
 
     def _receive(self) -> tuple[bool, bytes]:
         """Reads one answer; most come in one piece."""

@@ -46,13 +46,14 @@ def wait_until(condition, bound=BOUND):
     return done
 
 
-def spawn(name="cartpole", robot_namespace="/", own_namespace=None):
-    """Spawns the cart-pole; `own_namespace` goes into the plugin of its URDF."""
+def spawn(name="cartpole", robot_namespace="/", own_namespace=None, y=0.0):
+    """Spawns the cart-pole at `y` [m]; `own_namespace` goes into the plugin of its URDF."""
     xml = rospy.get_param("/robot_description")
     if own_namespace is not None:
         tag = f"<robotNamespace>{own_namespace}</robotNamespace>"
         xml = PLUGIN.sub(rf"\1>{tag}</plugin>", xml)
     request = SpawnModelRequest(model_name=name, model_xml=xml, robot_namespace=robot_namespace)
+    request.initial_pose.position.y = y
     return call("/gazebo/spawn_urdf_model", SpawnModel, request)
 
 

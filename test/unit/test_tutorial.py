@@ -84,7 +84,7 @@ def run_block(block: Block, folder: Path) -> None:
             assert worked == (block.mark != "fails"), f"{line}\n{ended.stdout}{ended.stderr}"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.extras("imageio_ffmpeg", "optuna", "stable_baselines3", "Box2D")
 def test_every_command_of_the_tutorial_runs(tmp_path: Path) -> None:
     for block in blocks(ENGLISH):

@@ -23,42 +23,45 @@ class ThinnedTopic:
         self._thinner = thinner
         self._publish = publish
         self._guard = threading.Lock()
+        self._waiting = False  # for the thinner, which will take what is kept then
         self._kept: Any = None
+        self._newest: Any = None  # that was published
         self._sent = 0.0  # [s of wall time]
 
     def send(self, sample: Any) -> None:
         """Publishes the sample, or keeps it until its turn or a newer one comes; called by the tick."""
-        if not self._thinner.active:
-            self._send_now(sample)
-            return
+        if self._waiting:  # nearly always, beyond real time: so this goes without the lock
+            self._kept = sample
+            if self._waiting:  # still: flush() takes what is kept after it has cleared this
+                return
         with self._guard:
-            early = self._kept is not None or time.monotonic() - self._sent < PERIOD
-            if early:
+            if sample is self._newest:  # flush() has been quicker
+                return
+            if self._thinner.active and time.monotonic() - self._sent < PERIOD:
                 self._kept = sample
-        if early:
+                self._waiting = True
+            else:
+                self._send_now(sample)
+        if self._waiting:
             self._thinner.remember(self)
-        else:
-            self._send_now(sample)
 
     def _send_now(self, sample: Any) -> None:
+        self._kept, self._newest = None, sample
+        self._sent = time.monotonic()
+        self._publish(sample)
+
+    def flush(self) -> None:
+        """Publishes what is kept."""
         with self._guard:
-            self._kept = None
-            self._sent = time.monotonic()
-            self._publish(sample)
+            self._waiting = False
+            if self._kept is not None:
+                self._send_now(self._kept)
 
     def close(self) -> None:
         """Ends it; what is kept is dropped."""
         with self._guard:
             self._kept = None
             self._publish = _drop
-
-    def flush(self) -> None:
-        """Publishes what is kept."""
-        with self._guard:
-            if self._kept is not None:
-                sample, self._kept = self._kept, None
-                self._sent = time.monotonic()
-                self._publish(sample)
 
 
 def _drop(sample: Any) -> None:
