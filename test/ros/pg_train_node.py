@@ -56,18 +56,17 @@ class PgTrain(unittest.TestCase):
         self.assertTrue(torch.equal(self.weights(first), self.weights(second)))
 
     def test_in_this_process_the_weights_are_those_over_ros(self):
-        for algorithm in ("document", "gae"):
-            over_ros, inside = self.place(), self.place()
-            flags = ("--episodes=6", "--seed=4", f"--algorithm={algorithm}", "--start-noise=0.05")
-            self.trained(over_ros, *flags)
-            self.trained(inside, *flags, "--backend=bullet")
-            for name in NETWORKS:
-                ours, theirs = (
-                    torch.load(place.run / name, weights_only=True) for place in (inside, over_ros)
-                )
-                self.assertEqual(ours.keys(), theirs.keys())
-                self.assertTrue(all(torch.equal(ours[key], theirs[key]) for key in ours), name)
-            self.assertEqual(inside.processes(), {})
+        over_ros, inside = self.place(), self.place()
+        flags = ("--episodes=8", "--seed=4", "--algorithm=gae", "--start-noise=0.05")
+        self.trained(over_ros, *flags)
+        self.trained(inside, *flags, "--backend=bullet")
+        for name in NETWORKS:
+            ours, theirs = (
+                torch.load(place.run / name, weights_only=True) for place in (inside, over_ros)
+            )
+            self.assertEqual(ours.keys(), theirs.keys())
+            self.assertTrue(all(torch.equal(ours[key], theirs[key]) for key in ours), name)
+        self.assertEqual(inside.processes(), {})
 
     def test_realtime(self):
         place = self.place()

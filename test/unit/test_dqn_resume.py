@@ -45,7 +45,10 @@ def whole(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run
 
 
-@pytest.mark.parametrize("seed", range(4))
+MORE = [pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3)]
+
+
+@pytest.mark.parametrize("seed", [0, 1, *MORE])
 def test_killed_at_random_moments(root: Path, whole: Path, tmp_path: Path, seed: int) -> None:
     run, moments = tmp_path / "run", random.Random(seed)
     process = start(root, *FLAGS, f"--run-dir={run}")
