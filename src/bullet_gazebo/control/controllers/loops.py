@@ -1,6 +1,11 @@
 """What the controllers with a PID share: a loop around a joint, and reports of its state."""
 
-from bullet_gazebo.control.controllers.base import Output
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Self
+
+from bullet_gazebo.control.controllers.base import Controller, Input, Output, joint_param
+from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.pid import Pid
 from bullet_gazebo.control.samples import JointControllerSample
@@ -62,3 +67,25 @@ class StateReport:
                     gains.p, gains.i, gains.d, gains.i_max, gains.antiwindup,
                 )
             )  # fmt: skip
+
+
+class PidJoint(Controller):
+    """A controller of one joint with one PID and the topics `command` and `state`."""
+
+    def __init__(self, name: str, joint: JointHandle, pid: Pid) -> None:
+        super().__init__(name)
+        self.joint = joint
+        self._report = StateReport(joint, pid)
+        self.claimed = (joint.name,)
+        self.inputs = [Input("command", "Float64", self.command)]
+        self.outputs = [self._report.output]
+        self.pids = {"pid": pid}
+
+    @classmethod
+    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> Self:
+        joint = joint_param(params, name, cls.interface, hardware)
+        return cls(name, joint, Pid.from_params(params.get("pid"), f"{name}/pid"))
+
+    @abstractmethod
+    def command(self, value: float) -> None:
+        """Takes a new set-point."""
