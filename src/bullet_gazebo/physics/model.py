@@ -166,12 +166,6 @@ class Model:
         """Takes the velocity out of all joints; the root link keeps its own."""
         self._rest(list(self._joints))
 
-    def rest(self) -> None:
-        """Takes all velocity out of the model; poses and joint positions stay."""
-        pose, _ = self.body.link_state(self.description.root)
-        self.body.reset_base(pose)
-        self._rest(list(self._joints))
-
     def reset(self, joints: bool) -> None:
         """Returns to the initial pose, at rest; with `joints`, also every joint to zero."""
         if joints:
