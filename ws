@@ -105,6 +105,8 @@ main() {
     case $command in
         test)
             cd -- "$ROOT"
+            # All tests take two processes: one for those through ROS, one for the others.
+            [[ $# -gt 1 ]] || set -- test --numprocesses 2 --dist loadgroup
             exec "$VENV/bin/python3" -m pytest "${@:2}"
             ;;
         check) check ;;

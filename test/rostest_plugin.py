@@ -37,7 +37,10 @@ class RostestFile(pytest.File):
     """A launch file with <test> elements."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        yield RostestItem.from_parent(self, name=self.path.stem)
+        item = RostestItem.from_parent(self, name=self.path.stem)
+        # One after the other on one of pytest-xdist's workers: each starts several processes.
+        item.add_marker(pytest.mark.xdist_group("ros"))
+        yield item
 
 
 class RostestItem(pytest.Item):

@@ -33,6 +33,24 @@ class DqnTrain(unittest.TestCase):
         self.assertEqual((config["dqn"]["gamma"], config["dqn"]["n_step"]), (0.9, 2))
         self.assertIn("last.pt", place.files())
 
+    def test_an_evaluation_over_ros_leaves_the_training_as_it_was(self):
+        """There is one robot in one simulator; in this process there are two."""
+        place = self.place()
+        options = ["--env-id=cartpole/Classic-v0", "--total-timesteps=260", "--eval-frequency=70",
+                   "--eval-episodes=2", "--confirm-episodes=3", "--learning-starts=50",
+                   "--log-frequency=20"]  # fmt: skip
+        figures = []
+        for backend in ("ros", "bullet"):
+            run = place.folder / backend
+            training = place.start("rosrun", "cartpole", "dqn_train.py", f"--run-dir={run}",
+                                   f"--env-kwargs=backend={backend}", *options)  # fmt: skip
+            self.assertEqual(training.end(90), 0, training.output)
+            with (run / "scalars.csv").open() as rows:
+                figures.append([row.split(",")[:3] for row in rows if "SPS" not in row])
+        self.assertTrue(any(tag == "eval/mean_reward" for _, tag, _ in figures[0]))
+        self.assertEqual(*figures)
+        self.assertEqual(place.left_after(20), {})
+
     def test_rosrun_needs_no_master_and_starts_none(self):
         place = self.place()
         training = place.start("rosrun", "cartpole", "dqn_train.py", f"--run-dir={place.run}",

@@ -1,7 +1,10 @@
 #!/usr/bin/env python3
 """pg_train.py from nothing: it trains, leaves its files, and leaves nothing running."""
 
+import contextlib
 import json
+import os
+import signal
 import unittest
 
 import rostest
@@ -16,6 +19,9 @@ TAGS = {
     "charts/episodic_return",
     "charts/episodic_length",
     "charts/SPS",
+    "losses/policy_loss",
+    "losses/value_loss",
+    "eval/mean_reward",
 }
 
 
@@ -68,6 +74,29 @@ class PgTrain(unittest.TestCase):
             self.assertTrue(all(torch.equal(ours[key], theirs[key]) for key in ours), name)
         self.assertEqual(inside.processes(), {})
 
+    def test_killed_and_resumed_the_weights_are_those_of_one_go(self):
+        flags = ("--algorithm=gae", "--start-noise=0.05", "--episodes=40", "--eval-episodes=1",
+                 "--checkpoint-frequency=5")  # fmt: skip
+        whole, killed = self.place(), self.place()
+        self.trained(whole, *flags, "--backend=bullet")
+        training = killed.train(*flags)
+        training.wait_for("episode    20/")
+        for pid in killed.processes():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        training.end()
+        resumed = killed.start("rosrun", "cartpole", "pg_train.py", f"--resume={killed.run}")
+        self.assertEqual(resumed.end(90), 0, resumed.output)
+        self.assertIn("going on after episode", resumed.output)
+        self.assertTrue(torch.equal(self.weights(whole), self.weights(killed)))
+        self.assertEqual(killed.left_after(5), {})
+
+    def test_another_environment_needs_no_master_and_starts_none(self):
+        place = self.place()
+        self.trained(place, "--env-id=CartPole-v1", "--episodes=2", "__name:=learner")
+        self.assertEqual(place.processes(), {})
+        self.assertIn("last.pt", place.files())
+
     def test_realtime(self):
         place = self.place()
         self.trained(place, "--episodes=3", "--realtime")
@@ -114,12 +143,13 @@ class PgTrain(unittest.TestCase):
         place = self.place()
         training = place.start(
             "roslaunch", "cartpole", "pg_train.launch", "episodes:=3", "seed:=2",
-            f"run_dir:={place.run}",
+            f"run_dir:={place.run}", "algorithm:=gae", "params:=batch_episodes=2",
         )  # fmt: skip
         training.end(90)
         self.assertEqual(place.left_after(5), {}, training.output)
-        settings = json.loads((place.run / "summary.json").read_text())["settings"]
-        self.assertEqual((settings["episodes"], settings["seed"]), (3, 2))
+        record = json.loads((place.run / "config.json").read_text())
+        self.assertEqual((record["run"]["episodes"], record["run"]["seed"]), (3, 2))
+        self.assertEqual(record["pg"]["batch_episodes"], 2)
 
     def wait_for_service(self, place: Place, name: str) -> None:
         script = f"import rospy; rospy.wait_for_service('{name}', 30)"

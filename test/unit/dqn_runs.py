@@ -1,12 +1,18 @@
-"""What is left of two trainings, compared: all but the wall clock must be the same bits."""
+"""Trainings in this process, and what is left of two of them compared: but for the clock, bits."""
 
 import csv
+import json
 import math
+import signal
 from pathlib import Path
 from typing import Any
 
 import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from cartpole.training.dqn_run import DQNTraining
+from cartpole.training.dqn_settings import Choice, choose
+from cartpole.training.interrupt import Interrupt
 
 CLOCKED = "charts/SPS"  # the only tag whose values depend on the wall clock
 SMALL = {  # options of a training that is quick and uses everything there is to save
@@ -36,6 +42,40 @@ def flags(options: dict[str, Any]) -> list[str]:
         words.get(str(value), f"--{{}}={value}").format(name.replace("_", "-"))
         for name, value in options.items()
     ]
+
+
+class InterruptAfter(Interrupt):
+    """Ctrl-C, pressed when the training asks for the n-th time."""
+
+    def __init__(self, asked: int) -> None:
+        super().__init__()
+        self._left = asked
+
+    def requested(self) -> bool:
+        self._left -= 1
+        if self._left <= 0:
+            self.signal = signal.SIGINT
+        return super().requested()
+
+
+def small(**changed: object) -> Choice:
+    values = SMALL | changed
+    return choose([], {name: str(value) for name, value in values.items()})
+
+
+def train(folder: Path, interrupt: Interrupt | None = None, **changed: object) -> Path:
+    folder.mkdir(exist_ok=True)
+    DQNTraining(small(**changed), folder, interrupt or Interrupt()).run()
+    return folder
+
+
+def resume(folder: Path, interrupt: Interrupt | None = None) -> Path:
+    DQNTraining(choose(["--resume", str(folder)], {}), folder, interrupt or Interrupt()).run()
+    return folder
+
+
+def summary(folder: Path) -> dict:
+    return json.loads((folder / "summary.json").read_text())
 
 
 def checkpoint(run: Path, name: str = "last.pt") -> dict[str, Any]:

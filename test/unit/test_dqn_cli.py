@@ -126,5 +126,9 @@ def test_on_a_terminal_a_bar_with_return_epsilon_and_speed() -> None:
     shown.episode_done(Episode(0, 5, 5, 5.0, 0.5, 1234.0))
     shown.close()
     assert "0/100" in stream.getvalue()
-    shown = DQNProgress(100, 50, history, Terminal())
+    stream = Terminal()
+    shown = DQNProgress(100, 50, history, stream)
+    for steps in range(51, 101):
+        shown.step_done(steps)
     shown.close()
+    assert "100/100" in stream.getvalue(), "it ends where the training has ended"

@@ -1,7 +1,6 @@
 """Whole trainings in this process: what they leave, and that resuming changes nothing."""
 
 import json
-import signal
 from pathlib import Path
 
 import gymnasium
@@ -9,12 +8,16 @@ import numpy as np
 import pytest
 import torch
 from unit.dqn_runs import (
-    SMALL,
+    InterruptAfter,
     assert_same,
     assert_same_run,
     checkpoint,
     points,
+    resume,
     rows,
+    small,
+    summary,
+    train,
     without_doubles,
 )
 
@@ -22,8 +25,7 @@ from cartpole.agents.dqn.agent import DQNAgent
 from cartpole.errors import CartpoleError
 from cartpole.training import run_checkpoints, run_folder
 from cartpole.training.dqn_run import DQNTraining
-from cartpole.training.dqn_settings import Choice, choose
-from cartpole.training.interrupt import Interrupt
+from cartpole.training.dqn_settings import choose
 
 TAGS = {
     "charts/episodic_return",
@@ -39,44 +41,10 @@ FILES = {"last.pt", "best.pt", "checkpoints", "config.json", "scalars.csv", "sum
          "learning_curve.png"}  # fmt: skip
 
 
-class InterruptAfter(Interrupt):
-    """Ctrl-C, pressed when the training asks for the n-th time."""
-
-    def __init__(self, asked: int) -> None:
-        super().__init__()
-        self._left = asked
-
-    def requested(self) -> bool:
-        self._left -= 1
-        if self._left <= 0:
-            self.signal = signal.SIGINT
-        return super().requested()
-
-
-def small(**changed: object) -> Choice:
-    values = SMALL | changed
-    return choose([], {name: str(value) for name, value in values.items()})
-
-
-def train(folder: Path, interrupt: Interrupt | None = None, **changed: object) -> Path:
-    folder.mkdir(exist_ok=True)
-    DQNTraining(small(**changed), folder, interrupt or Interrupt()).run()
-    return folder
-
-
-def resume(folder: Path, interrupt: Interrupt | None = None) -> Path:
-    DQNTraining(choose(["--resume", str(folder)], {}), folder, interrupt or Interrupt()).run()
-    return folder
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A training that was never interrupted."""
     return train(tmp_path_factory.mktemp("whole"))
-
-
-def summary(folder: Path) -> dict:
-    return json.loads((folder / "summary.json").read_text())
 
 
 def test_a_training_leaves_its_files(whole: Path) -> None:
@@ -199,15 +167,15 @@ def test_a_full_disk_is_one_line_and_keeps_the_checkpoint_before(
     whole: Path, tmp_path: Path, monkeypatch
 ) -> None:
     run = tmp_path / "run"
-    real, writes = run_checkpoints.write_atomically, []
+    real, writes = run_checkpoints.save_tensors, []
 
-    def full(path: Path, write: object) -> None:
+    def full(path: Path, content: dict) -> None:
         writes.append(path)
         if len(writes) > 4:
             raise OSError(28, "No space left on device", str(path))
-        real(path, write)
+        real(path, content)
 
-    monkeypatch.setattr(run_checkpoints, "write_atomically", full)
+    monkeypatch.setattr(run_checkpoints, "save_tensors", full)
     with pytest.raises(CartpoleError, match=r"can't write .*No space left.*--resume") as raised:
         train(run)
     assert "\n" not in str(raised.value)

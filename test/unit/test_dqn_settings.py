@@ -67,6 +67,30 @@ def test_parameters_as_roslaunch_has_them(empty: str) -> None:
 def test_options_of_the_environment(empty: str) -> None:
     run = choose([empty, "--env-kwargs=max_steps=5,backend=bullet"], {}).run
     assert run.env_kwargs == {"max_steps": 5, "backend": "bullet"}
+    run = choose([empty, "--env-kwargs=noise=1e-3,render_mode=1e,backend=null"], {}).run
+    assert run.env_kwargs == {"noise": 0.001, "render_mode": "1e", "backend": None}
+
+
+@pytest.mark.parametrize("text", ["noise=[1", "noise", "a={"])
+def test_options_of_the_environment_that_cannot_be_read(text: str, tmp_path: Path, capsys) -> None:
+    with pytest.raises(SystemExit):
+        choose([f"--env-kwargs={text}"], {})
+    assert "env-kwargs: must be KEY=VALUE" in capsys.readouterr().err
+    with pytest.raises(CartpoleError, match="env_kwargs must be KEY=VALUE"):
+        choose([], {"env_kwargs": text})
+
+
+@pytest.mark.parametrize("value", [".inf", "2020-01-01", "[1, .nan]", "{a: 2020-01-01}", "{1: 2}"])
+def test_options_of_the_environment_that_no_record_can_hold(tmp_path: Path, value: str) -> None:
+    file = written(tmp_path, f"CartPole-v1: {{env_kwargs: {{noise: {value}}}}}")
+    with pytest.raises(CartpoleError, match="env_kwargs has values that no file can hold"):
+        choose([file], {})
+
+
+def test_infinity_is_beyond_every_limit(tmp_path: Path) -> None:
+    """config.json couldn't hold it."""
+    with pytest.raises(CartpoleError, match="max_grad_norm lies between"):
+        choose([written(tmp_path, "max_grad_norm: .inf")], {})
 
 
 @pytest.mark.parametrize(
@@ -108,7 +132,9 @@ def test_wrong_flags_exit_with_2(flags: list[str], capsys) -> None:
     with pytest.raises(SystemExit) as stop:
         choose(flags, {})
     assert stop.value.code == 2
-    assert "error:" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "error:" in error and len(error.splitlines()) == 2, "no list of all flags"
+    assert flags[0] != "--gama" or "unknown flag '--gama'; did you mean --gamma?" in error
 
 
 def test_wrong_names_elsewhere_name_the_nearest(empty: str) -> None:

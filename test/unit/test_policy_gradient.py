@@ -17,7 +17,8 @@ from cartpole.agents.policy_gradient import (
 )
 from cartpole.envs.cartpole_env import CartPoleEnv
 from cartpole.errors import CartpoleError
-from cartpole.training.loop import History, run_episode, train
+from cartpole.training.history import History
+from cartpole.training.loop import run_episode, train
 
 
 def document_future_reward(rewards: list[float], index: int) -> float:

@@ -1,5 +1,6 @@
 """REINFORCE with generalised advantages: its formulas, its repeatability, and that it learns."""
 
+import copy
 import math
 
 import numpy as np
@@ -10,20 +11,23 @@ from hypothesis import strategies as st
 from unit.learning_fakes import FakePlant
 
 from cartpole.agents.policy_gradient import Episode
-from cartpole.agents.reinforce import ReinforceAgent, ReinforceSettings, generalised_advantages
+from cartpole.agents.reinforce import ReinforceAgent, generalised_advantages
+from cartpole.agents.reinforce_settings import ReinforceSettings
 from cartpole.envs.cartpole_env import CartPoleEnv
 from cartpole.errors import CartpoleError
-from cartpole.training.loop import History, run_episode, train
+from cartpole.training.history import History
+from cartpole.training.loop import run_episode, train
 
 numbers = st.floats(-10.0, 10.0)
 
 
-def an_episode(length=12, seed=0, terminated=True):
+def an_episode(length=12, seed=0, terminated=True, size=4, actions=2):
     rng = np.random.default_rng(seed)
     episode = Episode()
     for _ in range(length):
-        episode.add(rng.normal(size=4).astype(np.float32), int(rng.integers(2)), float(rng.normal()))
-    episode.final_observation = rng.normal(size=4).astype(np.float32)
+        observation = rng.normal(size=size).astype(np.float32)
+        episode.add(observation, int(rng.integers(actions)), float(rng.normal()))
+    episode.final_observation = rng.normal(size=size).astype(np.float32)
     episode.terminated = terminated
     return episode
 
@@ -56,20 +60,80 @@ def test_a_terminated_episode_does_not_bootstrap_and_a_truncated_one_does():
 def test_the_policy_starts_uniform_and_acting_agrees_with_the_network():
     agent = ReinforceAgent(3, scale=(0.4, 1.0, 0.2, 2.0))
     observation = np.array([0.1, -0.3, 0.05, 0.7], np.float32)
-    assert agent.probability_of_zero(observation) == 0.5
+    assert agent.probabilities(observation).tolist() == [0.5, 0.5]
     agent.learn(an_episode())
     scaled = torch.from_numpy(observation / np.array([0.4, 1.0, 0.2, 2.0], np.float32))
-    expected = agent.policy(scaled.unsqueeze(0))[0, 0].item()
-    assert agent.probability_of_zero(observation) == pytest.approx(expected, abs=1e-6)
+    expected = agent.policy(scaled.unsqueeze(0))[0].tolist()
+    assert agent.probabilities(observation) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("hidden", [0, 7])
+@pytest.mark.parametrize("normalize", [False, True])
+@pytest.mark.parametrize(("size", "actions"), [(4, 2), (6, 3), (1, 5)])
+def test_any_observations_and_actions(hidden, normalize, size, actions):
+    settings = ReinforceSettings(
+        policy_hidden=hidden, normalize_observations=normalize, value_epochs=2
+    )
+    agent = ReinforceAgent(1, (0.5,) * size, settings, actions)
+    assert agent.probabilities(np.ones(size, np.float32)) == pytest.approx([1 / actions] * actions)
+    for seed in range(3):
+        agent.learn(an_episode(30, seed, size=size, actions=actions))
+    observation = np.random.default_rng(0).normal(size=size).astype(np.float32)
+    expected = agent.policy(agent._seen([observation]))[0].tolist()
+    found = agent.probabilities(observation)
+    assert found == pytest.approx(expected, abs=1e-6)
+    assert agent.act_greedily(observation) == int(np.argmax(found))
+    drawn = np.bincount([agent.act(observation) for _ in range(4000)], minlength=actions)
+    assert drawn / 4000 == pytest.approx(found, abs=0.04)
+
+
+def test_observations_are_normalised_by_what_was_seen_before():
+    agent = ReinforceAgent(0, settings=ReinforceSettings(normalize_observations=True))
+    episode = an_episode(200)
+    first = agent._seen(episode.observations)
+    assert torch.equal(first, torch.from_numpy(np.stack(episode.observations)))
+    episode.observations = [5.0 + 3.0 * each for each in episode.observations]
+    agent.learn(episode)
+    seen = agent._seen(episode.observations).numpy()
+    assert seen.mean(0) == pytest.approx([0.0] * 4, abs=1e-4)
+    assert seen.std(0) == pytest.approx([1.0] * 4, abs=1e-4)
+
+
+def test_entropy_draws_towards_a_uniform_policy():
+    chances = []
+    for weight in (0.0, 5.0):
+        agent = ReinforceAgent(0, settings=ReinforceSettings(entropy_coefficient=weight))
+        for _ in range(30):
+            agent.learn(an_episode())
+        chances.append(agent.probabilities(an_episode().observations[0]).max())
+    assert chances[1] < chances[0]
+
+
+@pytest.mark.parametrize("episodes", [1, 3])
+def test_it_goes_on_from_its_state_to_the_same_bits(episodes):
+    settings = ReinforceSettings(batch_episodes=2, policy_hidden=3, normalize_observations=True)
+    agents = [ReinforceAgent(seed, settings=settings) for seed in (1, 2)]
+    for seed in range(episodes):
+        agents[0].learn(an_episode(seed=seed))
+    agents[1].load_state_dict(copy.deepcopy(agents[0].state_dict()))
+    observation = an_episode().observations[0]
+    for agent in agents:
+        for seed in range(3):
+            agent.learn(an_episode(seed=10 + seed))
+    assert [agents[0].act(observation) for _ in range(50)] == [
+        agents[1].act(observation) for _ in range(50)
+    ]
+    for ours, theirs in zip(agents[0].value.parameters(), agents[1].value.parameters(), strict=True):
+        assert torch.equal(ours, theirs)
 
 
 def test_a_batch_updates_with_its_last_episode():
     agent = ReinforceAgent(0, settings=ReinforceSettings(batch_episodes=3))
     before = agent.policy.fc.weight.detach().clone()
     for seed in range(2):
-        agent.learn(an_episode(seed=seed))
+        assert agent.learn(an_episode(seed=seed)) is None
     assert torch.equal(agent.policy.fc.weight, before)
-    agent.learn(an_episode(seed=2))
+    assert agent.learn(an_episode(seed=2)) is not None
     assert not torch.equal(agent.policy.fc.weight, before)
 
 

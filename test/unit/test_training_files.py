@@ -19,7 +19,7 @@ from cartpole.training.progress import Bar, Lines, progress
 
 
 def record(index: int, length: int = 10) -> EpisodeRecord:
-    return EpisodeRecord(index, length, length / 2, Losses(1.0, 2.0), 1000.0)
+    return EpisodeRecord(index, length, length / 2, Losses(1.0, 2.0), 1000.0, 10)
 
 
 def names(folder: Path) -> set[str]:

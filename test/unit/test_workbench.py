@@ -83,8 +83,10 @@ def test_eval_says_whether_it_is_solved(runs: Path, capsys) -> None:
     assert "not solved: the line is 475" in capsys.readouterr().out
 
 
-def test_options_of_the_environment_reach_it(runs: Path, capsys) -> None:
-    work("eval", runs / "robot", "--episodes", 1, "--env-kwargs", "max_steps=3", "--json", "-")
+@pytest.mark.parametrize("given", [["max_steps=3"], ["max_steps=3,noise=0.01"],
+                                   ["max_steps=3", "noise=0.01"]])  # fmt: skip
+def test_options_of_the_environment_reach_it(runs: Path, given: list[str], capsys) -> None:
+    work("eval", runs / "robot", "--episodes", 1, "--json", "-", "--env-kwargs", *given)
     assert json.loads(capsys.readouterr().out)["lengths"] == [3]
 
 
@@ -129,6 +131,25 @@ def test_plot_draws_runs_of_every_kind(runs: Path, tmp_path: Path, over: str) ->
     assert work("plot", *chosen, "--over", over, "--out", out) == 0
     with Image.open(out) as picture:
         assert picture.format == "PNG" and picture.size == (1100, 550)
+
+
+def test_runs_in_a_picture_can_be_told_apart(tmp_path: Path) -> None:
+    from cartpole.workbench.pictures import training_curves
+    from cartpole.workbench.runs import open_run
+
+    kinds = [{}, {"seed": 1}, {"env_id": "cartpole/Classic-v0"}, {"env_id": "cartpole/Classic-v0"}]
+    folders = [
+        workbench_runs.record(tmp_path / f"run_{index}", [1.0, 2.0], **kind)
+        for index, kind in enumerate(kinds)
+    ]
+    runs = [open_run(folder) for folder in folders]
+    for chosen in (runs[:2], runs[:3], runs):
+        axes = training_curves(chosen, "episodes").axes[0]
+        names = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert len(set(names)) == len(chosen) + 1, "and the line from which it is solved"
+        (line,) = [each for each in axes.lines if each.get_linestyle() == "--"]
+        bold = [each.get_color() for each in axes.lines if each.get_linewidth() == 2.0]
+        assert len(set(bold)) == len(chosen) and line.get_color() not in bold
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -181,7 +202,7 @@ def test_compare_by_training_needs_no_checkpoint(tmp_path: Path, capsys) -> None
 
 def test_no_run_folder(tmp_path: Path, capsys) -> None:
     assert "there is no such folder" in refused(capsys, "eval", tmp_path / "nowhere")
-    assert "neither config.json nor summary.json" in refused(capsys, "eval", tmp_path)
+    assert "it has no config.json" in refused(capsys, "eval", tmp_path)
     assert "no run folder at" in refused(capsys, "plot", tmp_path, "--out", tmp_path / "a.png")
 
 
@@ -189,6 +210,17 @@ def test_no_run_folder(tmp_path: Path, capsys) -> None:
 def test_a_foreign_record(tmp_path: Path, text: str, capsys) -> None:
     (tmp_path / "config.json").write_text(text)
     refused(capsys, "eval", tmp_path)
+
+
+def test_a_damaged_run_costs_no_other(tmp_path: Path, capsys) -> None:
+    workbench_runs.record(tmp_path / "good", [1.0, 2.0])
+    (tmp_path / "damaged").mkdir()
+    (tmp_path / "damaged" / "config.json").write_text("{")
+    assert work("compare", tmp_path, "--episodes", 0) == 0
+    assert work("plot", str(tmp_path / "*"), "--out", tmp_path / "a.png") == 0
+    out, err = capsys.readouterr()
+    assert "| good |" in out and err.count("config.json isn't JSON") == 2
+    assert "isn't JSON" in refused(capsys, "compare", tmp_path / "damaged")
 
 
 def test_a_damaged_checkpoint_gives_way_to_an_earlier_one(own: Path, capsys) -> None:
@@ -199,15 +231,6 @@ def test_a_damaged_checkpoint_gives_way_to_an_earlier_one(own: Path, capsys) -> 
     assert json.loads(out)["checkpoint"].endswith("last.pt")
 
 
-def test_a_damaged_policy_network_gives_way_too(runs: Path, tmp_path: Path, capsys) -> None:
-    run = Path(shutil.copytree(runs / "pg", tmp_path / "pg"))
-    (run / "policy_network.pth").write_bytes(b"")
-    assert work("eval", run, "--episodes", 1, "--json", "-") == 0
-    out, err = capsys.readouterr()
-    assert "policy_network.pth is damaged" in err
-    assert json.loads(out)["checkpoint"].endswith("policy_network_episode_2.pth")
-
-
 def test_without_any_good_checkpoint(own: Path, capsys) -> None:
     for path in own.rglob("*.pt"):
         path.write_bytes(b"")
@@ -215,6 +238,11 @@ def test_without_any_good_checkpoint(own: Path, capsys) -> None:
     for path in own.rglob("*.pt"):
         path.unlink()
     assert "no checkpoint yet" in refused(capsys, "eval", own)
+
+
+def test_options_of_the_environment_that_cannot_be_read(runs: Path, capsys) -> None:
+    line = refused(capsys, "eval", runs / "robot", "--env-kwargs", "max_steps")
+    assert "KEY=VALUE" in line
 
 
 def test_no_episodes_yet(tmp_path: Path, capsys) -> None:

@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import gymnasium
+import numpy as np
 import pytest
 import torch
 import yaml
+from gymnasium.envs.classic_control import CartPoleEnv
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from unit import workbench_runs
 
@@ -105,6 +107,28 @@ def test_the_policy_is_the_one_that_was_trained(ppo: Path) -> None:
         assert player.act(observation) == model.predict(observation, deterministic=True)[0]
 
 
+@pytest.mark.parametrize(
+    ("algorithm", "options", "meaning"),
+    [("ppo", {"n_envs": 2}, "P(right) - P(left)"),
+     ("dqn-sb3", OFF_POLICY | {"env_id": "CartPole-v1"}, "Q(right) - Q(left)")],
+)  # fmt: skip
+def test_a_choice_is_drawn_by_how_much_it_is_preferred(
+    tmp_path: Path, algorithm: str, options: dict, meaning: str
+) -> None:
+    from cartpole.workbench.players import load_player
+    from cartpole.workbench.runs import open_run
+
+    run = workbench_runs.sb3(tmp_path / "run", algorithm, **options)
+    player = load_player(open_run(run))
+    observations = np.random.default_rng(0).normal(size=(50, 4)).astype(np.float32)
+    preferred = player.preference(observations)
+    assert preferred.shape == (50,) and len(np.unique(preferred)) > 10
+    assert player.meaning == meaning
+    chosen = [player.act(each) for each in observations]
+    assert [int(value > 0) for value in preferred] == chosen
+    player.env.close()
+
+
 def test_the_same_seed_learns_the_same(tmp_path: Path) -> None:
     first, second = (workbench_runs.sb3(tmp_path / name) for name in ("first", "second"))
     returns = [json.loads((run / "summary.json").read_text())["returns"] for run in (first, second)]
@@ -131,7 +155,13 @@ def test_dqn_doesnt_fit_the_swing_up(tmp_path: Path, capsys) -> None:
     [
         (["--params", "learning_rat=1"], "did you mean learning_rate?"),
         (["--params", "gamma"], "isn't KEY=VALUE"),
-        (["--params", "batch_size=hello"], "ppo can't be made"),
+        (["--params", "batch_size=hello"], "batch_size is a whole number from 1 on, not 'hello'"),
+        (["--learning-rate", "hello"], "ppo can't be made"),
+        (["--gamma", "5"], "gamma is a number from 0 to 1, not 5"),
+        (["--n-epochs", "0"], "n_epochs is a whole number from 1 on, not 0"),
+        (["--net-arch", "64,wide"], "net_arch is whole numbers, as in 64,64"),
+        (["--params", "gamma=["], "isn't a value"),
+        (["--device", "nonsense"], "ppo can't be made"),
         (["--env-id", "CartPol-v1"], "did you mean CartPole-v1?"),
     ],
 )
@@ -154,35 +184,13 @@ def test_the_weights_of_another_run_are_refused(ppo: Path, tmp_path: Path, capsy
     assert "isn't a checkpoint of" in capsys.readouterr().err
 
 
-def test_ctrl_c_saves_what_was_learned(tmp_path: Path, monkeypatch) -> None:
-    from cartpole.workbench import sb3_training
-    from cartpole.workbench.sb3_callback import Follower
-
-    interrupts = []
-    real = sb3_training.SB3Training.__init__
-
-    def keep(self, choice, folder, interrupt):
-        interrupts.append(interrupt)
-        real(self, choice, folder, interrupt)
-
-    def press(self, total, length):
-        interrupts[0].signal = signal.SIGINT
-
-    monkeypatch.setattr(sb3_training.SB3Training, "__init__", keep)
-    monkeypatch.setattr(Follower, "_episode_done", press)
-    run = workbench_runs.sb3(tmp_path / "run")
-    assert json.loads((run / "summary.json").read_text())["interrupted"]
-    assert (run / "last.pt").exists()
-
-
 def test_every_section_of_the_configuration_can_be_read(root: Path) -> None:
     for name in yaml.safe_load((root / "config/sb3.yaml").read_text()):
         algorithm, _, env_id = name.partition(" ")
-        arguments = cli.parse(["train", "--algo", algorithm, "--env-id", env_id])
         from cartpole.workbench.sb3_model import make_model
         from cartpole.workbench.sb3_settings import choose
 
-        choice = choose(arguments)
+        choice = choose(algorithm, ["--env-id", env_id])
         assert choice.run.total_timesteps >= 10_000 and choice.hyperparameters
         if not env_id.startswith("LunarLander"):
             make_model(choice).get_env().close()
@@ -190,8 +198,41 @@ def test_every_section_of_the_configuration_can_be_read(root: Path) -> None:
 
 def test_a_section_that_names_an_unknown_option(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("ppo CartPole-v1: {gama: 0.9}")
-    flags = ["train", "--algo", "ppo", "--env-id", "CartPole-v1", "--config", str(tmp_path / "a.yaml")]
+    flags = ["--env-id", "CartPole-v1", "--config", str(tmp_path / "a.yaml")]
     from cartpole.workbench.sb3_settings import choose
 
     with pytest.raises(CartpoleError, match="did you mean gamma"):
-        choose(cli.parse(flags))
+        choose("ppo", flags)
+
+
+class OneRobot(CartPoleEnv):
+    """Stands for an environment over ROS: a second one would move the same robot."""
+
+    shares_robot = True
+
+
+@pytest.fixture
+def one_robot() -> Iterator[str]:
+    gymnasium.register("test/OneRobot-v0", OneRobot, max_episode_steps=50)
+    yield "test/OneRobot-v0"
+    del gymnasium.registry["test/OneRobot-v0"]
+
+
+def test_where_there_is_one_robot_nothing_is_evaluated_while_it_learns(
+    tmp_path: Path, one_robot: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = workbench_runs.sb3(tmp_path / "run", env_id=one_robot)
+    assert "no evaluations during the training" in capsys.readouterr().out
+    assert json.loads((run / "summary.json").read_text())["evaluations"] == []
+    assert work("eval", run, "--episodes", 1) == 0
+    with pytest.raises(CartpoleError, match="n_envs is 1, not 2"):
+        workbench_runs.sb3(tmp_path / "two", env_id=one_robot, n_envs=2)
+
+
+def test_the_best_policy_is_confirmed_over_more_episodes(tmp_path: Path) -> None:
+    run = workbench_runs.sb3(tmp_path / "run", confirm_episodes=3)
+    rows = (run / "scalars.csv").read_text().splitlines()
+    confirmed = [row.split(",") for row in rows if ",eval/confirmed_reward," in row]
+    best = json.loads((run / "summary.json").read_text())["best"]
+    assert confirmed and [int(confirmed[-1][0]), float(confirmed[-1][2])] == best
+    assert (best[1] * 3) == pytest.approx(round(best[1] * 3))  # a mean of three, not of two

@@ -1,17 +1,14 @@
 """Small trainings of every kind, for the tests of the workbench."""
 
-import argparse
 import json
 from pathlib import Path
 
+from unit import pg_runs
 from unit.dqn_runs import SMALL
-from unit.learning_fakes import FakePlant
 
 from cartpole.training.dqn_run import DQNTraining
 from cartpole.training.dqn_settings import choose
 from cartpole.training.interrupt import Interrupt
-from cartpole.training.pg_run import Training
-from cartpole.training.pg_settings import Settings
 
 PPO = {"n_steps": 64, "batch_size": 64, "total_timesteps": 256, "eval_frequency": 128,
        "eval_episodes": 2}  # fmt: skip
@@ -25,10 +22,7 @@ def dqn(folder: Path, **changed: object) -> Path:
 
 
 def policy_gradient(folder: Path, **choices: object) -> Path:
-    folder.mkdir(parents=True)
-    settings = Settings(**{"episodes": 4, "save_every": 2, "backend": "bullet", **choices})
-    Training(settings, folder, FakePlant(), Interrupt()).run()
-    return folder
+    return pg_runs.train(folder, **{"episodes": 4, "save_every": 2, **choices})
 
 
 def sb3(folder: Path, algorithm: str = "ppo", **changed: object) -> Path:
@@ -37,8 +31,7 @@ def sb3(folder: Path, algorithm: str = "ppo", **changed: object) -> Path:
 
     options = {"env_id": "CartPole-v1", **PPO, "run_dir": folder, **changed}
     pairs = [f"{name}={value}" for name, value in options.items() if value is not None]
-    arguments = argparse.Namespace(algo=algorithm, config=None, params=pairs)
-    return train(choose_sb3(arguments), Interrupt())
+    return train(choose_sb3(algorithm, ["--params", *pairs]), Interrupt())
 
 
 def record(folder: Path, returns: list[float], **run: object) -> Path:

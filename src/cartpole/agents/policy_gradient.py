@@ -7,12 +7,13 @@ of -log pi(a|s) A; the value's loss is the mean squared error to the returns.
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import nn
 
+from cartpole.agents.two_networks import TwoNetworks
 from cartpole.errors import CartpoleError
 
 GAMMA = 0.99
@@ -48,7 +49,7 @@ class ValueNetwork(nn.Module):
 class Episode:
     """What happened, step by step: observation before the action, action, reward."""
 
-    observations: list[np.ndarray] = field(default_factory=list)  # each float32 (4,)
+    observations: list[np.ndarray] = field(default_factory=list)  # each float32 (D,)
     actions: list[int] = field(default_factory=list)
     rewards: list[float] = field(default_factory=list)
     final_observation: np.ndarray | None = None  # after the last step
@@ -67,6 +68,36 @@ class Episode:
     def total_reward(self) -> float:
         """The undiscounted sum, added in order as the document's script does."""
         return float(sum(self.rewards))
+
+    def states(self) -> list[np.ndarray]:
+        """All observations, the final one included: T + 1.
+
+        Raises:
+            ValueError: if the episode isn't over.
+        """
+        if self.final_observation is None:
+            raise ValueError("the episode isn't over")
+        return [*self.observations, self.final_observation]
+
+    def state_dict(self) -> dict[str, Any]:
+        """Tensors and plain values, for a checkpoint.
+
+        Raises:
+            ValueError: if the episode isn't over.
+        """
+        return {
+            "observations": torch.from_numpy(np.stack(self.states())),
+            "actions": torch.tensor(self.actions),
+            "rewards": torch.tensor(self.rewards, dtype=torch.float64),
+            "terminated": self.terminated,
+        }
+
+    @classmethod
+    def from_state(cls, state: dict[str, Any]) -> "Episode":
+        """The episode that `state_dict` told of."""
+        *observations, final = state["observations"].numpy()
+        actions, rewards = state["actions"].tolist(), state["rewards"].tolist()
+        return cls(list(observations), actions, rewards, final, state["terminated"])
 
 
 class Losses(NamedTuple):
@@ -90,7 +121,7 @@ def discounted_returns(rewards: list[float], gamma: float = GAMMA) -> np.ndarray
     return returns
 
 
-class PolicyGradientAgent:
+class PolicyGradientAgent(TwoNetworks):
     """Learns from whole episodes; acts from a NumPy copy of the linear policy.
 
     Both output layers start at zero: a uniform policy, and a value of 0 everywhere. From random
@@ -107,20 +138,18 @@ class PolicyGradientAgent:
     def __init__(self, seed: int = 0, random_weights: bool = False) -> None:
         with torch.random.fork_rng():
             torch.manual_seed(seed)
-            self.policy = PolicyNetwork()
-            self.value = ValueNetwork()
+            policy, value = PolicyNetwork(), ValueNetwork()
         if not random_weights:
-            start_at_zero(self.policy.fc)
-            start_at_zero(self.value.fc2)
-        self.policy_optimizer = torch.optim.Adam(self.policy.parameters(), POLICY_LEARNING_RATE)
-        self.value_optimizer = torch.optim.Adam(self.value.parameters(), VALUE_LEARNING_RATE)
-        self._rng = np.random.default_rng(seed)
+            start_at_zero(policy.fc)
+            start_at_zero(value.fc2)
+        super().__init__(policy, value, (POLICY_LEARNING_RATE, VALUE_LEARNING_RATE), seed)
+        self._output = policy.fc
         self.sync()
 
     def sync(self) -> None:
         """Copies the policy's weights to where acting reads them."""
-        self._weight = self.policy.fc.weight.detach().numpy().copy()  # (2, 4)
-        self._bias = self.policy.fc.bias.detach().numpy().copy()  # (2,)
+        self._weight = self._output.weight.detach().numpy().copy()  # (2, 4)
+        self._bias = self._output.bias.detach().numpy().copy()  # (2,)
 
     def probability_of_zero(self, observation: np.ndarray) -> float:
         """The policy's probability of action 0 for an observation of shape (4,).
@@ -130,9 +159,14 @@ class PolicyGradientAgent:
         left, right = (self._weight @ observation + self._bias).tolist()
         return 1.0 / (1.0 + math.exp(min(right - left, 700.0)))
 
+    def probabilities(self, observation: np.ndarray) -> np.ndarray:
+        """Of both actions, (2,)."""
+        left = self.probability_of_zero(observation)
+        return np.array([left, 1.0 - left])
+
     def act(self, observation: np.ndarray) -> int:
         """Draws an action from the policy."""
-        return 0 if self._rng.random() < self.probability_of_zero(observation) else 1
+        return 0 if self.generator.random() < self.probability_of_zero(observation) else 1
 
     def act_greedily(self, observation: np.ndarray) -> int:
         """The more probable action."""

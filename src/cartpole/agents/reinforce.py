@@ -7,46 +7,29 @@ nudged towards it once; and observations come scaled, so that one learning rate 
 truncated episode bootstraps from the baseline, a terminated one doesn't.
 """
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
 from torch import nn
 
-from cartpole.agents.policy_gradient import (
-    Episode,
-    Losses,
-    PolicyNetwork,
-    check_finite,
-    descend,
-    start_at_zero,
-)
+from cartpole.agents.dqn.normalisation import Normaliser
+from cartpole.agents.policy_gradient import Episode, Losses, check_finite, descend, start_at_zero
+from cartpole.agents.reinforce_settings import ReinforceSettings
+from cartpole.agents.softmax_policy import Actor, PairActor, SoftmaxActor, SoftmaxNetwork
+from cartpole.agents.two_networks import TwoNetworks
 
 SMALLEST_SPREAD = 1e-8  # of advantages, below which they are not blown up
 
 
-@dataclass(frozen=True)
-class ReinforceSettings:
-    """The algorithm's constants."""
-
-    gamma: float = 0.99
-    gae_lambda: float = 0.95
-    policy_learning_rate: float = 0.03
-    value_learning_rate: float = 0.01
-    value_epochs: int = 20  # steps of the baseline for each batch
-    batch_episodes: int = 1  # episodes for each step of the policy
-    hidden: int = 32  # units in each of the baseline's two layers
-
-
 class BaselineNetwork(nn.Module):
-    """Scaled observation (N, 4) to the estimated return (N, 1)."""
+    """Prepared observation (N, D) to the estimated return (N, 1)."""
 
-    def __init__(self, hidden: int) -> None:
+    def __init__(self, observations: int, hidden: int) -> None:
         super().__init__()
         self.layers = nn.Sequential(
-            nn.Linear(4, hidden), nn.Tanh(),
+            nn.Linear(observations, hidden), nn.Tanh(),
             nn.Linear(hidden, hidden), nn.Tanh(),
             nn.Linear(hidden, 1),
         )  # fmt: skip
@@ -55,14 +38,15 @@ class BaselineNetwork(nn.Module):
         return self.layers(observations)
 
 
-class ReinforceAgent:
-    """Learns from batches of whole episodes; the policy is linear in the scaled observation.
+class ReinforceAgent(TwoNetworks):
+    """Learns from batches of whole episodes; a softmax policy over single actions.
 
     Args:
         seed: makes initial weights and the choice of actions repeatable, through generators of
             its own.
-        scale: what an observation is divided by, of shape (4,).
-        settings: the algorithm's constants.
+        scale: what an observation is divided by, of shape (D,).
+        settings: the algorithm's options.
+        actions: number of actions A.
     """
 
     def __init__(
@@ -70,66 +54,80 @@ class ReinforceAgent:
         seed: int = 0,
         scale: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
         settings: ReinforceSettings | None = None,
+        actions: int = 2,
     ) -> None:
-        self.settings = settings or ReinforceSettings()
+        self.settings = settings = settings or ReinforceSettings()
         with torch.random.fork_rng():
             torch.manual_seed(seed)
-            self.policy = PolicyNetwork()
-            self.value = BaselineNetwork(self.settings.hidden)
-        start_at_zero(self.policy.fc)
-        rates = (self.settings.policy_learning_rate, self.settings.value_learning_rate)
-        self.policy_optimizer = torch.optim.Adam(self.policy.parameters(), rates[0])
-        self.value_optimizer = torch.optim.Adam(self.value.parameters(), rates[1])
-        self._rng = np.random.default_rng(seed)
-        self._factors = 1.0 / np.asarray(scale, np.float32)  # (4,)
+            self._network = SoftmaxNetwork(len(scale), actions, settings.policy_hidden)
+            value = BaselineNetwork(len(scale), settings.value_hidden)
+        start_at_zero(self._network.fc)
+        rates = (settings.policy_learning_rate, settings.value_learning_rate)
+        super().__init__(self._network, value, rates, seed)
+        self._factors = 1.0 / np.asarray(scale, np.float32)  # (D,)
+        self._normaliser = Normaliser(len(scale)) if settings.normalize_observations else None
+        self._is_pair = actions == 2 and not settings.policy_hidden and self._normaliser is None
         self._batch: list[Episode] = []
-        self._losses = Losses(0.0, 0.0)
+        self._actor: Actor
         self.sync()
 
     def sync(self) -> None:
         """Copies the policy's weights to where acting reads them."""
-        weight = self.policy.fc.weight.detach().numpy()  # (2, 4)
-        bias = self.policy.fc.bias.detach().numpy()  # (2,)
-        self._weight = (weight[1] - weight[0]) * self._factors
-        self._bias = float(bias[1] - bias[0])
+        if self._is_pair:
+            self._actor = PairActor(self._network, self._factors)
+        else:
+            self._actor = SoftmaxActor(self._network, self._prepared)
 
-    def probability_of_zero(self, observation: np.ndarray) -> float:
-        """The policy's probability of action 0 for an observation of shape (4,)."""
-        preference = float(self._weight @ observation) + self._bias
-        return 1.0 / (1.0 + math.exp(min(preference, 700.0)))
+    def _prepared(self, observations: np.ndarray) -> np.ndarray:
+        """Observations (..., D) as the networks see them, float32."""
+        scaled: np.ndarray = observations * self._factors
+        return scaled if self._normaliser is None else self._normaliser(scaled)
+
+    def probabilities(self, observation: np.ndarray) -> np.ndarray:
+        """The policy's probabilities of the actions, (A,), for an observation (D,)."""
+        return self._actor.probabilities(observation)
 
     def act(self, observation: np.ndarray) -> int:
         """Draws an action from the policy."""
-        return 0 if self._rng.random() < self.probability_of_zero(observation) else 1
+        return self._actor.draw(observation, self.generator.random())
 
     def act_greedily(self, observation: np.ndarray) -> int:
-        """The more probable action."""
-        return 0 if self.probability_of_zero(observation) >= 0.5 else 1
+        """The most probable action."""
+        return self._actor.greedy(observation)
 
-    def learn(self, episode: Episode) -> Losses:
+    def learn(self, episode: Episode) -> Losses | None:
         """Takes an episode; the last one of a batch updates both networks.
 
         Returns:
-            The losses of the last update, taken before it.
+            The losses of the update, taken before it; None if the batch isn't full yet.
 
         Raises:
-            CartpoleError: if a loss isn't finite; the networks are as before then.
+            CartpoleError: if a loss isn't finite; the agent is as before then.
         """
-        self._batch.append(episode)
-        if len(self._batch) >= self.settings.batch_episodes:
-            batch, self._batch = self._batch, []
-            self._losses = self._update(batch)
-            self.sync()
-        return self._losses
+        batch = [*self._batch, episode]
+        if len(batch) < self.settings.batch_episodes:
+            self._batch = batch
+            return None
+        losses = self._update(batch)
+        self._batch = []
+        self._measure(batch)
+        self.sync()
+        return losses
+
+    def _measure(self, batch: list[Episode]) -> None:
+        """Counts a batch's observations: after its update, so that this met the policy that acted."""
+        if self._normaliser is not None:
+            for episode in batch:
+                for observation in episode.observations:
+                    self._normaliser.add(observation * self._factors)
 
     def _update(self, batch: list[Episode]) -> Losses:
-        observations = torch.cat([self._scaled(episode.observations) for episode in batch])
+        observations = torch.cat([self._seen(episode.observations) for episode in batch])
         actions = torch.tensor([action for episode in batch for action in episode.actions])
         advantages, targets = self._judge(batch)
         spread = float(advantages.std(correction=0))
         advantages = (advantages - advantages.mean()) / (spread + SMALLEST_SPREAD)
-        chosen = torch.log(self.policy(observations).gather(1, actions.unsqueeze(1)).squeeze(1))
-        policy_loss = -(chosen * advantages).mean()
+        policy_loss = self._policy_loss(observations, actions, advantages)
         value_loss = self._value_loss(observations, targets)
         losses = Losses(policy_loss.item(), value_loss.item())
         check_finite(losses)
@@ -137,6 +135,17 @@ class ReinforceAgent:
         for _ in range(self.settings.value_epochs):
             descend(self.value_optimizer, self._value_loss(observations, targets))
         return losses
+
+    def _policy_loss(
+        self, observations: torch.Tensor, actions: torch.Tensor, advantages: torch.Tensor
+    ) -> torch.Tensor:
+        probabilities = self.policy(observations)
+        chosen = torch.log(probabilities.gather(1, actions.unsqueeze(1)).squeeze(1))
+        loss = -(chosen * advantages).mean()
+        if not self.settings.entropy_coefficient:
+            return loss
+        entropy = torch.special.entr(probabilities).sum(1).mean()
+        return loss - self.settings.entropy_coefficient * entropy
 
     def _judge(self, batch: list[Episode]) -> tuple[torch.Tensor, torch.Tensor]:
         """Advantages and the baseline's targets, each (T,) over all episodes' steps."""
@@ -155,20 +164,32 @@ class ReinforceAgent:
 
     def _values(self, episode: Episode) -> np.ndarray:
         """The baseline at each state, the final one included: (T + 1,); 0 where nothing follows."""
-        if episode.final_observation is None:
-            raise ValueError("the episode isn't over")
-        states = [*episode.observations, episode.final_observation]
         with torch.no_grad():
-            values = self.value(self._scaled(states)).squeeze(1).double().numpy()
+            values = self.value(self._seen(episode.states())).squeeze(1).double().numpy()
         if episode.terminated:
             values[-1] = 0.0
         return values
 
-    def _scaled(self, observations: Sequence[np.ndarray]) -> torch.Tensor:
-        return torch.from_numpy(np.stack(observations) * self._factors)
+    def _seen(self, observations: Sequence[np.ndarray]) -> torch.Tensor:
+        return torch.from_numpy(self._prepared(np.stack(observations)))
 
     def _value_loss(self, observations: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
         return nn.functional.mse_loss(self.value(observations).squeeze(1), targets)
+
+    def state_dict(self) -> dict[str, Any]:
+        """As every learner's, with the episodes that wait for their batch to fill."""
+        return {
+            **super().state_dict(),
+            "batch": [episode.state_dict() for episode in self._batch],
+            "normaliser": None if self._normaliser is None else self._normaliser.state_dict(),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Takes over what `state_dict` gave."""
+        self._batch = [Episode.from_state(each) for each in state["batch"]]
+        if self._normaliser is not None:
+            self._normaliser.load_state_dict(state["normaliser"])
+        super().load_state_dict(state)
 
 
 def generalised_advantages(

@@ -57,7 +57,7 @@ class BulletPlant:
         CartpoleError: if the robot's files aren't found.
     """
 
-    deterministic = True
+    deterministic, shared = True, False
 
     def __init__(
         self,

@@ -118,6 +118,11 @@ class CartPoleEnv(gymnasium.Env[np.ndarray, Any]):
         self._closed = False
 
     @property
+    def shares_robot(self) -> bool:
+        """Whether other environments of this process move the same robot, as over ROS."""
+        return self.plant.shared
+
+    @property
     def spec(self) -> EnvSpec | None:
         """How Gymnasium made this; says so where the robot never repeats itself."""
         return self._spec

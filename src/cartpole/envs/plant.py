@@ -14,6 +14,7 @@ class Plant(Protocol):
     """A cart-pole robot whose cart follows a position set-point."""
 
     deterministic: bool  # whether the same commands give the same states
+    shared: bool  # whether all plants of its kind in a process move the same robot
 
     def reset(self, state: CartPoleState) -> CartPoleState:
         """Puts both joints where the state says; returns the state reached.

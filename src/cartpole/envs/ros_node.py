@@ -79,6 +79,19 @@ def private_parameters(name: str) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
+def command_line_parameters(argv: list[str]) -> dict[str, Any]:
+    """The private parameters among a node's arguments, as in `_seed:=3`.
+
+    Raises:
+        CartpoleError: if a value isn't YAML.
+    """
+    try:
+        found: dict[str, Any] = rospy.client.load_command_line_node_params(argv)
+    except rospy.ROSInitException as error:
+        raise CartpoleError(" ".join(str(error).split())) from error
+    return found
+
+
 def refuse_twin(name: str) -> None:
     """Makes sure that no living node has this name: ROS would shut down the older one.
 

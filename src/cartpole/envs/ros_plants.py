@@ -72,7 +72,7 @@ class LockstepPlant:
         ticks: physics steps of one action.
     """
 
-    deterministic = True
+    deterministic = shared = True
 
     def __init__(self, ticks: int | None = None) -> None:
         from cartpole.srv import StepWorld, StepWorldRequest
@@ -130,7 +130,7 @@ class RealtimePlant:
             None takes the newest one without waiting for another one.
     """
 
-    deterministic = False
+    deterministic, shared = False, True
 
     def __init__(self, control_period: float | None = None) -> None:
         self._period = control_period

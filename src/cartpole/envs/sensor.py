@@ -24,9 +24,7 @@ class Sensor:
         ValueError: if the noise is negative or not finite, or the delay no number of steps.
     """
 
-    def __init__(
-        self, noise: float | Sequence[float] | np.ndarray = 0.0, delay: int = 0
-    ) -> None:
+    def __init__(self, noise: float | Sequence[float] | np.ndarray = 0.0, delay: int = 0) -> None:
         sizes = tuple(np.ravel(noise).tolist()) * (1 if np.ndim(noise) else 4)
         if len(sizes) != 4 or not all(math.isfinite(size) and size >= 0.0 for size in sizes):
             raise ValueError(f"sensor noise must be one or four numbers >= 0, not {noise}")

@@ -29,7 +29,10 @@ class WorkerProcess:
     def __init__(self, job: Job, memory: int) -> None:
         self._job = job
         ours, theirs = socket.socketpair()
-        for end in (ours, theirs):  # rospy sets a default timeout, which would make them non-blocking
+        for end in (
+            ours,
+            theirs,
+        ):  # rospy sets a default timeout, which would make them non-blocking
             end.setblocking(True)
         with theirs:
             self._process = subprocess.Popen(

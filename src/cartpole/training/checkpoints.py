@@ -1,15 +1,16 @@
 """Network weights on disk: plain state_dicts, each file whole or absent."""
 
+import io
 import os
 import tempfile
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import torch
 
-from cartpole.training.loop import Agent, EpisodeRecord
+from cartpole.agents.two_networks import TwoNetworks
+from cartpole.training.loop import EpisodeRecord
 
 
 def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
@@ -30,6 +31,19 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
         os.unlink(temporary)
         raise
     _sync_folder(path.parent)
+
+
+def save_tensors(path: Path, content: dict[str, Any]) -> None:
+    """Writes what `torch.load` reads, whole or not at all.
+
+    By way of the memory: torch turns the error of a full disk into one of its own.
+
+    Raises:
+        OSError: if the disk refuses; an older file of that name is untouched.
+    """
+    memory = io.BytesIO()
+    torch.save(content, memory)
+    write_atomically(path, lambda stream: stream.write(memory.getbuffer()))
 
 
 def _umask() -> int:
@@ -55,7 +69,7 @@ class NetworkSaver:
         every: episodes between two saves (the first is episode 0); 0 saves only at the end.
     """
 
-    def __init__(self, folder: Path, agent: Agent, every: int) -> None:
+    def __init__(self, folder: Path, agent: TwoNetworks, every: int) -> None:
         self._folder = folder
         self._agent = agent
         self._every = every
@@ -68,5 +82,4 @@ class NetworkSaver:
         """Writes policy_network{suffix}.pth and value_network{suffix}.pth."""
         networks = {"policy_network": self._agent.policy, "value_network": self._agent.value}
         for name, network in networks.items():
-            path = self._folder / f"{name}{suffix}.pth"
-            write_atomically(path, partial(torch.save, network.state_dict()))
+            save_tensors(self._folder / f"{name}{suffix}.pth", network.state_dict())

@@ -1,8 +1,6 @@
 """The command dqn_train.py: errors in one line, exit codes."""
 
-import contextlib
 import sys
-from pathlib import Path
 from typing import Any
 
 from cartpole.envs import ros_node
@@ -20,8 +18,9 @@ def main(argv: list[str] | None = None) -> int:
     interrupt = Interrupt().install()
     try:
         flags = ros_node.plain_arguments(argv)
-        choose(flags, {})  # wrong flags and --help need no master
-        return run(choose(flags, _parameters(argv)), interrupt)
+        own = ros_node.command_line_parameters(argv)
+        choose(flags, own)  # wrong flags and --help need no master
+        return run(choose(flags, _parameters(argv) | own), interrupt)
     except CartpoleError as error:
         print(f"{NODE}: {error}", file=sys.stderr, flush=True)
         return interrupt.exit_code or 1
@@ -48,9 +47,9 @@ def run(choice: Choice, interrupt: Interrupt) -> int:
     """
     from cartpole.training.dqn_run import DQNTraining  # slow to import; --help needs none of it
 
-    name = choice.run.env_id.replace("/", "-").replace(":", "-")
+    chosen = choice.run
     folder = choice.resume or run_folder.create(
-        choice.run.run_dir or None, name, choice.run.exp_name, choice.run.seed
+        chosen.run_dir or None, chosen.env_id, chosen.exp_name, chosen.seed
     )
     try:
         with run_folder.held(folder):
@@ -59,10 +58,5 @@ def run(choice: Choice, interrupt: Interrupt) -> int:
             training.run()
     finally:
         interrupt.defer()
-        _remove_if_empty(folder)
+        run_folder.remove_if_empty(folder)
     return interrupt.exit_code
-
-
-def _remove_if_empty(folder: Path) -> None:
-    with contextlib.suppress(OSError):
-        folder.rmdir()

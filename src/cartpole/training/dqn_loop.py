@@ -2,14 +2,14 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import torch
 
 from cartpole.agents.dqn.agent import DQNAgent, Learned
 from cartpole.training.episode_tape import EpisodeTape
+from cartpole.training.history import History
 
 
 @dataclass(frozen=True)
@@ -22,34 +22,6 @@ class Episode:
     total_reward: float
     epsilon: float
     steps_per_second: float  # since the training began or was resumed
-
-
-@dataclass
-class History:
-    """What the training has seen so far."""
-
-    returns: list[float] = field(default_factory=list)
-    lengths: list[int] = field(default_factory=list)
-    evaluations: list[tuple[int, float]] = field(default_factory=list)  # step, mean return
-    best: tuple[int, float] | None = None  # of the evaluations
-    seconds: float = 0.0  # of wall time until it was last resumed
-
-    def state_dict(self) -> dict[str, Any]:
-        """Plain numbers and tensors."""
-        return {
-            "returns": torch.tensor(self.returns, dtype=torch.float64),
-            "lengths": torch.tensor(self.lengths, dtype=torch.int64),
-            "evaluations": [list(each) for each in self.evaluations],
-            "best": None if self.best is None else list(self.best),
-            "seconds": self.seconds,
-        }
-
-    def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Takes over what `state_dict` gave."""
-        self.returns, self.lengths = state["returns"].tolist(), state["lengths"].tolist()
-        self.evaluations = [(step, mean) for step, mean in state["evaluations"]]
-        self.best = None if state["best"] is None else (state["best"][0], state["best"][1])
-        self.seconds = state["seconds"]
 
 
 class Observer(Protocol):

@@ -1,5 +1,6 @@
 """Agents for environments: new ones, and those that a training left in its folder."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,7 +11,7 @@ from cartpole.agents.dqn.settings import DQNSettings
 from cartpole.errors import CartpoleError
 from cartpole.training.dqn_settings import RunSettings, from_config
 from cartpole.training.environments import discrete_actions, make_environment
-from cartpole.training.run_checkpoints import BEST, LAST, read
+from cartpole.training.run_checkpoints import LAST, candidates, read
 
 
 class Policy(NamedTuple):
@@ -48,10 +49,28 @@ def load_policy(path: Path, **env_options: Any) -> Policy:
         CartpoleError: if it can't be read, or its environment can't be made.
     """
     if path.is_dir():
-        path = path / BEST if (path / BEST).exists() else path / LAST
-    content = read(path)
-    run, dqn = from_config(content.get("config"), str(path))
+        path = next(iter(candidates(path, best_first=True)), path / LAST)
+    return policy_of(read(path), str(path), env_options)
+
+
+def policy_of(content: dict[str, Any], origin: str, env_options: Mapping[str, Any]) -> Policy:
+    """The agent of a checkpoint that was read already.
+
+    Args:
+        content: what `run_checkpoints.read` gave.
+        origin: its file, for the errors.
+        env_options: further options of the environment, as `render_mode`.
+
+    Raises:
+        CartpoleError: if it isn't DQN's, or its environment can't be made or has changed.
+    """
+    run, dqn = from_config(content.get("config"), origin)
     env = make_environment(run.env_id, {**run.env_kwargs, **env_options})
-    agent = make_agent(run, dqn, env)
-    agent.load_policy_state(content)
-    return Policy(agent, env, run, content["steps"])
+    try:
+        agent = make_agent(run, dqn, env)
+        agent.load_policy_state(content)
+        return Policy(agent, env, run, content["steps"])
+    except (CartpoleError, RuntimeError, KeyError) as error:
+        env.close()
+        reason = str(error).splitlines()[0]
+        raise CartpoleError(f"{origin} doesn't fit {run.env_id}: {reason}") from error

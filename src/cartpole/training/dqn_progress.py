@@ -5,7 +5,8 @@ import time
 from typing import Any, TextIO
 
 from cartpole.agents.dqn.agent import Learned
-from cartpole.training.dqn_loop import Episode, History
+from cartpole.training.dqn_loop import Episode
+from cartpole.training.history import History
 from cartpole.training.progress import LINE_EVERY, terminal_bar
 
 REFRESH = 0.1  # [s]
@@ -26,16 +27,21 @@ class DQNProgress:
     ) -> None:
         self._stream = stream or sys.stderr
         self._returns = history.returns
-        self._shown, self._time = done, time.monotonic()
+        self._steps = self._shown = done
+        self._time = time.monotonic()
         self._bar: Any = None
         if self._stream.isatty():
             self._bar = terminal_bar(total, "step", self._stream, done)
 
     def step_done(self, steps: int) -> None:
         """Moves the bar, now and then."""
+        self._steps = steps
         if self._bar is not None and time.monotonic() - self._time > REFRESH:
-            self._bar.update(steps - self._shown)
-            self._shown, self._time = steps, time.monotonic()
+            self._move()
+
+    def _move(self) -> None:
+        self._bar.update(self._steps - self._shown)
+        self._shown, self._time = self._steps, time.monotonic()
 
     def learned(self, steps: int, learned: Learned) -> None:
         """Nothing to see."""
@@ -63,6 +69,7 @@ class DQNProgress:
             print(text, file=self._stream, flush=True)
 
     def close(self) -> None:
-        """Ends the bar."""
+        """Ends the bar, where the training has come to."""
         if self._bar is not None:
+            self._move()
             self._bar.close()

@@ -1,8 +1,6 @@
 """One DQN training: settings and a folder in; networks, figures and a summary out."""
 
-import json
 import shlex
-import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,20 +9,21 @@ import torch
 
 from cartpole.errors import CartpoleError
 from cartpole.training import run_folder
-from cartpole.training.dqn_loop import History, Loop, Observer
+from cartpole.training.dqn_judge import Judge
+from cartpole.training.dqn_loop import Loop, Observer
 from cartpole.training.dqn_policy import make_agent
 from cartpole.training.dqn_progress import DQNProgress
-from cartpole.training.dqn_settings import CONFIG_RECORD, Choice, config
+from cartpole.training.dqn_settings import Choice, check_same, config
 from cartpole.training.environments import make_environment
 from cartpole.training.episode_tape import EpisodeTape
-from cartpole.training.evaluation import run_greedily
+from cartpole.training.history import History
 from cartpole.training.interrupt import Interrupt
 from cartpole.training.plots import learning_curve
 from cartpole.training.random_states import random_states, restore_random_states, seed_all
-from cartpole.training.run_checkpoints import Checkpoints, read_newest
+from cartpole.training.run_checkpoints import Checkpoints, candidates, read_newest
+from cartpole.training.run_record import read_record, write_record
 from cartpole.training.scalar_log import Figures, ScalarLog
 
-EVALUATION_SEED = 1_000_000  # added to the training's: other episodes than those learned from
 LAST = 100  # [episodes] over which the summary reports a mean
 
 
@@ -51,17 +50,26 @@ class DQNTraining:
         self._run, self._dqn = choice.run, choice.dqn
         self._folder, self._interrupt = folder, interrupt
         self._checkpoints = Checkpoints(folder, self._run.keep_checkpoints)
-        self._resumed = read_newest(folder, say) if choice.resume else None
+        self._resumed = self._read_checkpoint() if choice.resume else None
         seed_all(self._run.seed)
         self._env = make_environment(self._run.env_id, self._run.env_kwargs)
-        self._agent = make_agent(self._run, self._dqn, self._env)
-        self._judge = self._env  # where nothing is evaluated, a second robot would be in the way
-        if self._run.eval_frequency:
-            self._judge = make_environment(self._run.env_id, self._run.env_kwargs)
+        try:
+            self._agent = make_agent(self._run, self._dqn, self._env)
+            self._judge = Judge(self._run, self._agent, self._env, interrupt.requested)
+        except CartpoleError:
+            self._env.close()
+            raise
         self._history = History()
         self._saved_at = -1  # [steps]
         self._log: ScalarLog
         self._loop: Loop
+        self._shown: DQNProgress
+
+    def _read_checkpoint(self) -> dict[str, Any]:
+        content = read_newest(self._folder, say)
+        check_same(self._run, self._dqn, content.get("config"), str(self._folder))
+        self._checkpoints.remove_leftovers()
+        return content
 
     def run(self) -> None:
         """Trains and writes everything; what was learned is saved also when it fails.
@@ -78,19 +86,19 @@ class DQNTraining:
             place = error.filename or self._folder
             failure = CartpoleError(f"can't write {place}: {error.strerror}")
         finally:
-            self._env.close()
             self._judge.close()
+            self._env.close()
         self._finish(failure)
 
     def _train(self) -> None:
         tape = EpisodeTape(self._env, self._run.seed)
         self._restore_counters()
         self._log = self._open_log()
-        shown = DQNProgress(self._dqn.total_timesteps, self._agent.steps, self._history)
-        observers: list[Observer] = [Figures(self._log), shown]
+        self._shown = DQNProgress(self._dqn.total_timesteps, self._agent.steps, self._history)
+        observers: list[Observer] = [Figures(self._log), self._shown]
         self._loop = Loop(tape, self._agent, self._history, observers, self._run.log_frequency)
         try:
-            self._restore_episode(shown)
+            self._restore_episode()
             while not (self._is_complete() or self._interrupt.requested()):
                 self._loop.step()
                 self._follow_up()
@@ -99,7 +107,7 @@ class DQNTraining:
             self._checkpoints.save_failure(self._content())
             raise
         finally:
-            shown.close()
+            self._shown.close()
             self._log.close()
 
     def _restore_counters(self) -> None:
@@ -110,27 +118,23 @@ class DQNTraining:
     def _open_log(self) -> ScalarLog:
         settings = {**asdict(self._run), **asdict(self._dqn)}
         length = self._resumed["log_bytes"] if self._resumed else 0
-        return ScalarLog(self._folder, settings, length)
+        return ScalarLog(self._folder, settings, length, say)
 
-    def _restore_episode(self, shown: DQNProgress) -> None:
-        self._record()
+    def _restore_episode(self) -> None:
+        write_record(self._folder, config(self._run, self._dqn), bool(self._resumed))
         if not self._resumed:
             say(f"training DQN in {self._run.env_id} with seed {self._run.seed}: {self._folder}")
+            self._save()  # so that there is something to go on from, whatever happens
             return
-        self._loop.load_state_dict(self._resumed["loop"], shown.say)
+        others = run_folder.other_versions(read_record(self._folder).get("versions", {}))
+        if others:
+            say(f"{others}: from here on it may come to other bits")
+        self._loop.load_state_dict(self._resumed["loop"], self._shown.say)
         restore_random_states(self._resumed["random"])
         say(f"going on at step {self._agent.steps} of {self._dqn.total_timesteps}: {self._folder}")
         self._resumed = None  # a replay buffer's worth of memory
         if self._agent.steps:
             self._evaluate()  # the interruption may have come before it
-
-    def _record(self) -> None:
-        """Writes config.json; of a resumed training, whose length may be new, the rest stays."""
-        path = self._folder / CONFIG_RECORD
-        record: dict[str, Any] = {"versions": run_folder.versions(), "began": time.time()}
-        if self._resumed:
-            record = json.loads(path.read_text(encoding="utf-8"))
-        run_folder.write_summary(path, {**record, **config(self._run, self._dqn)})
 
     def _is_complete(self) -> bool:
         run, history = self._run, self._history
@@ -156,34 +160,15 @@ class DQNTraining:
         evaluations = self._history.evaluations
         if not every or steps % every or (evaluations and evaluations[-1][0] == steps):
             return
-        mean = self._mean_return(self._run.eval_episodes, 0)
-        if mean is None:
+        verdict = self._judge.judge(self._loop, self._best_return(), self._shown.say)
+        if verdict is None:
             return
-        confirmed = self._confirmed(mean)
-        if confirmed is None:
-            return
-        self._log.add(steps, {"eval/mean_reward": mean})
-        evaluations.append((steps, mean))
-        if confirmed > self._best_return():
-            self._log.add(steps, {"eval/confirmed_reward": confirmed})
-            self._history.best = (steps, confirmed)
+        self._log.add(steps, {"eval/mean_reward": verdict.mean})
+        evaluations.append((steps, verdict.mean))
+        if verdict.confirmed > self._best_return():
+            self._log.add(steps, {"eval/confirmed_reward": verdict.confirmed})
+            self._history.best = (steps, verdict.confirmed)
             self._save(best=True)
-
-    def _confirmed(self, mean: float) -> float | None:
-        """The mean over many more episodes, for a policy that seems to be the best so far.
-
-        A policy that is perfect in ten episodes may well fall in the next ninety.
-        """
-        if mean <= self._best_return():
-            return mean
-        return self._mean_return(self._run.confirm_episodes, 1)
-
-    def _mean_return(self, episodes: int, stream: int) -> float | None:
-        """Of greedy episodes in an environment of their own; None if interrupted."""
-        seed = self._run.seed + EVALUATION_SEED * (1 + stream)
-        act, stop = self._agent.act_greedily, self._interrupt.requested
-        result = run_greedily(self._judge, act, seed, episodes, stop)
-        return None if result is None else result.mean_return
 
     def _save(self, best: bool = False) -> None:
         """Writes a checkpoint, unless this step has one already."""
@@ -213,10 +198,14 @@ class DQNTraining:
             failure = failure or CartpoleError(f"can't write to {self._folder}: {error.strerror}")
         self._tell()
         if failure and not self._interrupt.requested():
-            raise CartpoleError(
-                f"{failure}; stopped after {self._agent.steps} of {self._dqn.total_timesteps} "
-                f"steps; --resume {shlex.quote(str(self._folder))} goes on from the last checkpoint"
+            text = (
+                f"{failure}; stopped after {self._agent.steps} of {self._dqn.total_timesteps} steps"
             )
+            if candidates(self._folder):
+                text += (
+                    f"; --resume {shlex.quote(str(self._folder))} goes on from the last checkpoint"
+                )
+            raise CartpoleError(text)
 
     def _draw(self) -> None:
         if self._history.returns:

@@ -1,8 +1,6 @@
 """What one DQN training can be told: flags, rosparams, a YAML section and KEY=VALUE."""
 
 import argparse
-import json
-import shlex
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,12 +8,13 @@ from typing import Any, NamedTuple
 from cartpole.agents.dqn.settings import DQNSettings
 from cartpole.errors import CartpoleError
 from cartpole.option import check_options, option
+from cartpole.training.command_options import CommandOptions, flag
 from cartpole.training.config_file import default_file, read_section
-from cartpole.training.options import Options, key_values, unknown
+from cartpole.training.options import Options
+from cartpole.training.run_record import CONFIG_RECORD, is_plain, read_record
 
 COMMAND = "dqn_train.py"
 CONFIG = "dqn.yaml"
-CONFIG_RECORD = "config.json"  # in the run folder
 DESCRIPTION = """\
 Trains an agent by DQN in any Gymnasium environment with single actions.
 
@@ -53,7 +52,7 @@ class RunSettings:
         None, "ends the training when a confirmed mean return reaches it", -1e18, 1e18
     )
     checkpoint_frequency: int = option(
-        5_000, "steps between two checkpoints; 0: at the end only", 0, 2**53
+        5_000, "steps between two checkpoints; 0: at start and end only", 0, 2**53
     )
     keep_checkpoints: int = option(3, "the newest ones are kept; 0: all", 0, 10**6)
     log_frequency: int = option(500, "steps between two points of losses/", 1, 2**53)
@@ -62,6 +61,11 @@ class RunSettings:
         check_options(self)
         if not self.env_id:
             raise CartpoleError("env_id names an environment")
+        if not is_plain(self.env_kwargs):
+            raise CartpoleError(
+                f"env_kwargs has values that no file can hold: {self.env_kwargs}; texts, finite "
+                "numbers, true, false, lists and mappings of these will do"
+            )
 
 
 class Choice(NamedTuple):
@@ -74,24 +78,20 @@ class Choice(NamedTuple):
 
 OPTIONS = Options(RunSettings, DQNSettings)
 EXTENDING = ("total_timesteps", "episodes", "device")  # may be changed when resuming
-SPECIAL = ("config", "preset", "params", "resume")
 
 
-def parser() -> argparse.ArgumentParser:
+def command_options() -> CommandOptions:
     """All flags; none has a default of its own."""
     result = argparse.ArgumentParser(
         COMMAND,
+        usage=f"{COMMAND} [--help] [--OPTION VALUE ...]",
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
         argument_default=argparse.SUPPRESS,
     )
-    result.add_argument("--config", metavar="FILE", help="options in YAML (config/dqn.yaml)")
     result.add_argument("--preset", metavar="NAME", help="a section of that file, as in: tutorial")
-    result.add_argument("--params", nargs="+", metavar="KEY=VALUE", help="options by name")
-    result.add_argument("--resume", metavar="RUN_DIR", help="go on with an interrupted training")
-    OPTIONS.add_flags(result)
-    return result
+    return CommandOptions(result, OPTIONS, CONFIG, ("preset",))
 
 
 def choose(flags: list[str], parameters: dict[str, Any]) -> Choice:
@@ -101,8 +101,7 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> Choice:
         SystemExit: with code 2 and a usage line, if a flag is wrong; with 0 after --help.
         CartpoleError: if a name is unknown or a value wrong anywhere else.
     """
-    given = _given(flags, parameters)
-    special = {name: given.pop(name) for name in SPECIAL if name in given}
+    given, special = command_options().given(flags, parameters)
     if special.get("resume"):
         return _resumed(Path(special["resume"]), given, special)
     origin = f"--config {special['config']}" if "config" in special else f"config/{CONFIG}"
@@ -114,34 +113,17 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> Choice:
     return Choice(OPTIONS.make(RunSettings, merged), OPTIONS.make(DQNSettings, merged), None)
 
 
-def _given(flags: list[str], parameters: dict[str, Any]) -> dict[str, Any]:
-    """What somebody gave: --params, overridden by rosparams, overridden by flags."""
-    from_flags = vars(parser().parse_args(flags))
-    for name in parameters:
-        if name not in (*SPECIAL, *OPTIONS.names):
-            raise CartpoleError(unknown("parameter ~", name, [*SPECIAL, *OPTIONS.names]))
-    special = {name: str(parameters[name]) for name in SPECIAL if parameters.get(name)}
-    own = {name: value for name, value in parameters.items() if name not in SPECIAL}
-    pairs = [*shlex.split(special.pop("params", "")), *from_flags.pop("params", [])]
-    listed = OPTIONS.read(key_values(pairs, "--params"), "--params")
-    return listed | OPTIONS.read(own, "rosparam") | special | from_flags
-
-
 def _resumed(folder: Path, given: dict[str, Any], special: dict[str, Any]) -> Choice:
     others = [name for name in given if name not in EXTENDING]
     others += [name for name in special if name != "resume"]
     if others:
         raise CartpoleError(
-            f"a resumed training keeps its settings: --resume allows no {_flag(others[0])}, "
-            f"only {', '.join(_flag(name) for name in EXTENDING)}"
+            f"a resumed training keeps its settings: --resume allows no {flag(others[0])}, "
+            f"only {', '.join(flag(name) for name in EXTENDING)}"
         )
     run, dqn = read_config(folder)
     merged = asdict(run) | asdict(dqn) | given
     return Choice(OPTIONS.make(RunSettings, merged), OPTIONS.make(DQNSettings, merged), folder)
-
-
-def _flag(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
 
 
 def config(run: RunSettings, dqn: DQNSettings) -> dict[str, Any]:
@@ -155,10 +137,29 @@ def from_config(content: Any, origin: str) -> tuple[RunSettings, DQNSettings]:
     Raises:
         CartpoleError: if it is something else.
     """
-    if not isinstance(content, dict) or content.get("algorithm") != "dqn":
+    record = content if isinstance(content, dict) else {}
+    run, dqn = record.get("run"), record.get("dqn")
+    if record.get("algorithm") != "dqn" or not (isinstance(run, dict) and isinstance(dqn, dict)):
         raise CartpoleError(f"{origin} isn't the configuration of a DQN training")
-    values = OPTIONS.read({**content["run"], **content["dqn"]}, origin)
+    values = OPTIONS.read({**run, **dqn}, origin)
     return OPTIONS.make(RunSettings, values), OPTIONS.make(DQNSettings, values)
+
+
+def check_same(run: RunSettings, dqn: DQNSettings, content: Any, origin: str) -> None:
+    """Holds the settings to resume with against those in a checkpoint.
+
+    Raises:
+        CartpoleError: if one differs that a resumed training can't change, or these are no settings.
+    """
+    before, after = (
+        asdict(pair[0]) | asdict(pair[1]) for pair in (from_config(content, origin), (run, dqn))
+    )
+    for name, value in before.items():
+        if name not in EXTENDING and after[name] != value:
+            raise CartpoleError(
+                f"{origin}: {CONFIG_RECORD} says {name} {after[name]}, the checkpoint {value}; a "
+                "resumed training keeps its settings"
+            )
 
 
 def read_config(folder: Path) -> tuple[RunSettings, DQNSettings]:
@@ -167,11 +168,4 @@ def read_config(folder: Path) -> tuple[RunSettings, DQNSettings]:
     Raises:
         CartpoleError: if there is none.
     """
-    path = folder / CONFIG_RECORD
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise CartpoleError(f"{folder} is no run folder: {path}: {error.strerror}") from error
-    except ValueError as error:
-        raise CartpoleError(f"{path} isn't JSON: {error}") from error
-    return from_config(content, str(path))
+    return from_config(read_record(folder), str(folder / CONFIG_RECORD))

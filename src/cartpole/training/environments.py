@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
+import numpy as np
 from gymnasium import spaces
 
 from cartpole.errors import CartpoleError
@@ -12,12 +13,17 @@ from cartpole.training.options import unknown
 FLAT = (spaces.Box, spaces.Discrete, spaces.MultiBinary, spaces.MultiDiscrete)
 CONTINUOUS = "PPO, A2C, SAC, TD3 or DDPG"
 SEVERAL = "PPO or A2C"
+LARGEST = float(np.finfo(np.float32).max)  # networks and replay know no larger number
+# What constructors raise about options that they don't like.
+_REFUSED = (gymnasium.error.Error, ImportError, TypeError, ValueError, LookupError, AssertionError)
 
 
 def make_environment(
     env_id: str, options: Mapping[str, Any] | None = None
 ) -> gymnasium.Env[Any, Any]:
     """Makes an environment; its observations are vectors, flattened where they weren't.
+
+    It refuses to go on with an observation or a reward that isn't finite.
 
     Raises:
         CartpoleError: if there is no such environment, naming the nearest, if something that it
@@ -30,9 +36,60 @@ def make_environment(
     except (gymnasium.error.UnregisteredEnv, gymnasium.error.DeprecatedEnv) as error:
         known = sorted(gymnasium.registry)
         raise CartpoleError(_nearest(env_id, known)) from error
-    except (gymnasium.error.Error, ImportError, TypeError, ValueError) as error:
-        raise CartpoleError(f"can't make {env_id}: {error}") from error
-    return _flat(env, env_id)
+    except _REFUSED as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise CartpoleError(f"can't make {env_id}: {reason}") from error
+    return FiniteNumbers(_flat(env, env_id), env_id)
+
+
+class FiniteNumbers(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Ends with an error what would spoil replay, statistics and weights, before it gets there.
+
+    Args:
+        env: its observations are vectors.
+        env_id: for the error.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], env_id: str) -> None:
+        super().__init__(env)
+        self._id = env_id
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """As the environment's.
+
+        Raises:
+            CartpoleError: if the observation isn't finite in single precision.
+        """
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._check(observation)
+        return observation, info
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """As the environment's.
+
+        Raises:
+            CartpoleError: if the observation or the reward isn't finite in single precision.
+        """
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self._check(observation)
+        if not abs(float(reward)) <= LARGEST:  # so that NaN is refused too
+            raise self._error("reward", reward)
+        return observation, reward, terminated, truncated, info
+
+    def _check(self, observation: np.ndarray) -> None:
+        if not np.abs(observation).max(initial=0) <= LARGEST:
+            raise self._error("observation", observation)
+
+    def _error(self, what: str, value: Any) -> CartpoleError:
+        text = " ".join(str(value).split())
+        return CartpoleError(f"the {what} of {self._id} isn't finite in float32: {text}")
+
+
+def shares_robot(env: gymnasium.Env[Any, Any]) -> bool:
+    """Whether another environment of this kind would move the same robot."""
+    return bool(getattr(env.unwrapped, "shares_robot", False))
 
 
 def _nearest(env_id: str, known: list[str]) -> str:

@@ -7,12 +7,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from cartpole.envs.cartpole_env import CartPoleEnv
-from cartpole.envs.plant import Plant
-from cartpole.task import BalanceTask
-from cartpole.training.loop import Agent
-
-EPISODES = 20
 # The simulator repeats itself: from the upright state a greedy policy would run the same
 # episode 20 times. So each starts from its own seeded position [m] and angle [rad] within this.
 NOISE = 0.02
@@ -32,18 +26,6 @@ class Evaluation:
     @property
     def mean_return(self) -> float:
         return float(np.mean(self.returns))
-
-
-def evaluate(
-    plant: Plant,
-    agent: Agent,
-    seed: int,
-    episodes: int = EPISODES,
-    should_stop: Callable[[], bool] = lambda: False,
-) -> Evaluation | None:
-    """Runs greedy episodes from seeded initial states; None if told to stop."""
-    env = CartPoleEnv(plant, BalanceTask(noise=NOISE))
-    return run_greedily(env, agent.act_greedily, seed, episodes, should_stop)
 
 
 def run_greedily(

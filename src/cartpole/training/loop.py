@@ -1,129 +1,129 @@
-"""The training loop: run an episode, learn from it, report, save."""
+"""The policy-gradient loop: run an episode, learn from it, report."""
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Any, Protocol
 
+import gymnasium
 import numpy as np
-from torch import nn
 
 from cartpole.agents.policy_gradient import Episode, Losses
-from cartpole.envs.cartpole_env import CartPoleEnv
+from cartpole.training.history import History
 
 WINDOW = 20  # [episodes] over which a mean length counts
 
 
 @dataclass(frozen=True)
 class EpisodeRecord:
-    """One line of the training's history."""
+    """One finished episode."""
 
     index: int
     length: int  # [steps]
     total_reward: float
-    losses: Losses
-    steps_per_second: float  # mean since the training began, learning included
+    losses: Losses | None  # None: nothing was learned yet, its batch isn't full
+    steps_per_second: float  # mean since the training began or was resumed, learning included
+    steps: int  # of the whole training, this episode included
 
 
-@dataclass
-class History:
-    """What the training has seen so far; complete also when it ends early."""
-
-    episodes: list[EpisodeRecord] = field(default_factory=list)
-    steps: int = 0
-    _started: float = field(default_factory=time.monotonic)  # [s]
-    seconds: float = 0.0  # wall time from the beginning to the last finished episode
-
-    def add(self, index: int, episode: Episode, losses: Losses) -> EpisodeRecord:
-        self.steps += episode.length
-        self.seconds = max(time.monotonic() - self._started, 1e-9)
-        record = EpisodeRecord(
-            index, episode.length, episode.total_reward, losses, self.steps / self.seconds
-        )
-        self.episodes.append(record)
-        return record
-
-    def is_solved(self, length: float) -> bool:
-        """Whether the last 20 episodes lasted that long on average."""
-        recent = self.lengths[-WINDOW:]
-        return len(recent) == WINDOW and sum(recent) >= length * WINDOW
-
-    @property
-    def lengths(self) -> list[int]:
-        return [record.length for record in self.episodes]
-
-    @property
-    def returns(self) -> list[float]:
-        return [record.total_reward for record in self.episodes]
-
-
-class Agent(Protocol):
+class Learner(Protocol):
     """What acts, and learns from whole episodes."""
-
-    @property
-    def policy(self) -> nn.Module: ...
-
-    @property
-    def value(self) -> nn.Module: ...
 
     def act(self, observation: np.ndarray) -> int: ...
 
-    def act_greedily(self, observation: np.ndarray) -> int: ...
-
-    def learn(self, episode: Episode) -> Losses: ...
+    def learn(self, episode: Episode) -> Losses | None: ...
 
 
 class Observer(Protocol):
-    """Is told of every finished episode: a logger, a progress bar, a checkpoint writer."""
+    """Is told of every finished episode: a logger, a progress bar, what saves and evaluates."""
 
     def episode_done(self, record: EpisodeRecord) -> None: ...
 
 
-def run_episode(env: CartPoleEnv, agent: Agent, should_stop: Callable[[], bool]) -> Episode | None:
+def run_episode(
+    env: gymnasium.Env[Any, Any], agent: Learner, should_stop: Callable[[], bool]
+) -> Episode | None:
     """Runs one episode with the agent's own, random choice of actions.
 
     Returns:
         The episode, or None if it was broken off because `should_stop()` became true.
     """
     episode = Episode()
-    observation, _ = env.reset()
+    observation = _vector(env.reset()[0])
     finished = False
     while not finished:
         if should_stop():
             return None
         action = agent.act(observation)
         following, reward, terminated, truncated, _ = env.step(action)
-        episode.add(observation, action, reward)
-        observation = following
+        episode.add(observation, action, float(reward))
+        observation = _vector(following)
         finished = terminated or truncated
-    episode.final_observation, episode.terminated = observation, terminated
+    episode.final_observation, episode.terminated = observation, bool(terminated)
     return episode
 
 
+def _vector(observation: Any) -> np.ndarray:
+    """A copy: an environment may well write into the array that it returned."""
+    return np.array(observation, dtype=np.float32)
+
+
+class _Book:
+    """Enters episodes into the history, with the time they took."""
+
+    def __init__(self, history: History) -> None:
+        self._history = history
+        self._began, self._seconds_before = time.monotonic(), history.seconds
+        self._steps = self._steps_before = history.steps
+
+    def add(self, episode: Episode, losses: Losses | None) -> EpisodeRecord:
+        history = self._history
+        history.lengths.append(episode.length)
+        history.returns.append(episode.total_reward)
+        self._steps += episode.length
+        elapsed = max(time.monotonic() - self._began, 1e-9)
+        history.seconds = self._seconds_before + elapsed
+        return EpisodeRecord(
+            len(history.lengths) - 1,
+            episode.length,
+            episode.total_reward,
+            losses,
+            (self._steps - self._steps_before) / elapsed,
+            self._steps,
+        )
+
+
 def train(
-    env: CartPoleEnv,
-    agent: Agent,
+    env: gymnasium.Env[Any, Any],
+    agent: Learner,
     episodes: int,
     history: History,
     observers: list[Observer],
     should_stop: Callable[[], bool] = lambda: False,
-    stop_at: float | None = None,
+    stop_at: float = 0.0,
 ) -> None:
-    """Trains for that many episodes, or until `should_stop()`; an episode broken off is dropped.
+    """Trains until it is complete, or `should_stop()`; an episode broken off is dropped.
 
     Args:
-        stop_at: the mean length [steps] of the last 20 episodes with which it is done.
+        episodes: of the whole training; those in `history` count.
+        stop_at: the mean length [steps] of the last 20 episodes with which it is done; 0: none.
 
     Raises:
-        SimulatorError: if the simulator fails; `history` and `agent` hold what was learned.
+        CartpoleError: if the environment or the arithmetic fails; `history` and `agent` hold
+            what was learned.
     """
-    for index in range(episodes):
+    book = _Book(history)
+    while not is_complete(history, episodes, stop_at):
         episode = run_episode(env, agent, should_stop)
         if episode is None:
             return
-        losses = agent.learn(episode)
-        record = history.add(index, episode, losses)
+        record = book.add(episode, agent.learn(episode))
         for observer in observers:
             observer.episode_done(record)
-        if stop_at and history.is_solved(stop_at):
-            return
+
+
+def is_complete(history: History, episodes: int, stop_at: float) -> bool:
+    """Whether all episodes were run, or the last 20 lasted long enough."""
+    recent = history.lengths[-WINDOW:]
+    solved = bool(stop_at) and len(recent) == WINDOW and sum(recent) >= stop_at * WINDOW
+    return solved or len(history.lengths) >= episodes

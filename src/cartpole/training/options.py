@@ -180,10 +180,22 @@ def _sizes(value: Any) -> tuple[int, ...]:
         raise ValueError("whole numbers, as in 128,128") from None
 
 
+def _scalar(text: str) -> Any:
+    """As YAML, but 1e-3 is a number."""
+    value = yaml.safe_load(text)
+    try:
+        return float(value) if isinstance(value, str) and value[-1:].isdigit() else value
+    except ValueError:
+        return value
+
+
 def _mapping(value: Any) -> dict[str, Any]:
     if isinstance(value, str):
         pairs = [pair.partition("=") for pair in value.replace(",", " ").split()]
-        value = {name: yaml.safe_load(text) for name, _, text in pairs}
+        try:
+            value = {name: _scalar(text) for name, _, text in pairs}
+        except yaml.YAMLError:
+            value = None
         if not all(sign for _, sign, _ in pairs):
             value = None
     if not isinstance(value, dict):

@@ -2,6 +2,7 @@
 
 import contextlib
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,11 +10,10 @@ from cartpole.envs import ros_node
 from cartpole.errors import CartpoleError
 from cartpole.training import run_folder
 from cartpole.training.interrupt import Interrupt
-from cartpole.training.pg_settings import Settings, settings
+from cartpole.training.pg_settings import Choice, Settings, choose
 
 if TYPE_CHECKING:
-    from cartpole.envs.local_session import LocalSession
-    from cartpole.envs.ros_session import RosSession
+    from cartpole.training.pg_stage import Stage
 
 NODE = "pg_train"
 
@@ -24,11 +24,13 @@ def main(argv: list[str] | None = None) -> int:
     interrupt = Interrupt().install()
     try:
         flags = ros_node.plain_arguments(argv)
-        chosen = settings(flags, {})  # wrong flags and --help need no master
+        own = ros_node.command_line_parameters(argv)
+        choice = choose(flags, own)  # wrong flags and --help need no master
         name = ros_node.full_name(argv, NODE)
-        if chosen.backend == "ros":  # without ROS there may be no master to ask
-            chosen = settings(flags, ros_node.private_parameters(name))
-        return run(chosen, name, argv, interrupt)
+        is_launched = any(argument.startswith("__name:=") for argument in argv)
+        if choice.run.over_ros or is_launched:  # without ROS there may be no master to ask
+            choice = choose(flags, ros_node.private_parameters(name) | own)
+        return run(choice, name, argv, interrupt)
     except CartpoleError as error:
         return _failed(error, interrupt)
     except KeyboardInterrupt:
@@ -36,8 +38,8 @@ def main(argv: list[str] | None = None) -> int:
         return interrupt.exit_code or 130
 
 
-def run(chosen: Settings, name: str, argv: list[str], interrupt: Interrupt) -> int:
-    """Brings up what is needed, trains, and ends what it brought up.
+def run(choice: Choice, name: str, argv: list[str], interrupt: Interrupt) -> int:
+    """Brings up what is needed, trains or goes on, and ends what it brought up.
 
     Args:
         name: this node's full name.
@@ -47,41 +49,59 @@ def run(chosen: Settings, name: str, argv: list[str], interrupt: Interrupt) -> i
         The exit code. A failure that the user can mend is one line; what was learned is saved.
 
     Raises:
-        CartpoleError: if the run folder can't be made.
+        CartpoleError: if the run folder can't be made, or a training runs in it.
     """
     # Slow to import, and --help needs none of it.
     from cartpole.training.pg_run import Training, say
 
-    folder = run_folder.create(chosen.run_dir, "cartpole", "pg", chosen.seed)
-    session = _session(chosen, name, argv)
-    try:
-        plant = session.start(say)
-        interrupt.defer()
-        Training(chosen, folder, plant, interrupt).run()
-    except CartpoleError as error:
-        return _failed(error, interrupt)  # told before the closing: a hung simulator takes its time
-    finally:
-        interrupt.defer()
-        session.close()
-        _remove_if_empty(folder)
+    folder = (choice.resume or _new_folder(choice.run)).resolve()
+    with contextlib.ExitStack() as closing:
+        closing.callback(run_folder.remove_if_empty, folder)
+        closing.enter_context(run_folder.held(folder))
+        try:
+            stage = _stage(choice.run, name, argv, say, closing)
+            training = Training(choice, folder, stage, interrupt)
+            interrupt.defer()
+            training.run()
+        except CartpoleError as error:
+            return _failed(error, interrupt)  # before the closing: a hung simulator takes its time
+        finally:
+            interrupt.defer()
     return interrupt.exit_code
 
 
-def _session(chosen: Settings, name: str, argv: list[str]) -> "RosSession | LocalSession":
-    if chosen.backend == "bullet":
-        from cartpole.envs.local_session import LocalSession
+def _new_folder(run: Settings) -> Path:
+    name = "cartpole" if run.is_robot else run.env_id
+    return run_folder.create(run.run_dir or None, name, run.exp_name, run.seed)
 
-        return LocalSession()
-    from cartpole.envs.ros_session import RosSession
 
-    return RosSession(name, argv, chosen.realtime, chosen.gui, chosen.seed)
+def _stage(
+    run: Settings,
+    name: str,
+    argv: list[str],
+    say: Callable[[str], None],
+    closing: contextlib.ExitStack,
+) -> "Stage":
+    """The environments; `closing` ends them, and what was started for them."""
+    from cartpole.training.pg_stage import gymnasium_stage, robot_stage
+
+    if not run.is_robot:
+        stage = gymnasium_stage(run.env_id, run.env_kwargs)
+        closing.callback(stage.close)
+        return stage
+    if run.over_ros:
+        from cartpole.envs.ros_session import RosSession
+
+        session = RosSession(name, argv, run.realtime, run.gui, run.seed)
+        closing.callback(session.close)
+        return robot_stage(session.start(say), run.start_noise)
+    from cartpole.envs.local_session import LocalSession
+
+    local = LocalSession()
+    closing.callback(local.close)
+    return robot_stage(local.start(say), run.start_noise)
 
 
 def _failed(error: CartpoleError, interrupt: Interrupt) -> int:
     print(f"{NODE}: {error}", file=sys.stderr, flush=True)
     return interrupt.exit_code or 1
-
-
-def _remove_if_empty(folder: Path) -> None:
-    with contextlib.suppress(OSError):
-        folder.rmdir()

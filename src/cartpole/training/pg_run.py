@@ -1,5 +1,6 @@
-"""One training by policy gradient: a plant and a folder in, networks, logs and a summary out."""
+"""One training by policy gradient: a stage and a folder in; networks, figures and a summary out."""
 
+import contextlib
 import shlex
 from dataclasses import asdict
 from pathlib import Path
@@ -7,28 +8,25 @@ from typing import Any
 
 import torch
 
-from cartpole.agents.policy_gradient import (
-    GAMMA,
-    POLICY_LEARNING_RATE,
-    VALUE_LEARNING_RATE,
-    PolicyGradientAgent,
-)
-from cartpole.agents.reinforce import ReinforceAgent, ReinforceSettings
-from cartpole.envs.cartpole_env import CartPoleEnv
-from cartpole.envs.plant import Plant
 from cartpole.errors import CartpoleError
-from cartpole.task import BalanceTask
 from cartpole.training import run_folder
 from cartpole.training.checkpoints import NetworkSaver
-from cartpole.training.evaluation import Evaluation, evaluate
+from cartpole.training.evaluation import Evaluation
+from cartpole.training.history import History
 from cartpole.training.interrupt import Interrupt
-from cartpole.training.logs import TensorBoardLog
-from cartpole.training.loop import Agent, History, train
-from cartpole.training.pg_settings import Settings
+from cartpole.training.loop import Observer, is_complete, train
+from cartpole.training.pg_figures import PolicyFigures
+from cartpole.training.pg_keeper import Keeper
+from cartpole.training.pg_policy import hyperparameters, make_agent
+from cartpole.training.pg_settings import Choice, check_same, config
+from cartpole.training.pg_stage import Stage
 from cartpole.training.plots import learning_curve
 from cartpole.training.progress import progress
+from cartpole.training.random_states import seed_all
+from cartpole.training.run_checkpoints import read_newest
+from cartpole.training.run_record import read_record, write_record
+from cartpole.training.scalar_log import ScalarLog
 
-SCALE = (0.4, 1.0, 0.2, 2.0)  # [m], [m/s], [rad], [rad/s]: what an observation comes to
 LAST = 60  # [episodes] over which the summary reports a mean
 
 
@@ -38,26 +36,35 @@ def say(text: str) -> None:
 
 
 class Training:
-    """The training proper: knows a plant, not where it comes from.
+    """The training proper; new, or resumed from its folder.
 
     Args:
-        settings: what the user chose.
-        folder: an empty folder for all results.
-        plant: the robot.
+        choice: what the user chose.
+        folder: an empty folder for all results, or the one of the resumed training.
+        stage: where it takes place.
         interrupt: tells when to stop.
+
+    Raises:
+        CartpoleError: if the environment doesn't suit the algorithm, or there is nothing to
+            resume from.
     """
 
-    def __init__(
-        self, settings: Settings, folder: Path, plant: Plant, interrupt: Interrupt
-    ) -> None:
+    def __init__(self, choice: Choice, folder: Path, stage: Stage, interrupt: Interrupt) -> None:
         torch.set_num_threads(1)  # networks this small only lose by more
-        self._settings = settings
-        self._folder = folder
-        self._plant = plant
-        self._interrupt = interrupt
-        self._agent = make_agent(settings)
-        self._saver = NetworkSaver(folder, self._agent, settings.save_every)
-        self._history = History()  # its clock starts here
+        self._choice, self._run = choice, choice.run
+        self._folder, self._stage, self._interrupt = folder, stage, interrupt
+        self._hyperparameters = hyperparameters(choice)
+        seed_all(self._run.seed)
+        self._agent = make_agent(choice, stage.env)
+        self._resumed = self._read_checkpoint() if choice.resume else None
+        self._saver = NetworkSaver(folder, self._agent, self._run.save_every)
+        self._history = History()
+        self._evaluation: Evaluation | None = None
+
+    def _read_checkpoint(self) -> dict[str, Any]:
+        content = read_newest(self._folder, say)
+        check_same(self._choice, content.get("config"), str(self._folder))
+        return content
 
     def run(self) -> None:
         """Trains and writes everything; what was learned is saved also when it fails.
@@ -66,93 +73,122 @@ class Training:
             CartpoleError: if the simulator, the disk or the arithmetic fails.
         """
         failure: CartpoleError | None = None
-        evaluation = None
         try:
             self._train()
-            self._saver.save()
-            evaluation = self._evaluate()
         except CartpoleError as error:
             failure = error
         except OSError as error:
             place = error.filename or self._folder
             failure = CartpoleError(f"can't write {place}: {error.strerror}")
-        self._finish(evaluation, failure)
+        self._finish(failure)
 
     def _train(self) -> None:
-        settings = self._settings
-        log = TensorBoardLog(self._folder, {**asdict(settings), **hyperparameters(settings)})
-        shown = progress(settings.episodes)
-        say(f"training for {settings.episodes} episodes with seed {settings.seed}")
-        env = CartPoleEnv(self._plant, BalanceTask(noise=settings.start_noise))
+        record = config(self._choice, self._hyperparameters)
+        write_record(self._folder, record, bool(self._resumed))
+        self._stage.env.reset(seed=self._run.seed)  # the loop's own resets go on from here
+        length = self._resumed["log_bytes"] if self._resumed else 0
+        log = ScalarLog(self._folder, {**asdict(self._run), **self._hyperparameters}, length, say)
         try:
-            env.reset(seed=settings.seed)  # the loop's own resets go on from here
-            train(
-                env,
-                self._agent,
-                settings.episodes,
-                self._history,
-                [log, self._saver, shown],
-                self._interrupt.requested,
-                settings.stop_at or None,
-            )
+            keeper = Keeper(self._choice, self._folder, self._stage, self._agent, self._history,
+                            log, self._interrupt.requested)  # fmt: skip
+            if self._resumed:
+                keeper.load_state_dict(self._resumed)
+            self._begin(keeper)
+            self._learn(keeper, log)
+            self._saver.save()
+            self._evaluation = keeper.finish()
         finally:
-            shown.close()
             log.close()
 
-    def _evaluate(self) -> Evaluation | None:
-        if self._interrupt.requested():
-            return None
-        return evaluate(
-            self._plant, self._agent, self._settings.seed, should_stop=self._interrupt.requested
-        )
+    def _begin(self, keeper: Keeper) -> None:
+        run, done = self._run, len(self._history.lengths)
+        if self._resumed:
+            others = run_folder.other_versions(read_record(self._folder).get("versions", {}))
+            if others:
+                say(f"{others}: from here on it may come to other bits")
+            say(f"going on after episode {done} of {run.episodes}: {self._folder}")
+            return
+        where = "" if run.is_robot else f" in {run.env_id}"
+        say(f"training{where} for {run.episodes} episodes with seed {run.seed}")
+        keeper.save()  # so that there is something to go on from, whatever happens
 
-    def _finish(self, evaluation: Evaluation | None, failure: CartpoleError | None) -> None:
+    def _learn(self, keeper: Keeper, log: ScalarLog) -> None:
+        """The loop; whatever ends it, the training stands at the end of an episode then."""
+        run = self._run
+        shown = progress(run.episodes, done=len(self._history.lengths))
+        observers: list[Observer] = [PolicyFigures(log), self._saver, shown, keeper]
+        try:
+            if self._resumed:
+                keeper.evaluate_if_due()  # the interruption may have come before it
+            train(
+                self._stage.env,
+                self._agent,
+                run.episodes,
+                self._history,
+                observers,
+                self._interrupt.requested,
+                run.stop_at,
+            )
+            keeper.rewind()
+        except CartpoleError:
+            keeper.rewind()
+            with contextlib.suppress(OSError):  # the failure is what the user has to hear of
+                keeper.save()
+            raise
+        finally:
+            shown.close()
+
+    def _is_complete(self) -> bool:
+        return is_complete(self._history, self._run.episodes, self._run.stop_at)
+
+    def _finish(self, failure: CartpoleError | None) -> None:
         """Saves, draws, tells; then passes a failure on, unless the user had stopped anyway."""
         try:
             self._saver.save()
             self._draw()
-            summary = self._summary(evaluation, failure)
-            run_folder.write_summary(self._folder / "summary.json", summary)
+            run_folder.write_summary(self._folder / "summary.json", self._summary(failure))
         except OSError as error:
             failure = failure or CartpoleError(f"can't write to {self._folder}: {error.strerror}")
-        self._tell(evaluation)
+        self._tell()
         if failure and not self._interrupt.requested():
             raise CartpoleError(
-                f"{failure}; stopped after {len(self._history.episodes)} of "
-                f"{self._settings.episodes} episodes, what was learned is saved in {self._folder}"
+                f"{failure}; stopped after {len(self._history.lengths)} of {self._run.episodes} "
+                f"episodes, what was learned is saved in {self._folder}; --resume "
+                f"{shlex.quote(str(self._folder))} goes on from the last checkpoint"
             )
 
     def _draw(self) -> None:
-        if self._history.episodes:
+        if self._history.lengths:
+            what = "policy gradient" if self._run.is_robot else f"REINFORCE, {self._run.env_id}"
             learning_curve(
                 self._folder / "learning_curve.png",
                 self._history.lengths,
                 self._history.returns,
-                f"policy gradient, seed {self._settings.seed}",
+                f"{what}, seed {self._run.seed}",
             )
 
-    def _summary(
-        self, evaluation: Evaluation | None, failure: CartpoleError | None
-    ) -> dict[str, Any]:
+    def _summary(self, failure: CartpoleError | None) -> dict[str, Any]:
         history = self._history
         return {
-            "settings": asdict(self._settings),
-            "hyperparameters": hyperparameters(self._settings),
+            **config(self._choice, self._hyperparameters),
             "versions": run_folder.versions(),
             "failure": str(failure) if failure else None,
+            "complete": self._is_complete(),
             "interrupted": self._interrupt.requested(),
-            "episodes": len(history.episodes),
+            "episodes": len(history.lengths),
             "steps": history.steps,
             "seconds": round(history.seconds, 3),
             f"mean_length_last_{LAST}": _mean(history.lengths[-LAST:]),
+            "best": history.best,
+            "evaluations": history.evaluations,
             "lengths": history.lengths,
             "returns": history.returns,
-            "evaluation": asdict(evaluation) if evaluation else None,
+            "evaluation": asdict(self._evaluation) if self._evaluation else None,
         }
 
-    def _tell(self, evaluation: Evaluation | None) -> None:
-        history = self._history
-        count = len(history.episodes)
+    def _tell(self) -> None:
+        history, evaluation = self._history, self._evaluation
+        count = len(history.lengths)
         mean = _mean(history.lengths[-LAST:])
         line = f"trained {count} episodes, {history.steps} steps in {history.seconds:.1f} s"
         if mean is not None:
@@ -165,24 +201,6 @@ class Training:
         say(line)
         say(f"everything lies in {self._folder}")
         say(f"watch: tensorboard --logdir {shlex.quote(str(self._folder))}")
-
-
-def make_agent(settings: Settings) -> Agent:
-    """The learner that the settings name."""
-    if settings.algorithm == "gae":
-        return ReinforceAgent(settings.seed, SCALE)
-    return PolicyGradientAgent(settings.seed, settings.random_weights)
-
-
-def hyperparameters(settings: Settings) -> dict[str, float]:
-    """The algorithm's constants, for logs and summaries."""
-    if settings.algorithm == "gae":
-        return asdict(ReinforceSettings())
-    return {
-        "gamma": GAMMA,
-        "policy_learning_rate": POLICY_LEARNING_RATE,
-        "value_learning_rate": VALUE_LEARNING_RATE,
-    }
 
 
 def _mean(values: list[int]) -> float | None:

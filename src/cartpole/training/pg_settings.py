@@ -1,191 +1,260 @@
-"""What one training run can be told: flags, and the same as rosparams."""
+"""What one policy-gradient training can be told: flags, rosparams, a YAML section and KEY=VALUE."""
 
 import argparse
-from dataclasses import dataclass
-from difflib import get_close_matches
-from typing import Any
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, NamedTuple
 
+from cartpole.agents.reinforce_settings import ReinforceSettings
 from cartpole.errors import CartpoleError
+from cartpole.option import check_options, option
 from cartpole.task import MAX_STEPS
+from cartpole.training.command_options import CommandOptions, flag
+from cartpole.training.config_file import default_file, read_section
+from cartpole.training.options import Options
+from cartpole.training.run_record import CONFIG_RECORD, is_plain, read_record
 
 COMMAND = "pg_train.py"
+CONFIG = "pg.yaml"
+ALGORITHM = "pg"  # in config.json
+ROBOT = "cartpole/Balance-v0"
 DESCRIPTION = """\
-Trains the cart-pole by policy gradient over ROS, in lock-step with the simulator.
+Trains by policy gradient: the cart-pole robot over ROS, in lock-step with the simulator, or any
+Gymnasium environment with single actions in this process.
 
 Starts what isn't running (master, simulator, robot, controllers) and stops exactly that.
-Every flag is a private rosparam too (~episodes, ~seed, ~run_dir, ~save_every, ~realtime,
-~gui, ~random_weights, ~start_noise, ~algorithm, ~backend, ~stop_at); the command line wins.
-Ctrl-C saves what was learned and exits with 130 (SIGTERM: 143).
+What isn't given comes from config/pg.yaml, the environment's section; options of the algorithm
+count with --algorithm gae only. Every flag is a private rosparam too (~episodes, ~seed, ...). The
+command line wins over rosparams, these over --params, and all of them over the file.
+Ctrl-C saves everything and exits with 130 (SIGTERM: 143); --resume goes on from there, to the
+same bits as a training that was never interrupted.
 Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
 
 LARGEST_NOISE = 0.2  # [m], [rad]; just inside the angle at which an episode ends
-SWITCHES = ("realtime", "gui", "random_weights")
+ROBOTS_OWN = ("realtime", "gui", "random_weights", "start_noise")
+# What differs from the defaults, which are the robot's, in any other environment.
+ELSEWHERE = {"backend": "bullet", "algorithm": "gae", "normalize_observations": True}
+EXTENDING = ("episodes", "stop_at")  # may be changed when resuming
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What a user can choose for one training."""
+    """One training around the algorithm: where, how long, and what it leaves behind.
 
-    episodes: int = 600
-    seed: int = 0
-    run_dir: str | None = None
-    save_every: int = 100
-    realtime: bool = False
-    gui: bool = False
-    random_weights: bool = False
-    start_noise: float = 0.0
-    algorithm: str = "document"
-    backend: str = "ros"
-    stop_at: float = 0.0
+    Raises:
+        CartpoleError: if a value is beyond its limits, or two don't go together.
+    """
 
-
-def parser() -> argparse.ArgumentParser:
-    """The flags, with their defaults."""
-    result = argparse.ArgumentParser(
-        COMMAND,
-        description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
+    episodes: int = option(600, "the training's length", 1, 2**31 - 1)
+    seed: int = option(0, "of weights, actions, evaluation and simulator", 0, 2**31 - 1)
+    run_dir: str = option("", "a new or empty folder for all results (runs/ENV__EXP__SEED__TIME)")
+    save_every: int = option(
+        100, "episodes between saves of the networks as .pth; 0: at the end only", 0, 2**31 - 1
     )
-    add, default = result.add_argument, Settings()
-    add("--episodes", type=_at_least(1), default=default.episodes, metavar="N", help="default 600")
-    add(
-        "--seed",
-        type=_at_least(0),
-        default=default.seed,
-        metavar="N",
-        help="of weights, actions, evaluation and simulator (default 0)",
-    )
-    add(
-        "--run-dir",
-        metavar="DIR",
-        help="a new or empty folder for all results (default runs/cartpole__pg__SEED__TIME)",
-    )
-    add(
-        "--save-every",
-        type=_at_least(0),
-        default=default.save_every,
-        metavar="N",
-        help="episodes between saves of the networks; 0: at the end only (default 100)",
-    )
-    add(
-        "--realtime",
-        action="store_true",
-        help="let the world run by itself, as the existing script does",
-    )
-    add(
-        "--random-weights",
-        action="store_true",
-        help="draw all initial weights at random, as the existing script does; by default the "
-        "output layers start at zero, which learns more reliably",
-    )
-    add(
-        "--start-noise",
-        type=_noise,
-        default=default.start_noise,
-        metavar="X",
-        help="episodes start within +-X of the origin [m] and of upright [rad]; 0, as the existing "
-        "script does, starts them all alike (default %(default)s)",
-    )
-    add(
-        "--algorithm",
+    realtime: bool = option(False, "let the world run by itself, as the existing script does")
+    gui: bool = option(False, "show the simulator's window")
+    random_weights: bool = option(
+        False, "draw all initial weights at random, as the existing script does; else the output "
+        "layers start at zero, which learns more reliably",
+    )  # fmt: skip
+    start_noise: float = option(
+        0.0, "episodes start within +-X of the origin [m] and of upright [rad]; 0, as the existing "
+        "script does, starts them all alike", 0, LARGEST_NOISE,
+    )  # fmt: skip
+    algorithm: str = option(
+        "document", "document: the existing script's; gae: REINFORCE with a fitted baseline and "
+        "generalised advantages, which learns in a third of the episodes",
         choices=("document", "gae"),
-        default=default.algorithm,
-        help="document: the existing script's; gae: REINFORCE with a fitted baseline and generalised "
-        "advantages, which learns in a third of the episodes (default %(default)s)",
-    )
-    add(
-        "--backend",
+    )  # fmt: skip
+    backend: str = option(
+        "ros", "ros: the robot in a simulator over ROS; bullet: in this process, with the same "
+        "bits, several times as fast, and no ROS needed",
         choices=("ros", "bullet"),
-        default=default.backend,
-        help="the robot in a simulator over ROS, or in this process: the same bits, several times as "
-        "fast, and no ROS needed (default %(default)s)",
+    )  # fmt: skip
+    stop_at: float = option(
+        0.0, "end when the last 20 episodes lasted X steps on average; 0: after all", 0, 1e9
     )
-    add(
-        "--stop-at",
-        type=_length,
-        default=default.stop_at,
-        metavar="X",
-        help="end when the last 20 episodes lasted X steps on average; 0: after all episodes "
-        "(default 0)",
+    env_id: str = option(ROBOT, "Gymnasium's id of the environment; this one is the robot")
+    env_kwargs: dict[str, Any] = option({}, "of another environment, KEY=VALUE with commas")
+    exp_name: str = option("pg", "in the run folder's name; of gae it is gae")
+    eval_frequency: int = option(
+        0, "episodes between two evaluations; 0: at the end only", 0, 2**31 - 1
     )
-    window = result.add_mutually_exclusive_group()
-    window.add_argument("--gui", action="store_true", help="show the simulator's window")
-    window.add_argument(
-        "--headless", dest="gui", action="store_false", help="no window (the default)"
+    eval_episodes: int = option(20, "greedy episodes of an evaluation", 1, 10**6)
+    checkpoint_frequency: int = option(
+        20, "episodes between two checkpoints; 0: at the end only", 0, 2**31 - 1
     )
-    return result
+    keep_checkpoints: int = option(3, "the newest ones are kept; 0: all", 0, 10**6)
 
+    def __post_init__(self) -> None:
+        check_options(self)
+        fault = _contradiction(self)
+        if fault:
+            raise CartpoleError(fault)
 
-def _at_least(minimum: int) -> Any:
-    def number(text: str) -> int:
-        value = int(text)
-        if not minimum <= value < 2**31:
-            raise argparse.ArgumentTypeError(f"must be at least {minimum} and below 2^31: {text}")
-        return value
+    @property
+    def is_robot(self) -> bool:
+        """Whether it is the robot's own task, over ROS or not."""
+        return self.env_id == ROBOT
 
-    return number
-
-
-def _noise(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value <= LARGEST_NOISE:
-        raise argparse.ArgumentTypeError(f"must lie between 0 and {LARGEST_NOISE}: {text}")
-    return value
-
-
-def _length(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value <= MAX_STEPS:
-        raise argparse.ArgumentTypeError(f"must lie between 0 and {MAX_STEPS}: {text}")
-    return value
-
-
-def as_flags(parameters: dict[str, Any]) -> list[str]:
-    """Private rosparams as flags, so that both go through the same checks.
-
-    Raises:
-        CartpoleError: if there is no such parameter, or a switch isn't true or false.
-    """
-    known = list(Settings.__dataclass_fields__)
-    flags: list[str] = []
-    for name, value in parameters.items():
-        if name not in known:
-            near = get_close_matches(name, known, 1) or known
-            raise CartpoleError(f"unknown parameter ~{name}; did you mean ~{', ~'.join(near)}?")
-        flags += _flag(name, value)
-    return flags
-
-
-def _flag(name: str, value: Any) -> list[str]:
-    flag = f"--{name.replace('_', '-')}"
-    if name in SWITCHES:
-        if not isinstance(value, bool):
-            raise CartpoleError(f"parameter ~{name} must be true or false, not {value!r}")
-        return [flag] if value else []
-    return [] if value == "" else [f"{flag}={value}"]
-
-
-def settings(flags: list[str], parameters: dict[str, Any]) -> Settings:
-    """Defaults, overridden by rosparams, overridden by flags.
-
-    Raises:
-        SystemExit: with code 2 and a usage line, if a flag is wrong; with 0 after --help.
-        CartpoleError: if a rosparam is unknown.
-    """
-    known = parser()
-    from_parameters = known.parse_args(as_flags(parameters))
-    chosen = Settings(**vars(known.parse_args(flags, namespace=from_parameters)))
-    fault = _contradiction(chosen)
-    if fault:
-        known.error(fault)
-    return chosen
+    @property
+    def over_ros(self) -> bool:
+        """Whether a simulator is needed."""
+        return self.is_robot and self.backend == "ros"
 
 
 def _contradiction(chosen: Settings) -> str:
     """What can't be had together; empty if nothing."""
+    if not chosen.env_id:
+        return "env_id names an environment"
+    if not is_plain(chosen.env_kwargs):
+        return f"env_kwargs has values that no file can hold: {chosen.env_kwargs}"
+    if not chosen.is_robot:
+        return _foreign(chosen)
+    if chosen.env_kwargs:
+        return f"--env-kwargs are for other environments than the robot's, {ROBOT}"
     if chosen.backend == "bullet" and (chosen.realtime or chosen.gui):
         return "--realtime and --gui are of a simulator over ROS: not with --backend bullet"
     if chosen.algorithm == "gae" and chosen.random_weights:
         return "--random-weights is the document's start: not with --algorithm gae"
+    if chosen.stop_at > MAX_STEPS:
+        return f"stop_at: an episode of the robot has no more than {MAX_STEPS} steps"
     return ""
+
+
+def _foreign(chosen: Settings) -> str:
+    if chosen.algorithm == "document":
+        return f"the document's algorithm is made for the robot: {chosen.env_id} needs --algorithm gae"
+    for name in ROBOTS_OWN:
+        if getattr(chosen, name):
+            return f"{flag(name)} is of the robot, {ROBOT}: not with --env-id {chosen.env_id}"
+    if chosen.backend == "ros":
+        text = f"--backend ros is of the robot, {ROBOT}: {chosen.env_id} is made in this process"
+        own = chosen.env_id.startswith("cartpole/")
+        return f"{text}; --env-kwargs backend=ros has it over ROS" if own else text
+    return ""
+
+
+class Choice(NamedTuple):
+    """What the user wants: a new training by these settings, or an old one resumed."""
+
+    run: Settings
+    gae: ReinforceSettings
+    resume: Path | None
+
+
+OPTIONS = Options(Settings, ReinforceSettings)
+_ALGORITHMS_OWN = [each.name for each in fields(ReinforceSettings)]
+
+
+def command_options() -> CommandOptions:
+    """All flags; none has a default of its own."""
+    result = argparse.ArgumentParser(
+        COMMAND,
+        usage=f"{COMMAND} [--help] [--OPTION VALUE ...]",
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    result.add_argument(
+        "--headless", action="store_true", default=argparse.SUPPRESS, help="no window (default)"
+    )
+    return CommandOptions(result, OPTIONS, CONFIG)
+
+
+def choose(flags: list[str], parameters: dict[str, Any]) -> Choice:
+    """Defaults, overridden by the file, --params, rosparams and flags, in this order.
+
+    Raises:
+        SystemExit: with code 2 and a usage line, if a flag is wrong, or options don't go
+            together; with 0 after --help.
+        CartpoleError: if a name is unknown or a value wrong anywhere else.
+    """
+    known = command_options()
+    given, special = known.given(flags, parameters)
+    if given.pop("headless", False):
+        if "--gui" in flags:
+            known.parser.error("--headless: not with --gui")
+        given["gui"] = False
+    if "resume" in special:
+        return _resumed(Path(special["resume"]), given, special)
+    section = _section(given.get("env_id"), special.get("config"))
+    try:
+        return _new(given, section)
+    except CartpoleError as error:
+        known.parser.error(str(error))
+
+
+def _section(env_id: str | None, config: str | None) -> dict[str, Any]:
+    path = Path(config) if config else default_file(CONFIG)
+    return OPTIONS.read(read_section(path, env_id or ROBOT, None), config or f"config/{CONFIG}")
+
+
+def _new(given: dict[str, Any], section: dict[str, Any]) -> Choice:
+    merged = {**section, **given}
+    if merged.get("env_id", ROBOT) != ROBOT:
+        merged = {**ELSEWHERE, **merged}
+    if merged.get("algorithm", "document") == "document":
+        surplus = [name for name in given if name in _ALGORITHMS_OWN]
+        if surplus:
+            raise CartpoleError(f"{flag(surplus[0])} is an option of --algorithm gae")
+        merged = {name: merged[name] for name in merged if name not in _ALGORITHMS_OWN}
+    else:
+        merged.setdefault("exp_name", "gae")
+    return _made(merged, None)
+
+
+def _made(values: dict[str, Any], resume: Path | None) -> Choice:
+    run, gae = OPTIONS.make(Settings, values), OPTIONS.make(ReinforceSettings, values)
+    return Choice(run, gae, resume)
+
+
+def _resumed(folder: Path, given: dict[str, Any], special: dict[str, str]) -> Choice:
+    others = [name for name in given if name not in EXTENDING]
+    others += [name for name in special if name != "resume"]
+    if others:
+        raise CartpoleError(
+            f"a resumed training keeps its settings: --resume allows no {flag(others[0])}, "
+            f"only {', '.join(flag(name) for name in EXTENDING)}"
+        )
+    old = from_config(read_record(folder), str(folder / CONFIG_RECORD))
+    return _made({**asdict(old.run), **asdict(old.gae), **given}, folder)
+
+
+def config(choice: Choice, hyperparameters: dict[str, Any]) -> dict[str, Any]:
+    """All as plain values, for config.json and checkpoints.
+
+    Args:
+        hyperparameters: of the algorithm that is chosen.
+    """
+    return {"algorithm": ALGORITHM, "run": asdict(choice.run), ALGORITHM: hyperparameters}
+
+
+def from_config(content: Any, origin: str) -> Choice:
+    """What `config` gave, also after JSON.
+
+    Raises:
+        CartpoleError: if it is something else.
+    """
+    record = content if isinstance(content, dict) else {}
+    run, own = record.get("run"), record.get(ALGORITHM)
+    if record.get("algorithm") != ALGORITHM or not (isinstance(run, dict) and isinstance(own, dict)):
+        raise CartpoleError(f"{origin} isn't the configuration of a policy-gradient training")
+    return _made(OPTIONS.read({**run, **own}, origin), None)
+
+
+def check_same(choice: Choice, content: Any, origin: str) -> None:
+    """Holds the settings to resume with against those in a checkpoint.
+
+    Raises:
+        CartpoleError: if one differs that a resumed training can't change, or these are no settings.
+    """
+    before, after = (
+        asdict(each.run) | asdict(each.gae) for each in (from_config(content, origin), choice)
+    )
+    for name, value in before.items():
+        if name not in EXTENDING and after[name] != value:
+            raise CartpoleError(
+                f"{origin}: {CONFIG_RECORD} says {name} {after[name]}, the checkpoint {value}; a "
+                "resumed training keeps its settings"
+            )

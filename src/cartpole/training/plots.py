@@ -8,6 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from cartpole.training.checkpoints import write_atomically
+
 WINDOW = 20  # [episodes] of the moving average
 
 
@@ -25,7 +27,7 @@ def learning_curve(
     """Draws length and return of every episode, each with its moving average, as a PNG.
 
     Raises:
-        OSError: if the file can't be written.
+        OSError: if the file can't be written; an older one is untouched.
     """
     figure = Figure(figsize=(9, 6), layout="constrained")
     FigureCanvasAgg(figure)
@@ -35,7 +37,7 @@ def learning_curve(
     upper.set_title(title)
     upper.legend(loc="upper left")
     lower.set_xlabel("episode")
-    figure.savefig(path, format="png", dpi=110)
+    write_atomically(path, lambda stream: figure.savefig(stream, format="png", dpi=110))
 
 
 def _draw(axes: Axes, values: Sequence[float], label: str, colour: str) -> None:

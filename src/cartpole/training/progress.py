@@ -37,8 +37,8 @@ def terminal_bar(total: int, unit: str, stream: TextIO, done: int = 0) -> tqdm:
 class Bar:
     """A tqdm bar with the last return, the last length and the steps per second."""
 
-    def __init__(self, episodes: int, stream: TextIO) -> None:
-        self._bar = terminal_bar(episodes, "episode", stream)
+    def __init__(self, episodes: int, stream: TextIO, done: int = 0) -> None:
+        self._bar = terminal_bar(episodes, "episode", stream, done)
 
     def episode_done(self, record: EpisodeRecord) -> None:
         self._bar.set_postfix_str(
@@ -82,7 +82,7 @@ class Lines:
         """Nothing to close."""
 
 
-def progress(episodes: int, stream: TextIO | None = None) -> Bar | Lines:
+def progress(episodes: int, stream: TextIO | None = None, done: int = 0) -> Bar | Lines:
     """The form that suits where the output goes (standard error unless told otherwise)."""
     stream = stream or sys.stderr
-    return Bar(episodes, stream) if stream.isatty() else Lines(episodes, stream)
+    return Bar(episodes, stream, done) if stream.isatty() else Lines(episodes, stream)

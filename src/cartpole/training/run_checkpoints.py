@@ -11,21 +11,22 @@ import os
 import pickle
 import shutil
 import zipfile
+import zlib
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import torch
 
 from cartpole.errors import CartpoleError
-from cartpole.training.checkpoints import write_atomically
+from cartpole.training.checkpoints import save_tensors
 
 LAST, BEST, FAILURE = "last.pt", "best.pt", "failure.pt"
 FOLDER = "checkpoints"
+LEFTOVERS = (".*.pt.*", ".*.pt.new", ".*.pth.*", ".*.json.*", ".*.png.*")  # of a kill while writing
 FORMAT = "cartpole 1"  # changes when older files can't be read any more
 _DAMAGED = (RuntimeError, pickle.UnpicklingError, EOFError, ValueError, KeyError, TypeError,
-            AttributeError, IndexError, zipfile.BadZipFile)  # fmt: skip
+            AttributeError, IndexError, zipfile.BadZipFile, zlib.error)  # fmt: skip
 
 
 class Checkpoints:
@@ -48,8 +49,9 @@ class Checkpoints:
         """
         path = self._run / FOLDER / f"step_{step:09d}.pt"
         path.parent.mkdir(exist_ok=True)
-        write_atomically(path, partial(torch.save, {"format": FORMAT, **content}))
-        for name in (LAST, BEST) if best else (LAST,):
+        save_tensors(path, {"format": FORMAT, **content})
+        # The last one last: killed in between, a training goes on from before its best step.
+        for name in (BEST, LAST) if best else (LAST,):
             _name(path, self._run / name)
         if self._keep:
             for old in _numbered(self._run)[self._keep :]:
@@ -63,7 +65,18 @@ class Checkpoints:
         """
         path = self._run / FAILURE
         with contextlib.suppress(OSError):  # a full disk may well be the failure
-            write_atomically(path, partial(torch.save, {"format": FORMAT, **content}))
+            save_tensors(path, {"format": FORMAT, **content})
+
+    def remove_leftovers(self) -> None:
+        """Removes what a training that was killed had begun to write; nobody else may write.
+
+        Raises:
+            OSError: if the disk refuses.
+        """
+        for folder in (self._run, self._run / FOLDER):
+            for pattern in LEFTOVERS:
+                for path in folder.glob(pattern):
+                    path.unlink()
 
 
 def _name(path: Path, name: Path) -> None:
@@ -79,7 +92,8 @@ def _name(path: Path, name: Path) -> None:
 
 def _numbered(run: Path) -> list[Path]:
     """The checkpoints of a run by number, the newest first."""
-    return sorted((run / FOLDER).glob("step_*.pt"), reverse=True)
+    paths = (run / FOLDER).glob("step_*.pt")
+    return sorted(paths, key=lambda path: (len(path.name), path.name), reverse=True)
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -110,7 +124,7 @@ def read_newest(run: Path, say: Callable[[str], None]) -> dict[str, Any]:
     Raises:
         CartpoleError: if there is none.
     """
-    for path in _candidates(run):
+    for path in candidates(run):
         try:
             return read(path)
         except CartpoleError as error:
@@ -118,10 +132,15 @@ def read_newest(run: Path, say: Callable[[str], None]) -> dict[str, Any]:
     raise CartpoleError(f"{run} holds no checkpoint to go on from")
 
 
-def _candidates(run: Path) -> list[Path]:
-    """last.pt, the numbered ones, best.pt; each file once, whatever its names."""
+def candidates(run: Path, best_first: bool = False) -> list[Path]:
+    """Checkpoints in the order in which to try them; each file once, whatever its names.
+
+    That is last.pt, the numbered ones from the newest on, and best.pt at the end or, if so told,
+    at the beginning.
+    """
+    best, others = [run / BEST], [run / LAST, *_numbered(run)]
     found: dict[tuple[int, int], Path] = {}
-    for path in (run / LAST, *_numbered(run), run / BEST):
+    for path in best + others if best_first else others + best:
         with contextlib.suppress(FileNotFoundError):
             status = path.stat()
             found.setdefault((status.st_dev, status.st_ino), path)

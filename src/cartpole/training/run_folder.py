@@ -1,32 +1,39 @@
 """The folder of one run: its name, and its summary as JSON."""
 
+import contextlib
 import fcntl
 import json
 import os
 import platform
+import re
+import shlex
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from cartpole.errors import CartpoleError
 from cartpole.training.checkpoints import write_atomically
 
+LIBRARIES = ("python", "numpy", "torch", "gymnasium")  # a training's bits depend on them
+
 
 def create(run_dir: str | None, env: str, experiment: str, seed: int) -> Path:
     """Makes the run's folder: the one given, or runs/{env}__{experiment}__{seed}__{time}.
 
+    Slashes and colons of the names become hyphens there.
+
     Raises:
         CartpoleError: if the folder holds something already, or can't be made or written to.
     """
-    if run_dir:
-        folder = Path(run_dir)
-    else:
-        folder = _fresh_name(Path("runs"), f"{env}__{experiment}__{seed}__{int(time.time())}")
+    name = re.sub("[/:]", "-", f"{env}__{experiment}__{seed}__{int(time.time())}")
+    folder = Path(run_dir or Path("runs") / name)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        if run_dir:
+            folder.mkdir(parents=True, exist_ok=True)
+        else:
+            folder = _fresh(folder)
         taken = next(folder.iterdir(), None) is not None
         if not taken:
             write_atomically(folder / ".probe", lambda stream: None)
@@ -40,7 +47,13 @@ def create(run_dir: str | None, env: str, experiment: str, seed: int) -> Path:
     return folder.resolve()
 
 
-@contextmanager
+def remove_if_empty(folder: Path) -> None:
+    """Leaves no folder behind of a training that couldn't begin."""
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+
+
+@contextlib.contextmanager
 def held(folder: Path) -> Iterator[None]:
     """Keeps a second training out of a run's folder; the lock ends with the process.
 
@@ -60,12 +73,16 @@ def held(folder: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
-def _fresh_name(parent: Path, name: str) -> Path:
-    """Two runs of one second get two folders."""
-    folder, number = parent / name, 2
-    while folder.exists():
-        folder, number = parent / f"{name}_{number}", number + 1
-    return folder
+def _fresh(wanted: Path) -> Path:
+    """Makes a folder; two runs of one second get two."""
+    wanted.parent.mkdir(parents=True, exist_ok=True)
+    folder, number = wanted, 2
+    while True:
+        try:
+            folder.mkdir()
+            return folder
+        except FileExistsError:
+            folder, number = wanted.with_name(f"{wanted.name}_{number}"), number + 1
 
 
 def write_summary(path: Path, content: dict[str, Any]) -> None:
@@ -76,6 +93,17 @@ def write_summary(path: Path, content: dict[str, Any]) -> None:
     """
     text = json.dumps(content, indent=1, allow_nan=False) + "\n"
     write_atomically(path, lambda stream: stream.write(text.encode()))
+
+
+def other_versions(before: Mapping[str, str]) -> str:
+    """Where those that a training began with aren't those of now; empty if they are the same.
+
+    Args:
+        before: what `versions` gave then.
+    """
+    now = versions()
+    names = [name for name in LIBRARIES if name in before and before[name] != now[name]]
+    return ", ".join(f"{name} {before[name]} is now {now[name]}" for name in names)
 
 
 def versions() -> dict[str, str]:
@@ -90,5 +118,5 @@ def versions() -> dict[str, str]:
         "torch": torch.__version__,
         "gymnasium": gymnasium.__version__,
         "machine": platform.platform(),
-        "command": " ".join(sys.argv),
+        "command": shlex.join(sys.argv),
     }

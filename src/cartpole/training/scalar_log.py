@@ -6,18 +6,22 @@ was written, and TensorBoard's file is written anew from it: so neither has a ro
 
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from torch.utils.tensorboard import SummaryWriter
+from torch.utils.tensorboard.summary import hparams
 
 from cartpole.agents.dqn.agent import Learned
-from cartpole.errors import CartpoleError
 from cartpole.training.dqn_loop import Episode
-from cartpole.training.logs import add_table
 
 NAME = "scalars.csv"
 HEADER = "step,tag,value,wall_time\n"
 EVENTS = "events.out.tfevents.*"
+METRICS = ("eval/mean_reward", "charts/episodic_return")  # beside the settings, under HPARAMS
+
+Point = tuple[str, float, int, float]  # tag, value, step, wall time [s]
 
 
 class ScalarLog:
@@ -25,34 +29,32 @@ class ScalarLog:
 
     Args:
         folder: where both files go.
-        settings: shown as a table under TEXT.
+        settings: shown as a table under TEXT, and under HPARAMS beside those of other trainings.
         length: of the CSV [bytes] at the checkpoint that the training goes on from; 0: a new one.
+        say: is told if the CSV has lost rows since then; the training doesn't depend on them.
 
     Raises:
         OSError: if the disk refuses.
-        CartpoleError: if the CSV is shorter than it was at the checkpoint.
     """
 
-    def __init__(self, folder: Path, settings: dict[str, object], length: int = 0) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        settings: dict[str, object],
+        length: int = 0,
+        say: Callable[[str], None] = print,
+    ) -> None:
         path = folder / NAME
-        if length:
-            _cut(path, length)
+        points = _cut(path, length, say) if length else []
         for old in folder.glob(EVENTS):
             old.unlink()
         self._writer = SummaryWriter(str(folder))
-        add_table(self._writer, settings)
-        self._file = path.open("a" if length else "w", encoding="utf-8")
-        if length:
-            self._repeat(path)
-        else:
+        _add_settings(self._writer, settings)
+        for point in points:
+            self._writer.add_scalar(*point)
+        self._file = path.open("a" if points else "w", encoding="utf-8")
+        if not points:
             self._file.write(HEADER)
-
-    def _repeat(self, path: Path) -> None:
-        with path.open(encoding="utf-8") as rows:
-            next(rows)
-            for row in rows:
-                step, tag, value, wall_time = row.rstrip("\n").split(",")
-                self._writer.add_scalar(tag, float(value), int(step), float(wall_time))
 
     def add(self, step: int, values: dict[str, float]) -> None:
         """Writes one row for each tag.
@@ -106,8 +108,44 @@ class Figures:
         self._log.add(episode.steps, values)
 
 
-def _cut(path: Path, length: int) -> None:
-    size = path.stat().st_size if path.exists() else 0
-    if size < length:
-        raise CartpoleError(f"{path} has {size} bytes; at the checkpoint it had {length}")
-    os.truncate(path, length)
+def _cut(path: Path, length: int, say: Callable[[str], None]) -> list[Point]:
+    """Cuts the CSV back to a length [bytes], or to what is whole of it; returns its points."""
+    content = path.read_bytes()[:length] if path.exists() else b""
+    header, *rows = content.splitlines(keepends=True) or [b""]
+    points, whole = [], len(header)
+    for row in rows:
+        point = _point(row)
+        if point is None:
+            break
+        points.append(point)
+        whole += len(row)
+    if header.decode(errors="replace") != HEADER:
+        points, whole = [], 0
+    if whole < length:
+        say(f"{path} lacks rows that it had at the checkpoint; going on without them")
+    if content:
+        os.truncate(path, whole)
+    return points
+
+
+def _point(row: bytes) -> Point | None:
+    """A row of the CSV; None if it isn't one, or not a whole one."""
+    try:
+        step, tag, value, wall_time = row.decode().split(",")
+        return (tag, float(value), int(step), float(wall_time)) if row.endswith(b"\n") else None
+    except ValueError:  # also of bytes that are no text
+        return None
+
+
+def _add_settings(writer: SummaryWriter, settings: dict[str, object]) -> None:
+    """Shows settings as a table under TEXT, and as columns under HPARAMS."""
+    rows = "\n".join(f"|{name}|{value}|" for name, value in settings.items())
+    writer.add_text("hyperparameters", f"|parameter|value|\n|-|-|\n{rows}")
+    plain = {
+        name: value if type(value) in (int, float) else str(value)  # True would become 1
+        for name, value in settings.items()
+    }
+    # Into this file: `add_hparams` would make a run of its own beside this one.
+    file: Any = writer.file_writer  # which has no type
+    for summary in hparams(plain, dict.fromkeys(METRICS, 0.0)):
+        file.add_summary(summary)

@@ -24,6 +24,7 @@ class _Command(NamedTuple):
     help: str
 
 
+TRAIN = "train"
 COMMANDS = {
     "eval": _Command("watching", "greedy episodes of a run: mean, deviation, every episode"),
     "enjoy": _Command("watching", "watch greedy episodes in a window"),
@@ -31,18 +32,21 @@ COMMANDS = {
     "plot": _Command("drawing", "the training curves of runs as PNG"),
     "policy": _Command("drawing", "the policy over the pole's angle and velocity as PNG"),
     "compare": _Command("comparing", "groups of runs: table per seed, IQM, intervals, curves"),
-    "train": _Command("searching", "train with Stable-Baselines3"),
+    "train": _Command("training", "train by DQN, policy gradient or Stable-Baselines3"),
     "sweep": _Command("searching", "search options with Optuna"),
+    "benchmark": _Command("benchmarking", "train several seeds, or a suite; table per seed, curves"),
 }
 PACKAGE = "cartpole.workbench.commands"
 
 
 def main(argv: list[str] | None = None) -> int:
     """Does what the arguments say; returns the process's exit code."""
-    argv = plain(sys.argv[1:] if argv is None else argv)
+    argv = sys.argv[1:] if argv is None else argv
     interrupt = Interrupt().install()
     try:
-        arguments = parse(argv)
+        if argv[:1] == [TRAIN]:  # its flags depend on the algorithm
+            return int(_module(TRAIN).train(plain(argv[1:]), interrupt))
+        arguments = parse(plain(argv))
         _module(arguments.command).run(arguments, interrupt)
         return interrupt.exit_code
     except CartpoleError as error:
@@ -78,7 +82,7 @@ def parse(argv: list[str]) -> argparse.Namespace:
         own = commands.add_parser(
             name, help=command.help, description=command.help, allow_abbrev=False
         )
-        if name == named:  # the others needn't be read
+        if name == named != TRAIN:  # the others needn't be read
             _module(name).add_flags(own, name)
     return parser.parse_args(argv)
 

@@ -45,17 +45,22 @@ def learning_curves(runs: Sequence[Run]) -> Figure:
 
 def _draw(axes: Axes, name: str, colour: str, runs: Sequence[Run]) -> bool:
     curves = [curve for run in runs if (curve := _curve(run)) is not None]
-    if not curves:
-        return False
+    if curves:
+        draw_band(axes, curves, colour, f"{name} ({len(curves)} runs)")
+    return bool(curves)
+
+
+def draw_band(
+    axes: Axes, curves: Sequence[tuple[np.ndarray, np.ndarray]], colour: str, label: str
+) -> None:
+    """The mean of curves (steps, values) with its interval; dashed where some have ended."""
     grid = np.linspace(0.0, max(steps[-1] for steps, _ in curves), POINTS)
     table = np.array([_on_grid(grid, *curve) for curve in curves])  # (runs, POINTS)
     middle, low, high = _summarised(table)
     whole = ~np.isnan(table).any(axis=0)  # elsewhere some of the runs have ended: dashed
     axes.plot(grid, middle, color=colour, linewidth=1.2, linestyle="--")
-    label = f"{name} ({len(curves)} runs)"
     axes.plot(grid, np.where(whole, middle, np.nan), color=colour, linewidth=2, label=label)
     axes.fill_between(grid, low, high, color=colour, alpha=0.2, linewidth=0)
-    return True
 
 
 def _curve(run: Run) -> tuple[np.ndarray, np.ndarray] | None:

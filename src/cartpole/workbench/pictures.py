@@ -10,6 +10,7 @@ from cartpole.training.plots import WINDOW, moving_average
 from cartpole.workbench.files import new_figure
 from cartpole.workbench.runs import Run, threshold, training_curve
 
+COLOURS = ("C0", "C1", "C2", "C4", "C5", "C6", "C8", "C9")  # without red, the threshold's, and grey
 RAW_AT_MOST = 8  # runs; of more of them the single episodes would be a fog
 
 
@@ -24,11 +25,10 @@ def training_curves(runs: Sequence[Run], over: str) -> Figure:
     """
     figure = new_figure(10, 5)
     axes = figure.subplots()
-    for index, run in enumerate(runs):
-        _draw(axes, run, f"C{index % 10}", over, len(runs))
+    for index, (run, name) in enumerate(zip(runs, _names(runs), strict=True)):
+        _draw(axes, run, name, COLOURS[index % len(COLOURS)], over, len(runs))
     _draw_thresholds(axes, runs)
-    environments = sorted({run.env_id for run in runs})
-    axes.set_title(f"training in {', '.join(environments)}")
+    axes.set_title(_title(runs))
     axes.set_xlabel("episode" if over == "episodes" else "step of the environment")
     axes.set_ylabel("return")
     axes.grid(alpha=0.3)
@@ -36,13 +36,30 @@ def training_curves(runs: Sequence[Run], over: str) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, run: Run, colour: str, over: str, count: int) -> None:
+def _title(runs: Sequence[Run]) -> str:
+    if len(runs) == 1:
+        return f"training: {runs[0].label}"
+    environments = sorted({run.env_id for run in runs})
+    return f"training in {', '.join(environments)}: mean of {WINDOW} episodes"
+
+
+def _names(runs: Sequence[Run]) -> list[str]:
+    """As short as tells the runs apart."""
+    short = [f"{run.experiment}, seed {run.seed}" for run in runs]
+    longer = [run.label for run in runs]
+    for names in (short, longer):
+        if len(set(names)) == len(runs):
+            return names
+    return [f"{label} ({run.name})" for label, run in zip(longer, runs, strict=True)]
+
+
+def _draw(axes: Axes, run: Run, name: str, colour: str, over: str, count: int) -> None:
     curve = training_curve(run)
     where = curve.steps if over == "steps" else np.arange(1, len(curve.values) + 1)
     if count <= RAW_AT_MOST:
         raw = "one episode" if count == 1 else None
         axes.plot(where, curve.values, alpha=0.3, color=colour, linewidth=0.9, label=raw)
-    label = f"mean of {WINDOW} episodes" if count == 1 else f"{run.experiment}, seed {run.seed}"
+    label = f"mean of {WINDOW} episodes" if count == 1 else name
     axes.plot(where, moving_average(curve.values.tolist()), color=colour, linewidth=2, label=label)
 
 

@@ -1,6 +1,5 @@
 """What a training learned, ready to act: one `Player` for every kind of run."""
 
-import re
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -8,18 +7,13 @@ from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
-import torch
 
 from cartpole.errors import CartpoleError
+from cartpole.training import pg_policy, run_checkpoints
 from cartpole.training.dqn_policy import load_policy
-from cartpole.training.environments import make_environment
-from cartpole.training.run_checkpoints import BEST, FOLDER, LAST, read
 from cartpole.workbench.runs import POLICY_GRADIENT, Run
 
 WHICH = ("best", "last")
-PG_LAST = "policy_network.pth"
-PG_NUMBERED = re.compile(r"policy_network_episode_(\d+)\.pth")
-_DAMAGED = (RuntimeError, KeyError, ValueError, EOFError, TypeError, AttributeError)
 
 
 class Player(NamedTuple):
@@ -57,7 +51,7 @@ def load_player(
     paths = candidates(run, which)
     for path in paths:
         try:
-            state = _read(run, path)
+            state = run_checkpoints.read(path)
         except CartpoleError as error:
             say(f"{error}; taking an earlier one")
             continue
@@ -78,36 +72,7 @@ def _loader(run: Run) -> Callable[[Run, Path, dict[str, Any], dict[str, Any]], P
 
 def candidates(run: Run, which: str) -> list[Path]:
     """Checkpoints in the order in which they are tried; only those that exist."""
-    if run.algorithm == POLICY_GRADIENT:
-        return _policy_networks(run.folder)
-    numbered = sorted((run.folder / FOLDER).glob("step_*.pt"), reverse=True)
-    best, last = run.folder / BEST, run.folder / LAST
-    order = [best, last, *numbered] if which == "best" else [last, *numbered, best]
-    return [path for path in order if path.exists()]
-
-
-def _policy_networks(folder: Path) -> list[Path]:
-    numbered = {
-        int(match[1]): path
-        for path in folder.iterdir()
-        if (match := PG_NUMBERED.fullmatch(path.name))
-    }
-    paths = [folder / PG_LAST, *(numbered[key] for key in sorted(numbered, reverse=True))]
-    return [path for path in paths if path.exists()]
-
-
-def _read(run: Run, path: Path) -> dict[str, Any]:
-    if run.algorithm != POLICY_GRADIENT:
-        return read(path)
-    try:
-        state: dict[str, Any] = torch.load(path, weights_only=True)
-        if set(state) != {"fc.weight", "fc.bias"}:
-            raise ValueError("other weights")
-    except OSError as error:
-        raise CartpoleError(f"can't read {path}: {error.strerror or error}") from error
-    except _DAMAGED as error:
-        raise CartpoleError(f"{path} is damaged, or no policy network") from error
-    return state
+    return run_checkpoints.candidates(run.folder, best_first=which == "best")
 
 
 def _dqn(run: Run, path: Path, state: dict[str, Any], options: dict[str, Any]) -> Player:
@@ -124,15 +89,11 @@ def _dqn(run: Run, path: Path, state: dict[str, Any], options: dict[str, Any]) -
 def _policy_gradient(
     run: Run, path: Path, state: dict[str, Any], options: dict[str, Any]
 ) -> Player:
-    from cartpole.training.pg_run import make_agent  # it draws and logs: slow to import
-    from cartpole.training.pg_settings import Settings
-
-    agent: Any = make_agent(Settings(**run.config["settings"]))
-    agent.policy.load_state_dict(state)
-    agent.sync()
+    policy = pg_policy.load_policy(path, **options)
+    agent = policy.agent
 
     def preference(observations: np.ndarray) -> np.ndarray:
-        return np.array([1.0 - 2.0 * agent.probability_of_zero(each) for each in observations])
+        found = [agent.probabilities(each) for each in observations]
+        return np.array([each[-1] - each[0] for each in found])
 
-    env = make_environment(run.env_id, options)
-    return Player(agent.act_greedily, preference, "P(right) - P(left)", env, path)
+    return Player(agent.act_greedily, preference, "P(right) - P(left)", policy.env, path)

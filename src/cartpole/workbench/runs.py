@@ -1,13 +1,12 @@
 """Run folders as they lie on disk, whichever command wrote them: what was trained, and its curve.
 
-    dqn_train.py, workbench.py train   config.json, scalars.csv (also while it runs), summary.json
-    pg_train.py                        summary.json (at its end)
+    config.json, scalars.csv (also while it runs), summary.json (at its end)
 """
 
 import csv
 import glob
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,12 +15,13 @@ import gymnasium
 import numpy as np
 
 from cartpole.errors import CartpoleError
-from cartpole.training.dqn_settings import CONFIG_RECORD
 from cartpole.training.evaluation import NOISE
+from cartpole.training.run_record import CONFIG_RECORD
 from cartpole.training.scalar_log import NAME as SCALARS
 
 SUMMARY = "summary.json"
 RETURN, EVALUATION = "charts/episodic_return", "eval/mean_reward"  # tags
+CONFIRMED = "eval/confirmed_reward"  # of a policy that became the best one
 POLICY_GRADIENT = "pg"
 PG_ENVIRONMENT = ("cartpole/Balance-v0", {"noise": NOISE})  # what pg_train.py evaluates in
 _NOT_THERE = (FileNotFoundError, NotADirectoryError)
@@ -51,10 +51,11 @@ class Run:
 
 
 class Curve(NamedTuple):
-    """Values over steps of the environment; both (N,), float64."""
+    """Values over steps of the environment; all (N,), float64."""
 
     steps: np.ndarray
     values: np.ndarray
+    times: np.ndarray  # of the clock [s since 1970]; not a number where nobody noted it
 
 
 def open_run(folder: Path) -> Run:
@@ -67,40 +68,27 @@ def open_run(folder: Path) -> Run:
         raise CartpoleError(f"{folder} is no run folder: there is no such folder")
     folder = folder.resolve()
     config = _read_json(folder / CONFIG_RECORD)
+    if config is None:
+        raise CartpoleError(f"{folder} is no run folder: it has no {CONFIG_RECORD}")
     try:
-        if config is not None:
-            return _with_config(folder, config)
-        return _policy_gradient(folder)
+        return _with_config(folder, config)
     except (KeyError, TypeError, AttributeError) as error:
         raise CartpoleError(f"{folder} is no run folder: its record lacks {error}") from error
 
 
 def _with_config(folder: Path, config: dict[str, Any]) -> Run:
     run = config["run"]
+    env_kwargs = dict(run["env_kwargs"])
+    if (config["algorithm"], run["env_id"]) == (POLICY_GRADIENT, PG_ENVIRONMENT[0]):
+        env_kwargs |= PG_ENVIRONMENT[1]
     return Run(
         folder,
         config["algorithm"],
         run["exp_name"],
         run["env_id"],
-        dict(run["env_kwargs"]),
+        env_kwargs,
         run["seed"],
         config,
-    )
-
-
-def _policy_gradient(folder: Path) -> Run:
-    summary = _read_json(folder / SUMMARY)
-    if summary is None:
-        raise CartpoleError(
-            f"{folder} is no run folder: it has neither {CONFIG_RECORD} nor {SUMMARY} "
-            "(pg_train.py writes that at its end)"
-        )
-    settings = summary["settings"]
-    experiment = f"{POLICY_GRADIENT}-{settings.get('algorithm', 'document')}"
-    env_id, env_kwargs = PG_ENVIRONMENT
-    record = {name: summary[name] for name in ("settings", "hyperparameters")}
-    return Run(
-        folder, POLICY_GRADIENT, experiment, env_id, dict(env_kwargs), settings["seed"], record
     )
 
 
@@ -125,34 +113,44 @@ def summary_of(run: Run) -> dict[str, Any]:
     return _read_json(run.folder / SUMMARY) or {}
 
 
-def find_runs(patterns: Sequence[str]) -> list[Run]:
+def find_runs(patterns: Sequence[str], say: Callable[[str], None]) -> list[Run]:
     """The runs of folders, of patterns such as 'runs/*dqn*', and of folders that hold runs.
 
     What matches a pattern or lies in a folder but is no run is passed over.
 
+    Args:
+        say: is told of runs that are passed over because their record is damaged.
+
     Raises:
-        CartpoleError: if one of them has no run.
+        CartpoleError: if one of them has no run, or is a run with a damaged record.
     """
     found: dict[Path, Run] = {}
     for pattern in patterns:
-        runs = _matching(pattern)
+        runs = _matching(pattern, say)
         if not runs:
             raise CartpoleError(f"there is no run folder at {pattern}")
         found.update((run.folder, run) for run in runs)
     return list(found.values())
 
 
-def _matching(pattern: str) -> list[Run]:
+def _matching(pattern: str, say: Callable[[str], None]) -> list[Run]:
     path = Path(pattern)
     if is_run(path):
         return [open_run(path)]
     inside = glob.glob(pattern) if not path.is_dir() else [str(each) for each in path.iterdir()]
-    return [open_run(Path(each)) for each in sorted(inside) if is_run(Path(each))]
+    found = []
+    for folder in map(Path, sorted(inside)):
+        if is_run(folder):
+            try:
+                found.append(open_run(folder))
+            except CartpoleError as error:  # one damaged run costs no other
+                say(f"{error}; passed over")
+    return found
 
 
 def is_run(folder: Path) -> bool:
     """Whether a training wrote its record there."""
-    return any((folder / name).is_file() for name in (CONFIG_RECORD, SUMMARY))
+    return (folder / CONFIG_RECORD).is_file()
 
 
 def training_curve(run: Run) -> Curve:
@@ -167,11 +165,15 @@ def training_curve(run: Run) -> Curve:
     return curve
 
 
-def evaluation_curve(run: Run) -> Curve:
-    """The mean returns of the evaluations during the training; may be empty."""
+def evaluation_curve(run: Run, tag: str = EVALUATION) -> Curve:
+    """The mean returns of the evaluations during the training; may be empty.
+
+    Args:
+        tag: EVALUATION for all, CONFIRMED for those that chose the best policy.
+    """
     if not (run.folder / SCALARS).exists():
-        return Curve(np.empty(0), np.empty(0))
-    return _scalars(run, EVALUATION)
+        return Curve(*np.empty((3, 0)))
+    return _scalars(run, tag)
 
 
 def _scalars(run: Run, tag: str) -> Curve:
@@ -179,7 +181,7 @@ def _scalars(run: Run, tag: str) -> Curve:
     try:
         with path.open(newline="", encoding="utf-8") as file:
             points = [
-                (float(row["step"]), float(row["value"]))
+                (float(row["step"]), float(row["value"]), float(row["wall_time"]))
                 for row in csv.DictReader(file)
                 # A training that runs may not have written the last line's end yet.
                 if row["tag"] == tag and row["wall_time"]
@@ -188,13 +190,14 @@ def _scalars(run: Run, tag: str) -> Curve:
         raise CartpoleError(f"can't read {path}: {error.strerror}") from error
     except (KeyError, ValueError, TypeError, csv.Error) as error:
         raise CartpoleError(f"{path} isn't the table of a training: {error}") from error
-    return Curve(*np.array(points, dtype=float).reshape(-1, 2).T)
+    return Curve(*np.array(points, dtype=float).reshape(-1, 3).T)
 
 
 def _from_summary(run: Run) -> Curve:
     summary = summary_of(run)
     lengths, returns = summary.get("lengths", []), summary.get("returns", [])
-    return Curve(np.cumsum(np.asarray(lengths, float)), np.asarray(returns, float))
+    steps = np.cumsum(np.asarray(lengths, float))
+    return Curve(steps, np.asarray(returns, float), np.full(len(steps), np.nan))
 
 
 def threshold(env_id: str) -> float | None:

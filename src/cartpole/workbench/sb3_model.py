@@ -5,6 +5,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import torch
 from gymnasium import spaces
 
 from cartpole.errors import CartpoleError
@@ -55,15 +56,14 @@ def make_model(choice: SB3Choice, envs: int | None = None) -> Any:
     from stable_baselines3.common.vec_env import DummyVecEnv
 
     run = choice.run
-    first = make_environment(run.env_id, run.env_kwargs)
-    try:
-        check_fit(choice.algorithm, run.env_id, first.action_space)
-    finally:
-        first.close()
     vector = DummyVecEnv([_maker(choice)] * (envs or run.n_envs))
     try:
+        check_fit(choice.algorithm, run.env_id, vector.action_space)
         return _make(choice, vector)
-    except (TypeError, ValueError, AssertionError, RuntimeError) as error:
+    except CartpoleError:
+        vector.close()
+        raise
+    except (TypeError, ValueError, AssertionError, RuntimeError, ArithmeticError) as error:
         vector.close()
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise CartpoleError(f"{choice.algorithm} can't be made: {text}") from error
@@ -77,12 +77,18 @@ def _maker(choice: SB3Choice) -> Callable[[], gymnasium.Env[Any, Any]]:
 
 
 def _make(choice: SB3Choice, vector: Any) -> Any:
+    torch.empty(0, device=choice.run.device)  # where there is none, the model would take the CPU
     own = dict(choice.hyperparameters)
-    network = {name: own.pop(name) for name in NETWORK if name in own}
+    network = {name: own.pop(name, None) for name in NETWORK}
+    network = {name: value for name, value in network.items() if value is not None}
+    if "net_arch" in network:
+        network["net_arch"] = _layers(network["net_arch"])
     if choice.run.lr_schedule == "linear":
-        own["learning_rate"] = linear(float(own.get("learning_rate", 3e-4)))
+        own["learning_rate"] = linear(_rate(own["learning_rate"]))
     if own.get("action_noise") is not None:
         own["action_noise"] = _noise(own["action_noise"], vector.action_space)
+    if isinstance(own.get("train_freq"), list):  # a number and a unit; neither YAML nor JSON has tuples
+        own["train_freq"] = tuple(own["train_freq"])
     return algorithm_class(choice.algorithm)(
         "MlpPolicy",
         vector,
@@ -91,6 +97,22 @@ def _make(choice: SB3Choice, vector: Any) -> Any:
         policy_kwargs=network or None,
         **own,
     )
+
+
+def _layers(value: Any) -> Any:
+    """Widths of layers, also as the text 64,64; other forms are left to Stable-Baselines3."""
+    if not isinstance(value, str | int):
+        return value
+    try:
+        return [int(each) for each in str(value).split(",")]
+    except ValueError:
+        raise CartpoleError(f"net_arch is whole numbers, as in 64,64, not {value!r}") from None
+
+
+def _rate(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise CartpoleError(f"learning_rate is a number, not {value!r}")
+    return float(value)
 
 
 def linear(start: float) -> Callable[[float], float]:

@@ -1,13 +1,16 @@
 """What a training with Stable-Baselines3 learned, ready to act.
 
-The checkpoint holds the policy's weights alone, and the policy is made anew from the recorded
-settings: so a foreign file can't run code, as it could in Stable-Baselines3's own zip.
+The checkpoint holds plain tensors, and the policy is made anew from the recorded settings: so a
+foreign file can't run code, as it could in Stable-Baselines3's own zip.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
+import torch
 from gymnasium import spaces
 
 from cartpole.errors import CartpoleError
@@ -15,7 +18,7 @@ from cartpole.training.environments import make_environment
 from cartpole.workbench.players import Player
 from cartpole.workbench.runs import Run
 from cartpole.workbench.sb3_model import greedy, make_model
-from cartpole.workbench.sb3_settings import from_record
+from cartpole.workbench.sb3_settings import ON_POLICY, from_record
 
 
 def load_sb3(run: Run, path: Path, state: dict[str, Any], options: dict[str, Any]) -> Player:
@@ -25,9 +28,10 @@ def load_sb3(run: Run, path: Path, state: dict[str, Any], options: dict[str, Any
         CartpoleError: if Stable-Baselines3 isn't installed, or the weights are others.
     """
     choice = from_record(run.config, str(run.folder))
-    choice.hyperparameters.pop("buffer_size", None)  # nothing is learned, so nothing is kept
-    if choice.algorithm not in ("ppo", "a2c"):
-        choice.hyperparameters["buffer_size"] = 1
+    if choice.algorithm in ON_POLICY:  # of one environment as many steps as of all
+        choice.hyperparameters["n_steps"] *= choice.run.n_envs
+    else:
+        choice.hyperparameters["buffer_size"] = 1  # nothing is learned, so nothing is kept
     model = make_model(choice, envs=1)
     model.get_env().close()
     try:
@@ -35,11 +39,34 @@ def load_sb3(run: Run, path: Path, state: dict[str, Any], options: dict[str, Any
     except (RuntimeError, KeyError) as error:
         raise CartpoleError(f"{path} isn't a checkpoint of {run.folder}") from error
     env = make_environment(run.env_id, options)
-    discrete = isinstance(env.action_space, spaces.Discrete)
+    preference, meaning = _preference(model, choice.algorithm, env.action_space)
+    return Player(greedy(model), preference, meaning, env, path)
 
-    def preference(observations: np.ndarray) -> np.ndarray:
-        actions = model.policy.predict(observations, deterministic=True)[0]
-        flat = np.asarray(actions, float).reshape(len(observations), -1)[:, 0]
-        return 2.0 * flat - 1.0 if discrete else flat
 
-    return Player(greedy(model), preference, "action", env, path)
+def _preference(
+    model: Any, algorithm: str, space: gymnasium.Space[Any]
+) -> tuple[Callable[[np.ndarray], np.ndarray], str]:
+    """What it would rather do in observations (N, D), as (N,), and what these numbers mean."""
+    if not isinstance(space, spaces.Discrete):
+        return lambda seen: _first(model.policy.predict(seen, deterministic=True)[0]), "action"
+    if algorithm in ON_POLICY:
+        return lambda seen: _spread(_probabilities(model, seen)), "P(right) - P(left)"
+    return lambda seen: _spread(model.q_net(_tensor(seen))), "Q(right) - Q(left)"
+
+
+def _probabilities(model: Any, observations: np.ndarray) -> torch.Tensor:
+    found: torch.Tensor = model.policy.get_distribution(_tensor(observations)).distribution.probs
+    return found
+
+
+def _tensor(observations: np.ndarray) -> torch.Tensor:
+    return torch.as_tensor(observations, dtype=torch.float32)
+
+
+def _first(actions: np.ndarray) -> np.ndarray:
+    return np.asarray(actions, float).reshape(len(actions), -1)[:, 0]
+
+
+def _spread(values: torch.Tensor) -> np.ndarray:
+    """The last action's against the first one's, of (N, actions)."""
+    return np.asarray((values[:, -1] - values[:, 0]).detach().cpu())

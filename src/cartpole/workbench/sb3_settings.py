@@ -10,15 +10,22 @@ import yaml
 
 from cartpole.errors import CartpoleError
 from cartpole.option import check_options, option
+from cartpole.training import run_folder
 from cartpole.training.config_file import default_file, read_section
 from cartpole.training.options import Options, key_values, unknown
+from cartpole.training.run_record import read_record
 from cartpole.workbench.extras import need
+from cartpole.workbench.sb3_limits import check_limits
 
 CONFIG = "sb3.yaml"
+COMMAND = "workbench.py train"
 CLASSES = {"ppo": "PPO", "a2c": "A2C", "sac": "SAC", "td3": "TD3", "ddpg": "DDPG", "dqn-sb3": "DQN"}
 ON_POLICY = ("ppo", "a2c")
 OURS = ("self", "policy", "env", "seed", "device", "verbose", "tensorboard_log", "_init_setup_model",
-        "stats_window_size", "policy_kwargs")  # fmt: skip
+        "stats_window_size", "policy_kwargs", "replay_buffer_class", "replay_buffer_kwargs",
+        "rollout_buffer_class", "rollout_buffer_kwargs")  # fmt: skip
+SPECIAL: tuple[str, ...] = ("config", "params", "resume")
+EXTENDING = ("total_timesteps", "device")  # may be changed when resuming
 NETWORK = ("net_arch", "log_std_init")  # of policy_kwargs, given like any other option
 
 
@@ -42,6 +49,14 @@ class SB3Run:
     run_dir: str = option("", "a new or empty folder for all results (runs/ENV__EXP__SEED__TIME)")
     eval_frequency: int = option(10_000, "steps between two evaluations; 0: never", 0, 2**53)
     eval_episodes: int = option(10, "greedy episodes of an evaluation", 1, 10**6)
+    confirm_episodes: int = option(
+        0, "greedy episodes that a policy needs to become the best one; 0: those of the evaluation",
+        0, 10**6,
+    )  # fmt: skip
+    checkpoint_frequency: int = option(
+        10_000, "steps between two checkpoints; 0: with evaluations and at the end", 0, 2**53
+    )
+    keep_checkpoints: int = option(3, "the newest ones are kept; 0: all", 0, 10**6)
     device: str = option("cpu", "torch's, as in cpu or cuda")
 
     def __post_init__(self) -> None:
@@ -51,11 +66,12 @@ class SB3Run:
 
 
 class SB3Choice(NamedTuple):
-    """What the user wants."""
+    """What the user wants: a new training by these settings, or an old one resumed."""
 
     algorithm: str  # a name of CLASSES
     run: SB3Run
-    hyperparameters: dict[str, Any]  # of the algorithm's class, as in the file
+    hyperparameters: dict[str, Any]  # all of the algorithm's class
+    resume: Path | None = None
 
 
 OPTIONS = Options(SB3Run)
@@ -73,37 +89,81 @@ def algorithm_class(name: str) -> Any:
     return getattr(stable_baselines3, CLASSES[name])
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Those of the command `train`."""
-    parser.add_argument("--algo", required=True, choices=tuple(CLASSES), help="the algorithm")
-    parser.add_argument("--config", type=Path, metavar="FILE", help=f"options (config/{CONFIG})")
-    parser.add_argument("--params", nargs="+", default=[], metavar="KEY=VALUE",
-                        help="any option of this list or of the algorithm's class")  # fmt: skip
-    OPTIONS.add_flags(parser)
-
-
-def choose(arguments: argparse.Namespace) -> SB3Choice:
-    """Defaults, overridden by the file's section, --params and flags, in this order.
+def parser(name: str) -> argparse.ArgumentParser:
+    """All flags of `train` for an algorithm; none has a default of its own.
 
     Raises:
+        CartpoleError: if the algorithm isn't installed.
+    """
+    result = argparse.ArgumentParser(
+        f"{COMMAND} --algo {name}",
+        description=f"Trains with Stable-Baselines3's {CLASSES[name]}.",
+        allow_abbrev=False,
+        argument_default=argparse.SUPPRESS,
+    )
+    result.add_argument("--config", type=Path, metavar="FILE", help=f"options (config/{CONFIG})")
+    result.add_argument("--params", nargs="+", metavar="KEY=VALUE", help="options by name")
+    result.add_argument("--resume", type=Path, metavar="RUN", help="go on with a training: with its "
+                        "networks, optimizers, replay buffer and figures, but with a new episode "
+                        "and other random numbers, so not to the same bits")  # fmt: skip
+    OPTIONS.add_flags(result)
+    own = result.add_argument_group(f"{CLASSES[name]}'s own, explained in its documentation")
+    for key, default in defaults(name).items():
+        flag, text = f"--{key.replace('_', '-')}", f"default {default}".replace("%", "%%")
+        if isinstance(default, bool):
+            own.add_argument(flag, action=argparse.BooleanOptionalAction, help=text)
+        else:
+            own.add_argument(flag, type=plain_value, metavar="VALUE", help=text)
+    return result
+
+
+def choose(name: str, flags: list[str]) -> SB3Choice:
+    """Defaults, overridden by the file's section, --params and flags, in this order.
+
+    Args:
+        name: of the algorithm.
+        flags: as on the command line.
+
+    Raises:
+        SystemExit: with code 2 and a usage line, if a flag is wrong; with 0 after --help.
         CartpoleError: if an option is unknown or wrong, or the algorithm isn't installed.
     """
-    name = arguments.algo
-    flags = {key: value for key, value in vars(arguments).items() if key in OPTIONS.names}
-    listed = {
-        key: yaml.safe_load(value)
-        for key, value in key_values(arguments.params, "--params").items()
-    }
-    path = arguments.config or default_file(CONFIG)
-    env_id = flags.get("env_id") or listed.get("env_id") or SB3Run().env_id
+    reading = parser(name)
+    known, strange = reading.parse_known_args(flags)
+    if strange:
+        names = [f"--{key.replace('_', '-')}" for key in (*OPTIONS.names, *defaults(name))]
+        reading.error(unknown("flag", strange[0].partition("=")[0], names))
+    given = vars(known)
+    special = {key: given.pop(key) for key in SPECIAL if key in given}
+    if "resume" in special:
+        return _resumed(name, special, given)
+    listed = key_values(special.get("params", []), "--params")
+    given = {key: plain_value(value) for key, value in listed.items()} | given
+    path = special.get("config") or default_file(CONFIG)
+    env_id = given.get("env_id") or SB3Run().env_id
     section = read_section(path, f"{name} {env_id}", None)
     merged = {"exp_name": name, "env_id": env_id}
-    hyperparameters: dict[str, Any] = {}
-    for values, origin in ((section, str(path)), (listed, "--params")):
+    hyperparameters = defaults(name)
+    for values, origin in ((section, str(path)), (given, "--params")):
         run, own = _separated(name, values, origin)
         merged |= run
         hyperparameters |= own
-    return SB3Choice(name, OPTIONS.make(SB3Run, merged | flags), hyperparameters)
+    check_limits(hyperparameters)
+    return SB3Choice(name, OPTIONS.make(SB3Run, merged), hyperparameters)
+
+
+def _resumed(name: str, special: dict[str, Any], given: dict[str, Any]) -> SB3Choice:
+    others = [key for key in (*special, *given) if key not in ("resume", *EXTENDING)]
+    if others:
+        raise CartpoleError(
+            f"a resumed training keeps its settings: --resume allows no "
+            f"--{others[0].replace('_', '-')}, only --total-timesteps and --device"
+        )
+    folder = special["resume"]
+    choice = from_record(read_record(folder), str(folder))
+    if choice.algorithm != name:
+        raise CartpoleError(f"{folder} was trained by {choice.algorithm}, not by {name}")
+    return choice._replace(run=replace(choice.run, **given), resume=folder)
 
 
 def _separated(
@@ -111,7 +171,7 @@ def _separated(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Options of the run, and those of the algorithm's class."""
     run = {key: value for key, value in values.items() if key in OPTIONS.names}
-    own = {key: value for key, value in values.items() if key not in OPTIONS.names}
+    own = {key: plain_value(values[key]) for key in values if key not in OPTIONS.names}
     known = hyperparameter_names(name)
     for key in own:
         if key not in known:
@@ -120,10 +180,36 @@ def _separated(
     return OPTIONS.read(run, origin), own
 
 
+def plain_value(value: Any) -> Any:
+    """A text as a YAML value; 1e-3 is a number, too, which YAML writes 1.0e-3."""
+    if not isinstance(value, str):
+        return value
+    try:
+        value = yaml.safe_load(value)
+    except yaml.YAMLError as error:
+        raise CartpoleError(f"{value!r} isn't a value: {' '.join(str(error).split())}") from error
+    try:
+        number = float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
+    is_whole = isinstance(value, str) and number.is_integer() and abs(number) >= 1
+    return int(number) if is_whole else number
+
+
+def defaults(name: str) -> dict[str, Any]:
+    """The options of the algorithm's class, and of its network, as they are if nobody says more.
+
+    Raises:
+        CartpoleError: if it isn't installed.
+    """
+    parameters = inspect.signature(algorithm_class(name).__init__).parameters
+    own = {key: each.default for key, each in parameters.items() if key not in OURS}
+    return own | dict.fromkeys(NETWORK)
+
+
 def hyperparameter_names(name: str) -> list[str]:
     """Of the algorithm's class, and of its network."""
-    parameters = inspect.signature(algorithm_class(name).__init__).parameters
-    return [*(key for key in parameters if key not in OURS), *NETWORK]
+    return list(defaults(name))
 
 
 def record(choice: SB3Choice) -> dict[str, Any]:
@@ -135,18 +221,21 @@ def record(choice: SB3Choice) -> dict[str, Any]:
     }
 
 
-def from_record(content: dict[str, Any], origin: str) -> SB3Choice:
+def from_record(content: Any, origin: str) -> SB3Choice:
     """What `record` gave, also after JSON.
 
     Raises:
         CartpoleError: if it is something else.
     """
-    if content.get("algorithm") not in CLASSES or "sb3" not in content:
+    known = isinstance(content, dict) and {"algorithm", "run", "sb3"} <= set(content)
+    if not known or content["algorithm"] not in CLASSES:
         raise CartpoleError(f"{origin} isn't the configuration of a training known here")
     run = OPTIONS.make(SB3Run, OPTIONS.read(content["run"], origin))
     return SB3Choice(content["algorithm"], run, dict(content["sb3"]))
 
 
-def with_folder(choice: SB3Choice, folder: Path) -> SB3Choice:
-    """The same training with its results in a folder."""
-    return choice._replace(run=replace(choice.run, run_dir=str(folder)))
+def sb3_versions() -> dict[str, str]:
+    """What the figures depend on."""
+    from stable_baselines3 import __version__
+
+    return {**run_folder.versions(), "stable_baselines3": __version__}

@@ -8,10 +8,9 @@ from cartpole.errors import CartpoleError
 from cartpole.training import dqn_settings
 from cartpole.training.dqn_cli import run as run_dqn
 from cartpole.training.interrupt import Interrupt
+from cartpole.workbench.algorithms import DQN
 from cartpole.workbench.runs import open_run, summary_of
 from cartpole.workbench.sweep import Trainer
-
-DQN = "dqn"
 
 
 def names_of(algorithm: str) -> list[str]:
@@ -50,14 +49,11 @@ def _dqn(values: dict[str, Any], interrupt: Interrupt) -> None:
 
 
 def _sb3(algorithm: str, values: dict[str, Any], interrupt: Interrupt) -> None:
-    import argparse
-
     from cartpole.workbench import sb3_settings
     from cartpole.workbench.sb3_training import train
 
     pairs = [f"{name}={value}" for name, value in values.items()]
-    arguments = argparse.Namespace(algo=algorithm, config=None, params=pairs)
-    train(sb3_settings.choose(arguments), interrupt)
+    train(sb3_settings.choose(algorithm, ["--params", *pairs]), interrupt)
 
 
 def _best(folder: Path) -> float | None:

@@ -1,7 +1,6 @@
 """All that the algorithm can be told, each option with its default."""
 
 import dataclasses
-import math
 from dataclasses import dataclass
 
 from cartpole.errors import CartpoleError
@@ -34,7 +33,7 @@ class DQNSettings:
     dueling: bool = option(False, "the network tells the state's value from the advantages")
     hidden_sizes: tuple[int, ...] = option((128, 128), "units of the hidden layers")
     loss: str = option("huber", "of the TD error", choices=("mse", "huber"))
-    max_grad_norm: float = option(10.0, "clips the gradient's norm; 0: never", 0, math.inf)
+    max_grad_norm: float = option(10.0, "clips the gradient's norm; 0: never", 0, 1e18)
     reward_scale: float = option(1.0, "rewards are multiplied by it", -1e9, 1e9)
     target_network_frequency: int = option(
         250, "gradient steps between two updates of the target network", 1, 2**31

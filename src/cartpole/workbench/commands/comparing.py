@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """
     for path in filter(None, (arguments.out, arguments.json)):
         check_writable(path)
-    runs = find_runs(arguments.runs)
+    runs = find_runs(arguments.runs, warn)
     rows = [examine(run, arguments.episodes, arguments.checkpoint, warn) for run in runs]
     groups = by_group(rows)
     ordered = [row for each in groups.values() for row in each]

@@ -8,7 +8,7 @@ from cartpole.workbench.commands.shared import add_policy_flags, env_options
 from cartpole.workbench.episodes import TEST_SEED
 from cartpole.workbench.files import check_writable, write_figure
 from cartpole.workbench.pictures import training_curves
-from cartpole.workbench.players import load_player
+from cartpole.workbench.players import load_player, warn
 from cartpole.workbench.runs import find_runs, open_run
 from cartpole.workbench.state_plane import plane_of, policy_picture
 
@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         CartpoleError: if something is wrong with a run or the file.
     """
     if arguments.command == "plot":
-        runs = find_runs(arguments.runs)
+        runs = find_runs(arguments.runs, warn)
         write_figure(arguments.out, training_curves(runs, arguments.over))
     else:
         _policy(arguments)

@@ -1,4 +1,4 @@
-"""train and sweep: new trainings, with Stable-Baselines3 and in search of options."""
+"""sweep: many trainings, in search of options."""
 
 import argparse
 import time
@@ -7,18 +7,16 @@ from typing import Any
 
 from cartpole.training.interrupt import Interrupt
 from cartpole.workbench import sb3_settings
+from cartpole.workbench.algorithms import DQN
 from cartpole.workbench.commands.shared import number
 from cartpole.workbench.extras import need
 from cartpole.workbench.sweep import Sweep, run_sweep
 from cartpole.workbench.sweep_ranges import read_ranges
-from cartpole.workbench.sweep_trainers import DQN, names_of, trainer
+from cartpole.workbench.sweep_trainers import names_of, trainer
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
-    """Flags of one of the two."""
-    if command == "train":
-        sb3_settings.add_flags(parser)
-        return
+    """Its flags."""
     add = parser.add_argument
     add("--algo", choices=(DQN, *sb3_settings.CLASSES), default=DQN, help="default dqn")
     add("--env-id", default="CartPole-v1", metavar="ID", help="default CartPole-v1")
@@ -32,21 +30,11 @@ def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """One of the two.
+    """Searches.
 
     Raises:
         CartpoleError: if something fails that the user can mend.
     """
-    if arguments.command == "sweep":
-        _sweep(arguments, interrupt)
-        return
-    need("stable_baselines3", "Stable-Baselines3", "train")
-    from cartpole.workbench.sb3_training import train
-
-    train(sb3_settings.choose(arguments), interrupt)
-
-
-def _sweep(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     need("optuna", "Optuna", "sweep")
     algorithm, env_id = arguments.algo, arguments.env_id
     ranges = read_ranges(arguments.ranges, algorithm, env_id, names_of(algorithm))

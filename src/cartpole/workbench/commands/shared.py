@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from cartpole.errors import CartpoleError
-from cartpole.training.options import key_values
+from cartpole.training.dqn_settings import OPTIONS
 from cartpole.workbench.players import WHICH
 
 
@@ -17,22 +16,17 @@ def add_policy_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=number(0), default=0, metavar="N",
                         help="of the episodes (default 0)")  # fmt: skip
     parser.add_argument("--env-kwargs", nargs="+", default=[], metavar="KEY=VALUE",
-                        help="options of the environment, as backend=ros")  # fmt: skip
+                        help="options of the environment, as backend=ros; several with commas")  # fmt: skip
 
 
 def env_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The environment's options as values.
+    """The environment's options as values, read as `train` reads them.
 
     Raises:
         CartpoleError: if one isn't KEY=VALUE.
     """
-    import yaml
-
-    pairs = key_values(arguments.env_kwargs, "--env-kwargs")
-    try:
-        return {name: yaml.safe_load(text) for name, text in pairs.items()}
-    except yaml.YAMLError as error:
-        raise CartpoleError(f"--env-kwargs: {' '.join(str(error).split())}") from error
+    text = ",".join(arguments.env_kwargs)
+    return dict(OPTIONS.read({"env_kwargs": text}, "--env-kwargs").get("env_kwargs", {}))
 
 
 def number(lowest: int) -> Any:

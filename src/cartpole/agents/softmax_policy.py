@@ -1,0 +1,128 @@
+"""Softmax policies over single actions: the network that learns, and its quick twins that act.
+
+For one observation NumPy is several times as fast as torch.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+import torch
+from torch import nn
+
+
+class SoftmaxNetwork(nn.Module):
+    """Prepared observation (N, D) to the probabilities (N, A) of the actions.
+
+    Args:
+        observations: D.
+        actions: A.
+        hidden: units in a layer of tanh between them; 0: none.
+    """
+
+    def __init__(self, observations: int, actions: int, hidden: int) -> None:
+        super().__init__()
+        if hidden:
+            self.hidden = nn.Linear(observations, hidden)
+        self.fc = nn.Linear(hidden or observations, actions)
+        self._has_hidden = bool(hidden)
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        if self._has_hidden:
+            observations = torch.tanh(self.hidden(observations))
+        return torch.softmax(self.fc(observations), dim=1)
+
+    @property
+    def has_hidden(self) -> bool:
+        """Whether there is a layer between observation and action."""
+        return self._has_hidden
+
+
+class Actor(Protocol):
+    """Acts by a copy of a network's weights; observations (D,) as the environment gives them."""
+
+    def probabilities(self, observation: np.ndarray) -> np.ndarray:
+        """Of the actions: (A,), float64."""
+        ...
+
+    def draw(self, observation: np.ndarray, uniform: float) -> int:
+        """The action that a number drawn from [0, 1) leads to."""
+        ...
+
+    def greedy(self, observation: np.ndarray) -> int:
+        """The most probable action."""
+        ...
+
+
+class PairActor:
+    """Two actions, no hidden layer: one dot product tells which.
+
+    Args:
+        network: without a hidden layer, for two actions.
+        factors: that observations are multiplied by, (D,).
+    """
+
+    def __init__(self, network: SoftmaxNetwork, factors: np.ndarray) -> None:
+        weight = network.fc.weight.detach().numpy()  # (2, D)
+        bias = network.fc.bias.detach().numpy()  # (2,)
+        self._weight = (weight[1] - weight[0]) * factors
+        self._bias = float(bias[1] - bias[0])
+
+    def _first(self, observation: np.ndarray) -> float:
+        preference = float(self._weight @ observation) + self._bias
+        return 1.0 / (1.0 + math.exp(min(preference, 700.0)))
+
+    def probabilities(self, observation: np.ndarray) -> np.ndarray:
+        """See `Actor`."""
+        first = self._first(observation)
+        return np.array([first, 1.0 - first])
+
+    def draw(self, observation: np.ndarray, uniform: float) -> int:
+        """See `Actor`."""
+        return 0 if uniform < self._first(observation) else 1
+
+    def greedy(self, observation: np.ndarray) -> int:
+        """See `Actor`."""
+        return 0 if self._first(observation) >= 0.5 else 1
+
+
+class SoftmaxActor:
+    """Any number of actions, with or without a hidden layer.
+
+    Args:
+        network: the one whose weights are copied.
+        prepare: what an observation goes through before the network sees it.
+    """
+
+    def __init__(
+        self, network: SoftmaxNetwork, prepare: Callable[[np.ndarray], np.ndarray]
+    ) -> None:
+        self._prepare = prepare
+        layers = [network.hidden, network.fc] if network.has_hidden else [network.fc]
+        self._layers = [
+            (layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy())
+            for layer in layers
+        ]
+
+    def _preferences(self, observation: np.ndarray) -> np.ndarray:
+        seen = self._prepare(observation)
+        for weight, bias in self._layers[:-1]:
+            seen = np.tanh(weight @ seen + bias)
+        weight, bias = self._layers[-1]
+        return np.asarray(weight @ seen + bias, np.float64)
+
+    def probabilities(self, observation: np.ndarray) -> np.ndarray:
+        """See `Actor`."""
+        preferences = self._preferences(observation)
+        weights = np.exp(preferences - preferences.max())
+        return weights / weights.sum()
+
+    def draw(self, observation: np.ndarray, uniform: float) -> int:
+        """See `Actor`."""
+        ends = np.cumsum(self.probabilities(observation))
+        return min(int(np.searchsorted(ends, uniform, side="right")), len(ends) - 1)
+
+    def greedy(self, observation: np.ndarray) -> int:
+        """See `Actor`."""
+        return int(np.argmax(self._preferences(observation)))

@@ -1,0 +1,159 @@
+"""benchmark: one training or several variants of it, over several seeds."""
+
+import argparse
+import datetime
+import json
+import os
+import platform
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from cartpole.errors import CartpoleError
+from cartpole.training import run_folder
+from cartpole.training.interrupt import Interrupt
+from cartpole.training.options import key_values
+from cartpole.workbench import benchmark
+from cartpole.workbench.algorithms import ALGORITHMS, DQN
+from cartpole.workbench.commands.shared import number
+from cartpole.workbench.curves import learning_curves
+from cartpole.workbench.files import write_figure, write_file, write_json
+from cartpole.workbench.panels import evaluation_panels
+from cartpole.workbench.players import warn
+from cartpole.workbench.runs import Run, is_run, open_run, threshold
+from cartpole.workbench.suites import Suite, make_variant, read_suite
+from cartpole.workbench.trainings import Job, Trainings
+
+RECORD = "suite.json"
+SEEDS = 5
+
+
+def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
+    """Its flags."""
+    add = parser.add_argument
+    add("suite", nargs="?", metavar="SUITE",
+        help="a section of config/benchmark.yaml; without one, the training that --algo, --env-id "
+        "and --params name")  # fmt: skip
+    add("--suites", type=Path, metavar="FILE", help="other suites than config/benchmark.yaml's")
+    add("--algo", choices=ALGORITHMS, default=DQN, help="default dqn")
+    add("--env-id", metavar="ID", help="default CartPole-v1")
+    add("--params", nargs="+", default=[], metavar="KEY=VALUE", help="options of the training")
+    add("--seeds", type=number(1), metavar="N", help=f"how many (the suite's, or {SEEDS})")
+    add("--first-seed", type=number(0), default=0, metavar="N", help="default 0")
+    add("--jobs", type=number(1), default=1, metavar="N",
+        help="trainings at a time, each on one core (default 1)")  # fmt: skip
+    add("--episodes", type=number(1), default=100, metavar="N",
+        help="unseen greedy episodes for each policy's figure (default 100)")  # fmt: skip
+    add("--out", type=Path, metavar="FOLDER",
+        help="for runs, tables and curves; one that was interrupted is gone on with "
+        "(runs/benchmark/SUITE)")  # fmt: skip
+
+
+def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
+    """Trains what isn't trained yet, then writes results.md, results.json and two pictures.
+
+    Raises:
+        CartpoleError: if a name is unknown, the folder holds another benchmark, or no run could
+            be made.
+    """
+    suite = _suite(arguments)
+    folder = (arguments.out or Path("runs/benchmark") / suite.name).resolve()
+    seeds = range(arguments.first_seed, arguments.first_seed + (arguments.seeds or suite.seeds))
+    _claim(folder, suite)
+    jobs = [
+        Job(variant, seed, folder / variant.name / f"seed_{seed}")
+        for variant in suite.variants
+        for seed in seeds
+    ]
+    interrupt.defer()
+    Trainings(_say).run(jobs, arguments.jobs, interrupt)
+    if interrupt.requested():
+        _say("interrupted; the same command goes on")
+        return
+    _report(folder, suite, jobs, arguments)
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
+
+
+def _suite(arguments: argparse.Namespace) -> Suite:
+    if arguments.suite:
+        if arguments.env_id or arguments.params:
+            raise CartpoleError("a suite says itself what is trained: no --env-id, no --params")
+        return read_suite(arguments.suite, arguments.suites)
+    env_id = arguments.env_id or "CartPole-v1"
+    options = {"algo": arguments.algo, "env_id": env_id, **key_values(arguments.params, "--params")}
+    name = f"{arguments.algo}__{env_id.replace('/', '-').replace(':', '-')}"
+    return Suite(name, "", SEEDS, (make_variant("--params", name, options),))
+
+
+def _claim(folder: Path, suite: Suite) -> None:
+    """Notes what the folder's runs are, or checks that they are the same."""
+    path, wanted = folder / RECORD, [asdict(variant) for variant in suite.variants]
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        if folder.is_dir() and any(folder.iterdir()):
+            raise CartpoleError(f"{folder} holds something else; name another folder") from None
+        write_json(path, wanted)
+        return
+    except (OSError, ValueError) as error:
+        raise CartpoleError(f"can't read {path}: {error}") from error
+    if found != json.loads(json.dumps(wanted)):
+        raise CartpoleError(f"{folder} holds runs with other options; name another folder")
+
+
+def _report(folder: Path, suite: Suite, jobs: list[Job], arguments: argparse.Namespace) -> None:
+    rows = [benchmark.examine(job, arguments.episodes, warn) for job in jobs]
+    if all(row.steps is None for row in rows):
+        raise CartpoleError(f"no training came to anything; see {jobs[0].log}")
+    line = _line(jobs)
+    tables = [benchmark.summary_table(rows, line), benchmark.table(rows)]
+    head = f"# {suite.name}\n\n{suite.about}\n\n{_machine(arguments, line)}"
+    text = "\n\n".join([head, *tables]) + "\n"
+    write_file(folder / "results.md", lambda stream: stream.write(text.encode()))
+    write_json(folder / "results.json", _content(rows, arguments))
+    runs = [open_run(job.folder) for job in jobs if is_run(job.folder)]
+    for name, draw in (("curves", learning_curves), ("evaluations", evaluation_panels)):
+        _draw(folder / f"{name}.png", draw, runs)
+    _say("\n\n".join(reversed(tables)))
+    _say(f"\ntables, figures and curves lie in {folder}")
+
+
+def _draw(path: Path, draw: Callable[[list[Run]], Figure], runs: list[Run]) -> None:
+    """A picture that can't be drawn costs no table."""
+    try:
+        figure = draw(runs)
+    except CartpoleError as error:
+        warn(f"no {path.name}: {error}")
+        return
+    write_figure(path, figure)
+
+
+def _line(jobs: list[Job]) -> float | None:
+    """The return from which the environment counts as solved, if all runs have the same."""
+    lines = {threshold(open_run(job.folder).env_id) for job in jobs if is_run(job.folder)}
+    return lines.pop() if len(lines) == 1 else None
+
+
+def _machine(arguments: argparse.Namespace, line: float | None) -> str:
+    about = f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
+    solved = "" if line is None else f" Solved: {line:g}."
+    return (
+        f"{datetime.date.today().isoformat()}, {about}, {arguments.jobs} at a time. Best and final: "
+        f"mean return of {arguments.episodes} greedy episodes that nothing was chosen by.{solved}"
+    )
+
+
+def _content(rows: list[benchmark.Row], arguments: argparse.Namespace) -> dict[str, Any]:
+    return {
+        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "versions": run_folder.versions(),
+        "episodes": arguments.episodes,
+        "jobs": arguments.jobs,
+        "runs": benchmark.content(rows),
+    }

@@ -1,0 +1,164 @@
+"""Trainings as processes of their own, like a user's: several at a time, each on one core."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from cartpole.errors import CartpoleError
+from cartpole.training.interrupt import Interrupt
+from cartpole.training.run_checkpoints import LAST
+from cartpole.workbench.files import write_json
+from cartpole.workbench.runs import SUMMARY
+from cartpole.workbench.suites import Variant, arguments
+
+COST = "cost.json"  # beside the run's folder
+# One core each; the networks are too small to gain by more.
+ONE_CORE = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+LOOK_EVERY = 0.2  # [s] at the user's Ctrl-C
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run of a benchmark."""
+
+    variant: Variant
+    seed: int
+    folder: Path  # of the run
+
+    @property
+    def log(self) -> Path:
+        """What the training said."""
+        return self.folder.with_name(f"{self.folder.name}.log")
+
+    @property
+    def cost_file(self) -> Path:
+        """What the processes took."""
+        return self.folder.with_name(f"{self.folder.name}.{COST}")
+
+    def summary(self) -> dict[str, Any]:
+        """What the run wrote at its end; empty if it has none."""
+        return _read(self.folder / SUMMARY)
+
+    def is_done(self) -> bool:
+        """Whether there is nothing left to train."""
+        return bool(self.summary().get("complete"))
+
+    def cost(self) -> dict[str, float]:
+        """Seconds of the clock and of the processor, for the whole command."""
+        return _read(self.cost_file)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content
+
+
+class Trainings:
+    """Runs jobs, each as a process.
+
+    Args:
+        say: is told of the end of each.
+    """
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._lock = Lock()
+        self._running: set[int] = set()  # process ids
+        self._stopped = False
+
+    def run(self, jobs: Sequence[Job], at_once: int, interrupt: Interrupt) -> None:
+        """Runs what isn't done yet; ends the processes if the user interrupts.
+
+        Raises:
+            CartpoleError: if a folder can't be written to.
+        """
+        open_jobs = [job for job in jobs if not job.is_done()]
+        with ThreadPoolExecutor(at_once) as pool:
+            futures = {pool.submit(self._train, job) for job in open_jobs}
+            try:
+                self._wait(futures, interrupt)
+            finally:
+                self._stop(interrupt)
+
+    def _wait(self, futures: set[Future[None]], interrupt: Interrupt) -> None:
+        while futures and not interrupt.requested():
+            done, futures = wait(futures, LOOK_EVERY, FIRST_COMPLETED)
+            for future in done:
+                future.result()
+
+    def _stop(self, interrupt: Interrupt) -> None:
+        """No further process begins; those that run save what they have and end."""
+        with self._lock:
+            self._stopped = True
+            for process in self._running:
+                os.kill(process, interrupt.signal or 15)
+
+    def _train(self, job: Job) -> None:
+        try:
+            job.folder.parent.mkdir(parents=True, exist_ok=True)
+            with job.log.open("a", encoding="utf-8") as log:
+                self._run_process(job, log)
+        except OSError as error:
+            raise CartpoleError(f"can't train into {job.folder}: {error.strerror}") from error
+
+    def _run_process(self, job: Job, log: Any) -> None:
+        began = time.monotonic()
+        with self._lock:
+            if self._stopped:
+                return
+            process = subprocess.Popen(
+                command(job),
+                env=os.environ | ONE_CORE,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+            self._running.add(process.pid)
+        # wait4 tells what this one process took; getrusage knows only the sum of all.
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        with self._lock:
+            self._running.discard(process.pid)
+        self._note(job, time.monotonic() - began, usage.ru_utime + usage.ru_stime)
+        self._say(_told(job, process.returncode))
+
+    def _note(self, job: Job, seconds: float, cpu_seconds: float) -> None:
+        """Adds to what earlier parts of an interrupted training took."""
+        before = job.cost()
+        cost = {
+            "command_seconds": round(before.get("command_seconds", 0.0) + seconds, 1),
+            "cpu_seconds": round(before.get("cpu_seconds", 0.0) + cpu_seconds, 1),
+        }
+        write_json(job.cost_file, cost)
+
+
+def command(job: Job) -> list[str]:
+    """What is run: a new training, or one that goes on."""
+    begin = [sys.executable, "-m", "cartpole.workbench", "train"]
+    if (job.folder / LAST).exists():
+        return [*begin, f"--resume={job.folder}"]
+    if job.folder.exists():  # it ended before its first checkpoint
+        shutil.rmtree(job.folder)
+    return [*begin, *arguments(job.variant, job.seed, job.folder)]
+
+
+def _told(job: Job, code: int) -> str:
+    name = f"{job.variant.name}, seed {job.seed}"
+    summary = job.summary()
+    if code or not summary:
+        return f"{name}: ended with exit code {code}, see {job.log}"
+    best = summary.get("best")
+    found = f"best evaluation {best[1]:.1f} at step {best[0]}" if best else "no evaluation"
+    return f"{name}: {summary['steps']} steps in {summary['seconds']:.1f} s, {found}"
