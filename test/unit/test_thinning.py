@@ -86,3 +86,24 @@ def test_a_closed_topic_publishes_nothing(thinner):
     topic.send(3)
     topic.flush()
     assert reader.got in ([1], [1, 2])
+
+
+class LateThinner:
+    """Never comes round, as on a machine that has no time for its thread."""
+
+    active = True
+
+    def remember(self, topic):
+        pass
+
+
+def test_a_world_that_is_slowed_down_sends_everything_from_then_on():
+    thinner, got = LateThinner(), []
+    topic = ThinnedTopic(thinner, got.append)
+    for sample in range(3):
+        topic.send(sample)
+    assert got == [0]
+    thinner.active = False
+    for sample in range(3, 6):
+        topic.send(sample)
+    assert got == [0, 3, 4, 5]

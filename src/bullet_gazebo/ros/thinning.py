@@ -30,7 +30,9 @@ class ThinnedTopic:
 
     def send(self, sample: Any) -> None:
         """Publishes the sample, or keeps it until its turn or a newer one comes; called by the tick."""
-        if self._waiting:  # nearly always, beyond real time: so this goes without the lock
+        # Nearly always, beyond real time: so this goes without the lock. When the world has just been
+        # slowed down, the thinner may not have come round yet; then nothing waits for it any more.
+        if self._waiting and self._thinner.active:
             self._kept = sample
             if self._waiting:  # still: flush() takes what is kept after it has cleared this
                 return
@@ -41,6 +43,7 @@ class ThinnedTopic:
                 self._kept = sample
                 self._waiting = True
             else:
+                self._waiting = False
                 self._send_now(sample)
         if self._waiting:
             self._thinner.remember(self)
