@@ -117,14 +117,16 @@ class ThinningTest(unittest.TestCase):
         self.assertTrue(self.clock.wait_for(lambda got: got[-1] > 100 * MILLISECOND))
         self.set_rate(REAL_TIME)
         begin = self.time()
-        self.assertTrue(self.clock.wait_for(lambda got: got[-1] > begin + 200 * MILLISECOND))
+        # Queues are short, so a machine that is late may lose some; a stretch of all of them comes soon.
+        stretch = range(0, 100 * MILLISECOND, MILLISECOND)
+        self.assertTrue(
+            self.joints.wait_for(
+                lambda got: got[-1] > begin + stretch[-1]
+                and [stamp - got[-100] for stamp in got[-100:]] == list(stretch)
+            )
+        )
         call("/gazebo/pause_physics", Empty)
         self.assert_last_is(self.time())
-        # Of /clock this node keeps the newest only, when it is late: so rospy hears it (queue_size 1).
-        seen = [stamp for stamp in self.joints.got if stamp > begin]
-        self.assertEqual(
-            {after - before for before, after in zip(seen, seen[1:], strict=False)}, {MILLISECOND}
-        )
 
     def test_steps_of_gz_world_end_with_their_last_message(self):
         for ticks in (1, 2, 3, 500):
