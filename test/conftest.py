@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import subprocess
 from collections.abc import Callable
 from functools import partial
@@ -18,6 +19,9 @@ collect_ignore_glob = ["ros/*.py"]
 
 ROOT = Path(__file__).resolve().parent.parent
 
+
+# Networks this small only lose by more threads: on a busy machine a test of seconds takes a minute.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 ENGINES = ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
 

@@ -1,10 +1,58 @@
-"""Small plants to learn on in unit tests: deterministic, and quick."""
+"""Small plants and environments to learn on in unit tests: quick, and all but one deterministic."""
+
+import random
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
 
 from cartpole.envs.variation import Variation
 from cartpole.errors import SimulatorError
 from cartpole.task import CartPoleState
 
 DT = 0.008  # [s]
+
+
+def register_with(monkeypatch: pytest.MonkeyPatch, kind: type[gymnasium.Env]) -> str:
+    """Makes an environment known to Gymnasium for as long as a test lasts; returns its id."""
+    name = f"{kind.__name__}-v0"
+    spec = gymnasium.envs.registration.EnvSpec(name, kind, disable_env_checker=True)
+    monkeypatch.setitem(gymnasium.registry, name, spec)
+    return name
+
+
+class Dicing(gymnasium.Env):
+    """Draws from the generators that all of a process share."""
+
+    observation_space = gymnasium.spaces.Box(-9, 9, (2,), np.float32)
+    action_space = gymnasium.spaces.Discrete(2)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return np.full(2, random.random(), np.float32), {}
+
+    def step(self, action):
+        ended = bool(np.random.random() < 0.1)
+        return np.full(2, torch.rand(1).item(), np.float32), random.random(), ended, False, {}
+
+
+class OnlyOne(gymnasium.Env):
+    """As over ROS: another one of its kind would move the same robot."""
+
+    observation_space = gymnasium.spaces.Box(-9, 9, (2,), np.float32)
+    action_space = gymnasium.spaces.Discrete(2)
+    shares_robot = True
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self._observation(), {}
+
+    def step(self, action):
+        return self._observation(), self.np_random.random(), self.np_random.random() < 0.1, False, {}
+
+    def _observation(self):
+        return self.np_random.random(2, np.float32)
 
 
 class FakePlant:

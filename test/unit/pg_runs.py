@@ -22,6 +22,7 @@ CARTPOLE = {  # options of a training that is quick and uses everything there is
     "value_hidden": 4,
     "eval_frequency": 4,
     "eval_episodes": 2,
+    "confirm_episodes": 3,
     "checkpoint_frequency": 5,
     "keep_checkpoints": 0,
     "seed": 3,

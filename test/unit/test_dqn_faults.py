@@ -5,7 +5,9 @@ import json
 import math
 import random
 import resource
+import shutil
 import zipfile
+from functools import partial
 from pathlib import Path
 
 import gymnasium
@@ -27,6 +29,7 @@ from unit.dqn_runs import (
     train,
     without_doubles,
 )
+from unit.learning_fakes import Dicing, register_with
 
 from cartpole.agents.dqn.agent import DQNAgent
 from cartpole.envs.cartpole_env import CartPoleEnv
@@ -66,30 +69,9 @@ class Spoilt(gymnasium.Env):
         return np.array([0.0, number]), reward, self.steps % 7 == 0, False, {}
 
 
-class Dicing(gymnasium.Env):
-    """Draws from the generators that all of a process share."""
-
-    observation_space = gymnasium.spaces.Box(-9, 9, (2,), np.float32)
-    action_space = gymnasium.spaces.Discrete(2)
-
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        return np.full(2, random.random(), np.float32), {}
-
-    def step(self, action):
-        ended = bool(np.random.random() < 0.1)
-        return np.full(2, torch.rand(1).item(), np.float32), random.random(), ended, False, {}
-
-
 @pytest.fixture
 def register(monkeypatch):
-    def one(kind: type[gymnasium.Env]) -> str:
-        name = f"{kind.__name__}-v0"
-        spec = gymnasium.envs.registration.EnvSpec(name, kind, disable_env_checker=True)
-        monkeypatch.setitem(gymnasium.registry, name, spec)
-        return name
-
-    return one
+    return partial(register_with, monkeypatch)
 
 
 @pytest.fixture(scope="module")
@@ -169,6 +151,31 @@ def test_killed_between_the_names_of_a_best_checkpoint(tmp_path: Path, monkeypat
         train(tmp_path / "run", total_timesteps=200)
     monkeypatch.undo()
     assert_same_run(whole, resume(tmp_path / "run"))
+
+
+def test_ctrl_c_on_a_full_disk_tells_that_it_could_not_save(tmp_path: Path, monkeypatch) -> None:
+    def full(path: Path, content: object) -> None:
+        if interrupt.signal is not None:
+            raise OSError(28, "No space left on device", str(path))
+        genuine(path, content)
+
+    genuine, interrupt = run_checkpoints.save_tensors, InterruptAfter(40)
+    monkeypatch.setattr(run_checkpoints, "save_tensors", full)
+    with pytest.raises(CartpoleError, match=r"No space left on device.*--resume"):
+        train(tmp_path / "run", interrupt, **SHORT)
+
+
+def test_a_training_killed_before_its_first_checkpoint_begins_anew(
+    short: Path, tmp_path: Path
+) -> None:
+    run = train(tmp_path / "run", InterruptAfter(40), **SHORT)
+    shutil.rmtree(run / "checkpoints")
+    (run / "last.pt").unlink()
+    mine, other = checkpoint(short), checkpoint(resume(run))
+    for content in (mine, other):
+        del content["config"]["run"]["run_dir"]
+    assert_same(mine, other, "last.pt")
+    assert rows(short) == rows(run)
 
 
 def test_half_written_files_of_a_killed_training_are_removed(tmp_path: Path) -> None:

@@ -32,6 +32,20 @@ def test_while_training_it_is_only_noted_however_often(interrupt: Interrupt) -> 
     assert interrupt.exit_code == 130
 
 
+def test_after_training_it_ends_any_wait_again(interrupt: Interrupt) -> None:
+    interrupt.defer()
+    interrupt.at_once()
+    with pytest.raises(KeyboardInterrupt):
+        os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_one_that_was_deferred_is_not_forgotten(interrupt: Interrupt) -> None:
+    interrupt.defer()
+    os.kill(os.getpid(), signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        interrupt.at_once()
+
+
 def test_sigterm_has_its_own_code(interrupt: Interrupt) -> None:
     interrupt.defer()
     os.kill(os.getpid(), signal.SIGTERM)

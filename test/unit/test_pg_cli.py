@@ -1,5 +1,6 @@
 """The command line: what the user sees, and one clear line for each thing that goes wrong."""
 
+import json
 import os
 import re
 from pathlib import Path
@@ -61,6 +62,13 @@ def test_resumed(tmp_path: Path, capsys) -> None:
 def test_an_environment_that_does_not_do(capsys, tmp_path: Path, env_id: str, words: str) -> None:
     assert words in failed(capsys, f"--env-id={env_id}", "--run-dir=run")
     assert not (tmp_path / "run").exists()
+
+
+def test_private_parameters_on_the_command_line(tmp_path: Path, capsys) -> None:
+    assert pg_cli.main([*PLAIN, "--run-dir=run", "_gamma:=0.5", "_batch_episodes:=2"]) == 0
+    record = json.loads((tmp_path / "run/config.json").read_text())
+    assert (record["pg"]["gamma"], record["pg"]["batch_episodes"]) == (0.5, 2)
+    assert "did you mean gamma" in failed(capsys, *PLAIN, "_gama:=0.5")
 
 
 def test_a_run_folder_in_use(capsys, tmp_path: Path) -> None:

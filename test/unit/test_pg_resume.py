@@ -1,5 +1,6 @@
 """Interrupted anywhere, resumed: a training ends with the bits with which it would have ended."""
 
+import json
 import random
 import signal
 import subprocess
@@ -9,10 +10,11 @@ from pathlib import Path
 
 import pytest
 import torch
-from unit.dqn_runs import without_doubles
-from unit.learning_fakes import FakePlant
+from unit.dqn_runs import flags, without_doubles
+from unit.learning_fakes import Dicing, FakePlant, OnlyOne, register_with
 from unit.pg_runs import CARTPOLE, InterruptAfter, assert_same_run, checkpoint, resume, train
 
+from cartpole.envs.bullet_plant import BulletPlant
 from cartpole.errors import CartpoleError
 
 ROBOT = {"episodes": 18, "start_noise": 0.05, "save_every": 10, "seed": 2, "eval_episodes": 3,
@@ -42,6 +44,18 @@ def test_ctrl_c_anywhere_and_resumed(
     without_doubles(run)
 
 
+@pytest.mark.parametrize("asked", [37, 60])
+@pytest.mark.parametrize("kind", [Dicing, OnlyOne])
+def test_whatever_generator_an_environment_draws_from_comes_back(
+    tmp_path: Path, monkeypatch, kind: type, asked: int
+) -> None:
+    options = CARTPOLE | {"env_id": register_with(monkeypatch, kind)}
+    whole = train(tmp_path / "whole", **options)
+    run = train(tmp_path / "run", InterruptAfter(asked), **options)
+    resume(run)
+    assert_same_run(whole, run)
+
+
 def test_ctrl_c_in_an_evaluation(whole: dict[str, Path], tmp_path: Path) -> None:
     class InEvaluation(InterruptAfter):
         def requested(self) -> bool:
@@ -55,6 +69,17 @@ def test_ctrl_c_in_an_evaluation(whole: dict[str, Path], tmp_path: Path) -> None
     run = train(tmp_path / "run", InEvaluation(30), **KINDS["CartPole-v1"])
     resume(run)
     assert_same_run(whole["CartPole-v1"], run)
+
+
+def test_an_evaluation_that_a_checkpoint_knows_of_is_not_held_again(tmp_path: Path) -> None:
+    options = CARTPOLE | {"checkpoint_frequency": 4}
+    whole, run = (train(tmp_path / name, **options) for name in ("whole", "run"))
+    for path in (run / "last.pt", sorted((run / "checkpoints").iterdir())[-1]):
+        path.unlink()  # killed after the one of episode 12
+    assert len(checkpoint(run, sorted((run / "checkpoints").iterdir())[-1])["history"]["evaluations"]) == 3
+    resume(run)
+    assert_same_run(whole, run)
+    without_doubles(run)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -96,6 +121,38 @@ def test_without_any_good_checkpoint_resuming_is_refused(tmp_path: Path) -> None
         resume(run)
 
 
+def test_killed_before_the_first_checkpoint_it_begins_anew(
+    whole: dict[str, Path], tmp_path: Path, capsys
+) -> None:
+    run = train(tmp_path / "run", InterruptAfter(2), **KINDS["gae"])
+    for path in (run / "last.pt", *(run / "checkpoints").iterdir()):
+        path.unlink()
+    (run / "checkpoints/.step_000000000.pt.abc").write_bytes(b"PK")
+    resume(run)
+    assert "beginning anew" in capsys.readouterr().out
+    assert_same_run(whole["gae"], run)
+    without_doubles(run)
+    assert not list((run / "checkpoints").glob(".*"))
+
+
+def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
+    run = train(tmp_path / "run", episodes=2)
+    record = json.loads((run / "config.json").read_text())
+    record["run"]["seed"] = 9
+    (run / "config.json").write_text(json.dumps(record))
+    with pytest.raises(CartpoleError, match=r"config.json says seed 9, the checkpoint 0"):
+        resume(run)
+
+
+def test_a_checkpoint_of_another_agent_is_refused(tmp_path: Path) -> None:
+    run = train(tmp_path / "run", episodes=2)
+    content = torch.load(run / "last.pt", weights_only=True)
+    content["agent"]["policy"] = {}
+    torch.save(content, run / "last.pt")
+    with pytest.raises(CartpoleError, match="doesn't hold the agent"):
+        resume(run)
+
+
 def test_a_checkpoint_loads_safely_and_has_it_all(whole: dict[str, Path]) -> None:
     content = torch.load(whole["CartPole-v1"] / "last.pt", weights_only=True)
     assert {"config", "agent", "history", "random", "steps", "log_bytes"} < set(content)
@@ -105,8 +162,6 @@ def test_a_checkpoint_loads_safely_and_has_it_all(whole: dict[str, Path]) -> Non
 
 
 def test_the_robot_in_process_resumes_exactly(tmp_path: Path) -> None:
-    from cartpole.envs.bullet_plant import BulletPlant
-
     options = {"episodes": 12, "seed": 5, "algorithm": "gae", "eval_episodes": 1}
     options |= {"checkpoint_frequency": 5, "start_noise": 0.02}
     plants = [BulletPlant() for _ in range(3)]
@@ -147,17 +202,19 @@ def news(run: Path, process: subprocess.Popen, before: int) -> None:
         time.sleep(0.005)
 
 
-BULLET = ["--backend=bullet", "--algorithm=gae", "--episodes=40", "--eval-episodes=2"]
-PLAIN = ["--env-id=CartPole-v1", "--episodes=70", "--eval-episodes=2", "--eval-frequency=20"]
+BULLET = {"backend": "bullet", "algorithm": "gae", "episodes": 40, "eval_episodes": 2}
+PLAIN = {"env_id": "CartPole-v1", "episodes": 70, "eval_episodes": 2, "eval_frequency": 20}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("flags", "seed"), [(BULLET, 0), (PLAIN, 1)], ids=["robot", "CartPole-v1"])
-def test_killed_at_random_moments(root: Path, tmp_path: Path, flags: list[str], seed: int) -> None:
-    flags = [*flags, "--checkpoint-frequency=2"]
-    whole, run, moments = tmp_path / "whole", tmp_path / "run", random.Random(seed)
-    complete = start(root, *flags, f"--run-dir={whole}")
-    process, killed = start(root, *flags, f"--run-dir={run}"), 0
+@pytest.mark.parametrize(("options", "seed"), [(BULLET, 0), (PLAIN, 1)], ids=["robot", "CartPole-v1"])
+def test_killed_at_random_moments(root: Path, tmp_path: Path, options: dict, seed: int) -> None:
+    options = options | {"checkpoint_frequency": 2}
+    run, moments = tmp_path / "run", random.Random(seed)
+    process, killed = start(root, *flags(options), f"--run-dir={run}"), 0
+    plant = BulletPlant()
+    whole = train(tmp_path / "whole", plant=plant, **options)
+    plant.close()
     for _ in range(2):
         news(run, process, (run / "last.pt").stat().st_mtime_ns if killed else 0)
         time.sleep(moments.uniform(0, 0.2))
@@ -166,7 +223,6 @@ def test_killed_at_random_moments(root: Path, tmp_path: Path, flags: list[str], 
         killed += process.returncode == -signal.SIGKILL
         process = start(root, f"--resume={run}")
     ended(process)
-    ended(complete)
     assert killed
     assert_same_run(whole, run)
     without_doubles(run)

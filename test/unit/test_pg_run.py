@@ -8,13 +8,15 @@ import pytest
 import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from unit.dqn_runs import points, rows, without_doubles
-from unit.learning_fakes import FakePlant
+from unit.learning_fakes import Dicing, FakePlant, OnlyOne, register_with
 from unit.pg_runs import CARTPOLE, InterruptAfter, checkpoint, resume, train
 
 from cartpole.errors import CartpoleError
-from cartpole.training import checkpoints, pg_run
+from cartpole.training import checkpoints, pg_keeper, pg_run
+from cartpole.training.evaluation import Evaluation
 from cartpole.training.interrupt import Interrupt
 from cartpole.training.pg_policy import load_policy
+from cartpole.training.pg_stage import gymnasium_stage
 
 DOCUMENTS = {"Reward", "Value Loss", "Policy Loss"}
 TAGS = DOCUMENTS | {
@@ -116,6 +118,23 @@ def test_evaluations_and_checkpoints_change_nothing_that_is_learned(
     ]
 
 
+@pytest.mark.parametrize("kind", [Dicing, OnlyOne])
+def test_an_evaluation_leaves_the_generators_alone_that_it_shares(
+    tmp_path: Path, monkeypatch, kind: type
+) -> None:
+    options = {"env_id": register_with(monkeypatch, kind), "episodes": 8, "eval_episodes": 2}
+    plain = train(tmp_path / "plain", **options)
+    judged = train(tmp_path / "judged", **options, eval_frequency=2)
+    assert len(summary(judged)["evaluations"]) == 4
+    assert summary(plain)["returns"] == summary(judged)["returns"]
+
+
+def test_over_ros_the_one_robot_is_judged_too(monkeypatch) -> None:
+    stage = gymnasium_stage(register_with(monkeypatch, OnlyOne), {})
+    assert stage.judge is stage.env
+    stage.close()
+
+
 def test_start_noise_is_seeded(tmp_path: Path) -> None:
     lengths = [
         summary(train(tmp_path / name, episodes=5, seed=4, start_noise=noise))["lengths"]
@@ -125,10 +144,39 @@ def test_start_noise_is_seeded(tmp_path: Path) -> None:
 
 
 def test_the_best_is_that_of_the_best_evaluation(tmp_path: Path) -> None:
-    result = summary(train(tmp_path, **CARTPOLE))
+    result = summary(train(tmp_path, **CARTPOLE | {"confirm_episodes": 0}))
     steps, mean = max(result["evaluations"], key=lambda each: each[1])
     assert result["best"] == [steps, mean]
     assert checkpoint(tmp_path, "best.pt")["steps"] == steps
+
+
+def test_a_worse_one_later_does_not_take_its_place(tmp_path: Path, monkeypatch) -> None:
+    verdicts = [Evaluation([1], [value]) for value in (5.0, 9.0, 3.0, 9.0)]
+    monkeypatch.setattr(pg_keeper, "run_greedily", lambda *_: verdicts.pop(0))
+    result = summary(train(tmp_path, episodes=8, eval_frequency=2))
+    assert [mean for _, mean in result["evaluations"]] == [5.0, 9.0, 3.0, 9.0]
+    assert result["best"] == [sum(result["lengths"][:4]), 9.0]
+    assert checkpoint(tmp_path, "best.pt")["steps"] == result["best"][0]
+
+
+def test_a_policy_is_the_best_one_only_if_more_episodes_confirm_it(
+    tmp_path: Path, monkeypatch
+) -> None:
+    def judged(env, act, seed: int, episodes: int, stop) -> Evaluation:
+        asked.append((seed, episodes))
+        return Evaluation([1], [verdicts.pop(0)])
+
+    verdicts, asked = [5.0, 4.0, 9.0, 3.0, 3.5, 7.0, 6.0], []
+    monkeypatch.setattr(pg_keeper, "run_greedily", judged)
+    result = summary(
+        train(tmp_path, episodes=8, eval_frequency=2, eval_episodes=3, confirm_episodes=6, seed=7)
+    )
+    assert [mean for _, mean in result["evaluations"]] == [5.0, 9.0, 3.5, 7.0]
+    assert result["best"] == [result["steps"], 6.0]
+    confirmed = [row[2] for row in rows(tmp_path) if row[1] == "eval/confirmed_reward"]
+    assert confirmed == ["4.0", "6.0"]
+    first, more = (7, 3), (1_000_007, 6)
+    assert asked == [first, more, first, more, first, first, more]
 
 
 def test_the_best_policy_comes_back_from_its_folder(tmp_path: Path) -> None:
@@ -201,8 +249,44 @@ def test_a_full_disk_is_one_line(tmp_path: Path, monkeypatch) -> None:
         raise OSError(28, "No space left on device", str(path))
 
     monkeypatch.setattr(checkpoints, "write_atomically", full)
-    with pytest.raises(CartpoleError, match="No space left on device"):
+    with pytest.raises(CartpoleError, match="No space left on device") as raised:
         train(tmp_path, episodes=2, save_every=0)
+    assert "is saved" not in str(raised.value) and "--resume" not in str(raised.value)
+
+
+def test_a_disk_that_is_full_from_the_beginning_fails_before_tensorboard(tmp_path: Path) -> None:
+    """TensorBoard writes in a thread of its own, which would end in a traceback."""
+    (tmp_path / "scalars.csv").symlink_to("/dev/full")
+    with pytest.raises(CartpoleError, match="No space left on device; stopped after 0"):
+        train(tmp_path, episodes=2)
+    assert not list(tmp_path.glob("events.*"))
+
+
+def test_ctrl_c_on_a_full_disk_tells_that_it_could_not_save(tmp_path: Path, monkeypatch) -> None:
+    def full(path: Path, write: Callable) -> None:
+        if interrupt.requested():
+            raise OSError(28, "No space left on device", str(path))
+        genuine(path, write)
+
+    genuine, interrupt = checkpoints.write_atomically, InterruptAfter(300)
+    monkeypatch.setattr(checkpoints, "write_atomically", full)
+    with pytest.raises(CartpoleError, match=r"No space left on device.*--resume") as raised:
+        train(tmp_path, interrupt, episodes=1000, save_every=0)
+    assert "is saved" not in str(raised.value)
+
+
+def test_resuming_that_fails_at_once_costs_nothing(tmp_path: Path) -> None:
+    class Dead(FakePlant):
+        def reset(self, state):
+            raise CartpoleError("the simulator has ended")
+
+    run = train(tmp_path / "run", InterruptAfter(800), episodes=100, save_every=0)
+    before, weights = summary(run), torch.load(run / "policy_network.pth", weights_only=True)
+    with pytest.raises(CartpoleError, match=f"stopped after {before['episodes']} of 100"):
+        resume(run, plant=Dead())
+    assert summary(run)["returns"] == before["returns"] != []
+    after = torch.load(run / "policy_network.pth", weights_only=True)
+    assert torch.equal(after["fc.weight"], weights["fc.weight"])
 
 
 def test_a_disk_that_fills_up_keeps_the_checkpoint_before(tmp_path: Path, monkeypatch) -> None:
@@ -238,6 +322,21 @@ def test_a_loss_that_is_no_number_is_one_line_and_loses_nothing(
     content = checkpoint(tmp_path)
     assert len(content["history"]["lengths"]) == summary(tmp_path)["episodes"] > 0
     assert all(weight.isfinite().all() for weight in content["agent"]["policy"].values())
+
+
+def test_an_observation_that_is_no_number_in_an_evaluation(tmp_path: Path) -> None:
+    class Spoilt(FakePlant):
+        def reset(self, state):
+            self.is_judged = state.pole_angle != 0.0  # the training's own begin upright
+            return super().reset(state)
+
+        def act(self, set_point: float):
+            state = super().act(set_point)
+            return state._replace(cart_position=float("nan")) if self.is_judged else state
+
+    with pytest.raises(CartpoleError, match=r"observation .* isn't finite.*is saved in.*--resume"):
+        train(tmp_path, plant=Spoilt(), episodes=3)
+    assert summary(tmp_path)["episodes"] == 3 and not (tmp_path / "best.pt").exists()
 
 
 def test_the_mean_of_the_last_episodes(tmp_path: Path) -> None:

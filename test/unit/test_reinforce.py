@@ -3,6 +3,7 @@
 import copy
 import math
 
+import gymnasium
 import numpy as np
 import pytest
 import torch
@@ -15,8 +16,9 @@ from cartpole.agents.reinforce import ReinforceAgent, generalised_advantages
 from cartpole.agents.reinforce_settings import ReinforceSettings
 from cartpole.envs.cartpole_env import CartPoleEnv
 from cartpole.errors import CartpoleError
+from cartpole.task import BalanceTask
 from cartpole.training.history import History
-from cartpole.training.loop import run_episode, train
+from cartpole.training.loop import is_complete, run_episode, train
 
 numbers = st.floats(-10.0, 10.0)
 
@@ -146,6 +148,79 @@ def test_the_same_seed_learns_the_same_bits():
         assert torch.equal(ours, theirs)
 
 
+@pytest.mark.parametrize("normalize", [False, True])
+def test_a_batch_is_one_step_down_the_gradient_of_the_paper(normalize):
+    """By NumPy alone: advantages, their normalisation, the policy's gradient, both losses."""
+    scale, gamma, gae_lambda = np.array([0.5, 1.0, 2.0, 4.0]), 0.9, 0.8
+    settings = ReinforceSettings(gamma=gamma, gae_lambda=gae_lambda, batch_episodes=3,
+                                 value_epochs=0, normalize_observations=normalize)  # fmt: skip
+    agent = ReinforceAgent(2, scale.tolist(), settings, actions=3)
+    for seed in range(3):  # so that weights and statistics aren't those of the beginning
+        agent.learn(an_episode(15, seed, actions=3))
+    seen = np.array([o for seed in range(3) for o in an_episode(15, seed, actions=3).observations])
+    mean, deviation = (seen / scale).mean(0), (seen / scale).std(0)
+    weight, bias = (each.detach().double().numpy() for each in (agent.policy.fc.weight, agent.policy.fc.bias))
+    batch = [an_episode(9 + seed, seed, terminated=seed != 4, actions=3) for seed in (3, 4, 5)]
+    inputs, actions, advantages, targets, estimates = [], [], [], [], []
+    for episode in batch:
+        states = np.array(episode.states()) / scale
+        states = (states - mean) / deviation if normalize else states
+        with torch.no_grad():
+            values = agent.value(torch.tensor(states, dtype=torch.float32))[:, 0].double().numpy()
+        values[-1] *= not episode.terminated
+        for t in range(episode.length):
+            advantage = sum(
+                (gamma * gae_lambda) ** (k - t)
+                * (episode.rewards[k] + gamma * values[k + 1] - values[k])
+                for k in range(t, episode.length)
+            )
+            advantages.append(advantage)
+            targets.append(advantage + values[t])
+        inputs.extend(states[:-1])
+        actions.extend(episode.actions)
+        estimates.extend(values[:-1])
+    inputs, advantages = np.array(inputs), np.array(advantages)
+    advantages = (advantages - advantages.mean()) / advantages.std()
+    chances = np.exp(inputs @ weight.T + bias)
+    chances /= chances.sum(1, keepdims=True)
+    chosen = np.eye(3)[actions]
+    slope = -((chosen - chances) * advantages[:, None]).T @ inputs / len(inputs)  # (3, 4)
+    for episode in batch:
+        losses = agent.learn(episode)
+    assert agent.policy.fc.weight.grad.numpy() == pytest.approx(slope, abs=1e-5)
+    assert losses.policy == pytest.approx(-np.mean(np.log((chances * chosen).sum(1)) * advantages), abs=1e-5)
+    assert losses.value == pytest.approx(np.mean((np.array(estimates) - targets) ** 2), rel=1e-4)
+
+
+def decided(entropy_coefficient, weight):
+    """An agent that is so sure of itself that the other action's chance is 0, or nearly."""
+    agent = ReinforceAgent(0, settings=ReinforceSettings(entropy_coefficient=entropy_coefficient))
+    with torch.no_grad():
+        agent.policy.fc.weight[:] = torch.tensor([[weight] * 4, [-weight] * 4])
+    agent.sync()
+    return agent
+
+
+def test_entropy_of_a_policy_that_is_sure_has_a_gradient():
+    agent, episode = decided(0.1, 60.0), an_episode(50)
+    episode.actions = [agent.act_greedily(each) for each in episode.observations]
+    agent.learn(episode)
+    assert all(weight.isfinite().all() for weight in agent.policy.parameters())
+
+
+def test_a_gradient_that_is_no_number_changes_nothing():
+    agent, episode = decided(0.0, 11.5), an_episode(3)
+    episode.observations = [np.ones(4, np.float32) for _ in episode.observations]
+    episode.actions = [0, 0, 1]  # of a chance whose inverse is beyond float32
+    before = copy.deepcopy(agent.state_dict())
+    with pytest.raises(CartpoleError, match="gradient isn't finite"):
+        agent.learn(episode)
+    after = agent.state_dict()
+    for name in ("policy", "value"):
+        assert all(torch.equal(after[name][key], before[name][key]) for key in before[name])
+    assert after["batch"] == before["batch"] == []
+
+
 def test_a_loss_that_is_no_number_changes_nothing():
     agent, episode = ReinforceAgent(0), an_episode()
     before = [p.detach().clone() for p in (*agent.policy.parameters(), *agent.value.parameters())]
@@ -171,7 +246,28 @@ def test_it_learns_on_a_fake_plant_and_stops_when_it_is_done():
     assert last > 1.2 * first
 
 
+def test_it_is_done_when_twenty_episodes_in_a_row_lasted_long_enough():
+    assert not is_complete(History(lengths=[300] * 19), 600, 10.0)
+    assert is_complete(History(lengths=[1] * 9 + [10] * 20), 600, 10.0)
+    assert not is_complete(History(lengths=[300] * 20 + [9] * 20), 600, 10.0)
+    assert is_complete(History(lengths=[1] * 600), 600, 10.0)
+
+
 def test_the_loop_tells_how_an_episode_ended():
     episode = run_episode(CartPoleEnv(FakePlant()), ReinforceAgent(0), lambda: False)
     assert episode.terminated
     assert episode.final_observation.shape == (4,)
+    short = CartPoleEnv(FakePlant(), BalanceTask(max_steps=3))
+    assert not run_episode(short, ReinforceAgent(0), lambda: False).terminated
+
+
+def test_the_loop_keeps_observations_that_an_environment_writes_over():
+    class Writing(gymnasium.ObservationWrapper):
+        def observation(self, observation):
+            self.array = getattr(self, "array", observation.copy())
+            self.array[:] = observation
+            return self.array
+
+    env = CartPoleEnv(FakePlant())
+    plain, written = (run_episode(each, ReinforceAgent(0), lambda: False) for each in (env, Writing(env)))
+    assert np.array_equal(plain.states(), written.states())

@@ -188,8 +188,8 @@ class PolicyGradientAgent(TwoNetworks):
         policy_loss = -torch.sum(torch.log(chosen) * advantages)
         losses = Losses(policy_loss.item(), value_loss.item())
         check_finite(losses)
-        descend(self.value_optimizer, value_loss)
         descend(self.policy_optimizer, policy_loss)
+        descend(self.value_optimizer, value_loss)
         self.sync()
         return losses
 
@@ -208,7 +208,15 @@ def start_at_zero(layer: nn.Linear) -> None:
 
 
 def descend(optimizer: torch.optim.Optimizer, loss: torch.Tensor) -> None:
-    """One step of the optimizer down the loss."""
+    """One step of the optimizer down the loss.
+
+    Raises:
+        CartpoleError: if the gradient isn't finite, as it may be where the loss is; no weight was
+            changed then.
+    """
     optimizer.zero_grad()
     loss.backward()
+    gradients = [weight.grad for group in optimizer.param_groups for weight in group["params"]]
+    if not math.isfinite(nn.utils.get_total_norm(gradients, math.inf)):
+        raise CartpoleError("a gradient isn't finite; the networks were left unchanged")
     optimizer.step()

@@ -21,6 +21,7 @@ from cartpole.agents.softmax_policy import Actor, PairActor, SoftmaxActor, Softm
 from cartpole.agents.two_networks import TwoNetworks
 
 SMALLEST_SPREAD = 1e-8  # of advantages, below which they are not blown up
+SMALLEST_CHANCE = float(np.finfo(np.float32).tiny)  # of an action, that counts for the entropy
 
 
 class BaselineNetwork(nn.Module):
@@ -102,7 +103,7 @@ class ReinforceAgent(TwoNetworks):
             The losses of the update, taken before it; None if the batch isn't full yet.
 
         Raises:
-            CartpoleError: if a loss isn't finite; the agent is as before then.
+            CartpoleError: if a loss or a gradient isn't finite; the agent is as before then.
         """
         batch = [*self._batch, episode]
         if len(batch) < self.settings.batch_episodes:
@@ -144,7 +145,8 @@ class ReinforceAgent(TwoNetworks):
         loss = -(chosen * advantages).mean()
         if not self.settings.entropy_coefficient:
             return loss
-        entropy = torch.special.entr(probabilities).sum(1).mean()
+        # At a probability of 0 its slope is infinite.
+        entropy = torch.special.entr(probabilities.clamp_min(SMALLEST_CHANCE)).sum(1).mean()
         return loss - self.settings.entropy_coefficient * entropy
 
     def _judge(self, batch: list[Episode]) -> tuple[torch.Tensor, torch.Tensor]:

@@ -61,11 +61,16 @@ class DQNTraining:
             raise
         self._history = History()
         self._saved_at = -1  # [steps]
+        self._is_written = True  # whatever was to be
         self._log: ScalarLog
         self._loop: Loop
         self._shown: DQNProgress
 
-    def _read_checkpoint(self) -> dict[str, Any]:
+    def _read_checkpoint(self) -> dict[str, Any] | None:
+        """None if the training was killed before its first checkpoint: it begins anew."""
+        if not candidates(self._folder):
+            say(f"{self._folder} has no checkpoint yet; beginning anew")
+            return None
         content = read_newest(self._folder, say)
         check_same(self._run, self._dqn, content.get("config"), str(self._folder))
         self._checkpoints.remove_leftovers()
@@ -83,8 +88,7 @@ class DQNTraining:
         except CartpoleError as error:
             failure = error
         except OSError as error:
-            place = error.filename or self._folder
-            failure = CartpoleError(f"can't write {place}: {error.strerror}")
+            failure = self._not_written(error)
         finally:
             self._judge.close()
             self._env.close()
@@ -195,9 +199,11 @@ class DQNTraining:
             self._draw()
             run_folder.write_summary(self._folder / "summary.json", self._summary(failure))
         except OSError as error:
-            failure = failure or CartpoleError(f"can't write to {self._folder}: {error.strerror}")
+            problem = self._not_written(error)
+            failure = problem if self._interrupt.requested() else failure or problem
         self._tell()
-        if failure and not self._interrupt.requested():
+        # A simulator dies of the same Ctrl-C; what couldn't be written has to be told all the same.
+        if failure and not (self._interrupt.requested() and self._is_written):
             text = (
                 f"{failure}; stopped after {self._agent.steps} of {self._dqn.total_timesteps} steps"
             )
@@ -206,6 +212,10 @@ class DQNTraining:
                     f"; --resume {shlex.quote(str(self._folder))} goes on from the last checkpoint"
                 )
             raise CartpoleError(text)
+
+    def _not_written(self, error: OSError) -> CartpoleError:
+        self._is_written = False
+        return CartpoleError(f"can't write {error.filename or self._folder}: {error.strerror}")
 
     def _draw(self) -> None:
         if self._history.returns:

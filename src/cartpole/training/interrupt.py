@@ -27,6 +27,12 @@ class Interrupt:
         """From now on signals only set `requested`."""
         self._deferred = True
 
+    def at_once(self) -> None:
+        """From now on signals raise KeyboardInterrupt again; one that was deferred does so here."""
+        self._deferred = False
+        if self.requested():
+            raise KeyboardInterrupt
+
     def requested(self) -> bool:
         return self.signal is not None
 

@@ -2,17 +2,24 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cartpole.training.evaluation import Evaluation, run_greedily
 from cartpole.training.history import History
 from cartpole.training.loop import EpisodeRecord, is_complete
 from cartpole.training.pg_policy import Agent, hyperparameters
 from cartpole.training.pg_settings import Choice, config
-from cartpole.training.pg_stage import Stage
+from cartpole.training.pg_stage import OTHER_SEED, Stage
 from cartpole.training.random_states import Generators
 from cartpole.training.run_checkpoints import Checkpoints
 from cartpole.training.scalar_log import ScalarLog
+
+
+class Verdict(NamedTuple):
+    """An evaluation, and the mean return to compare policies by."""
+
+    evaluation: Evaluation
+    confirmed: float
 
 
 class Keeper:
@@ -43,6 +50,7 @@ class Keeper:
         self._log = log
         self._should_stop = should_stop
         self._checkpoints = Checkpoints(folder, self._run.keep_checkpoints)
+        self._checkpoints.remove_leftovers()
         self._generators = Generators(stage.env, agent.generator)
         self._saved_at = -1  # [steps]
 
@@ -62,27 +70,40 @@ class Keeper:
         is_due = bool(run.eval_frequency and episodes) and episodes % run.eval_frequency == 0
         if done or not is_due or is_complete(history, run.episodes, run.stop_at):
             return
-        evaluation = self._evaluate()
-        if evaluation is None:
-            return
-        is_best = self._enter(steps, evaluation.mean_return)
-        if is_best:
+        verdict = self._judge()
+        if verdict and self._enter(steps, verdict):
             self.save(best=True)
 
-    def _enter(self, steps: int, mean: float) -> bool:
-        """Writes an evaluation down; returns whether it is the best one."""
+    def _best_return(self) -> float:
+        return self._history.best[1] if self._history.best else float("-inf")
+
+    def _enter(self, steps: int, verdict: Verdict) -> bool:
+        """Writes an evaluation down; returns whether the policy is the best one."""
+        mean = verdict.evaluation.mean_return
         self._log.add(steps, {"eval/mean_reward": mean})
         self._history.evaluations.append((steps, mean))
-        if self._history.best is not None and mean <= self._history.best[1]:
+        if verdict.confirmed <= self._best_return():
             return False
-        self._history.best = (steps, mean)
+        if self._run.confirm_episodes:
+            self._log.add(steps, {"eval/confirmed_reward": verdict.confirmed})
+        self._history.best = (steps, verdict.confirmed)
         return True
 
-    def _evaluate(self) -> Evaluation | None:
+    def _judge(self) -> Verdict | None:
+        """Evaluates the policy; one that seems to be the best is confirmed. None if interrupted."""
+        run, result = self._run, self._evaluate(self._run.eval_episodes, 0)
+        if result is None:
+            return None
+        if result.mean_return <= self._best_return() or not run.confirm_episodes:
+            return Verdict(result, result.mean_return)
+        confirmed = self._evaluate(run.confirm_episodes, OTHER_SEED)
+        return None if confirmed is None else Verdict(result, confirmed.mean_return)
+
+    def _evaluate(self, episodes: int, further: int) -> Evaluation | None:
         """Runs greedy episodes, which leave nothing behind in the training."""
-        seed = self._run.seed + self._stage.seed_offset
+        seed = self._run.seed + self._stage.seed_offset + further
         judge, act = self._stage.judge, self._agent.act_greedily
-        result = run_greedily(judge, act, seed, self._run.eval_episodes, self._should_stop)
+        result = run_greedily(judge, act, seed, episodes, self._should_stop)
         self._generators.rewind()
         return result
 
@@ -96,10 +117,12 @@ class Keeper:
         if not is_complete(self._history, self._run.episodes, self._run.stop_at):
             return None
         content = self._content()
-        evaluation = self._evaluate()
-        if evaluation and self._enter(self._history.steps, evaluation.mean_return):
+        verdict = self._judge()
+        if verdict is None:
+            return None
+        if self._enter(self._history.steps, verdict):
             self._checkpoints.save(self._history.steps, content, best=True)
-        return evaluation
+        return verdict.evaluation
 
     def rewind(self) -> None:
         """Takes back the draws of an episode that was broken off."""
@@ -126,9 +149,6 @@ class Keeper:
             "log_bytes": self._log.sync(),
         }
 
-    def load_state_dict(self, content: dict[str, Any]) -> None:
-        """Goes on from a checkpoint: agent, history and generators."""
-        self._checkpoints.remove_leftovers()
-        self._agent.load_state_dict(content["agent"])
-        self._history.load_state_dict(content["history"])
+    def go_on(self, content: dict[str, Any]) -> None:
+        """Takes over a checkpoint's generators; agent and history have its state already."""
         self._generators.load_state_dict(content["random"])

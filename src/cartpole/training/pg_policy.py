@@ -72,10 +72,22 @@ def load_policy(path: Path, **env_options: Any) -> Policy:
     content = read(path)
     choice = from_config(content.get("config"), str(path))
     env = make_environment(choice.run.env_id, {**choice.run.env_kwargs, **env_options})
-    agent = make_agent(choice, env)
+    try:
+        agent = make_agent(choice, env)
+        restore(agent, content, str(path))
+    except CartpoleError:
+        env.close()
+        raise
+    return Policy(agent, env, choice)
+
+
+def restore(agent: Agent, content: dict[str, Any], origin: str) -> None:
+    """Gives an agent the state that a checkpoint holds.
+
+    Raises:
+        CartpoleError: if it holds another one's.
+    """
     try:
         agent.load_state_dict(content["agent"])
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        env.close()
-        raise CartpoleError(f"{path} doesn't hold the agent that it tells of") from error
-    return Policy(agent, env, choice)
+        raise CartpoleError(f"{origin} doesn't hold the agent that it tells of") from error

@@ -17,13 +17,13 @@ from cartpole.training.interrupt import Interrupt
 from cartpole.training.loop import Observer, is_complete, train
 from cartpole.training.pg_figures import PolicyFigures
 from cartpole.training.pg_keeper import Keeper
-from cartpole.training.pg_policy import hyperparameters, make_agent
+from cartpole.training.pg_policy import hyperparameters, make_agent, restore
 from cartpole.training.pg_settings import Choice, check_same, config
 from cartpole.training.pg_stage import Stage
 from cartpole.training.plots import learning_curve
 from cartpole.training.progress import progress
 from cartpole.training.random_states import seed_all
-from cartpole.training.run_checkpoints import read_newest
+from cartpole.training.run_checkpoints import candidates, read_newest
 from cartpole.training.run_record import read_record, write_record
 from cartpole.training.scalar_log import ScalarLog
 
@@ -56,14 +56,24 @@ class Training:
         self._hyperparameters = hyperparameters(choice)
         seed_all(self._run.seed)
         self._agent = make_agent(choice, stage.env)
+        self._history = History()
         self._resumed = self._read_checkpoint() if choice.resume else None
         self._saver = NetworkSaver(folder, self._agent, self._run.save_every)
-        self._history = History()
         self._evaluation: Evaluation | None = None
+        self._is_written = True  # whatever was to be
 
-    def _read_checkpoint(self) -> dict[str, Any]:
+    def _read_checkpoint(self) -> dict[str, Any] | None:
+        """Takes over agent and history at once: whatever fails from here on writes these down again.
+
+        None if the training was killed before its first checkpoint: it begins anew.
+        """
+        if not candidates(self._folder):
+            say(f"{self._folder} has no checkpoint yet; beginning anew")
+            return None
         content = read_newest(self._folder, say)
         check_same(self._choice, content.get("config"), str(self._folder))
+        restore(self._agent, content, str(self._folder))
+        self._history.load_state_dict(content["history"])
         return content
 
     def run(self) -> None:
@@ -78,9 +88,12 @@ class Training:
         except CartpoleError as error:
             failure = error
         except OSError as error:
-            place = error.filename or self._folder
-            failure = CartpoleError(f"can't write {place}: {error.strerror}")
+            failure = self._not_written(error)
         self._finish(failure)
+
+    def _not_written(self, error: OSError) -> CartpoleError:
+        self._is_written = False
+        return CartpoleError(f"can't write {error.filename or self._folder}: {error.strerror}")
 
     def _train(self) -> None:
         record = config(self._choice, self._hyperparameters)
@@ -92,7 +105,7 @@ class Training:
             keeper = Keeper(self._choice, self._folder, self._stage, self._agent, self._history,
                             log, self._interrupt.requested)  # fmt: skip
             if self._resumed:
-                keeper.load_state_dict(self._resumed)
+                keeper.go_on(self._resumed)
             self._begin(keeper)
             self._learn(keeper, log)
             self._saver.save()
@@ -148,14 +161,20 @@ class Training:
             self._draw()
             run_folder.write_summary(self._folder / "summary.json", self._summary(failure))
         except OSError as error:
-            failure = failure or CartpoleError(f"can't write to {self._folder}: {error.strerror}")
+            problem = self._not_written(error)
+            failure = problem if self._interrupt.requested() else failure or problem
         self._tell()
-        if failure and not self._interrupt.requested():
-            raise CartpoleError(
-                f"{failure}; stopped after {len(self._history.lengths)} of {self._run.episodes} "
-                f"episodes, what was learned is saved in {self._folder}; --resume "
-                f"{shlex.quote(str(self._folder))} goes on from the last checkpoint"
-            )
+        # A simulator dies of the same Ctrl-C; what couldn't be written has to be told all the same.
+        if failure and not (self._interrupt.requested() and self._is_written):
+            raise CartpoleError(f"{failure}; {self._what_is_left()}")
+
+    def _what_is_left(self) -> str:
+        text = f"stopped after {len(self._history.lengths)} of {self._run.episodes} episodes"
+        if self._is_written:
+            text += f", what was learned is saved in {self._folder}"
+        if candidates(self._folder):
+            text += f"; --resume {shlex.quote(str(self._folder))} goes on from the last checkpoint"
+        return text
 
     def _draw(self) -> None:
         if self._history.lengths:

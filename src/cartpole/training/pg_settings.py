@@ -81,6 +81,10 @@ class Settings:
         0, "episodes between two evaluations; 0: at the end only", 0, 2**31 - 1
     )
     eval_episodes: int = option(20, "greedy episodes of an evaluation", 1, 10**6)
+    confirm_episodes: int = option(
+        0, "greedy episodes that a policy needs to become the best one; 0: those of the evaluation",
+        0, 10**6,
+    )  # fmt: skip
     checkpoint_frequency: int = option(
         20, "episodes between two checkpoints; 0: at the end only", 0, 2**31 - 1
     )

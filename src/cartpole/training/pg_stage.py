@@ -7,8 +7,9 @@ import gymnasium
 from cartpole.envs.cartpole_env import CartPoleEnv
 from cartpole.envs.plant import Plant
 from cartpole.task import BalanceTask
-from cartpole.training.environments import make_environment, shares_robot
+from cartpole.training.environments import FiniteNumbers, make_environment, shares_robot
 from cartpole.training.evaluation import NOISE
+from cartpole.training.pg_settings import ROBOT
 
 OTHER_SEED = 1_000_000  # added to the training's: other episodes than those learned from
 
@@ -33,7 +34,9 @@ def robot_stage(plant: Plant, start_noise: float) -> Stage:
         start_noise: of the episodes that are learned from [m, rad].
     """
     env = CartPoleEnv(plant, BalanceTask(noise=start_noise))
-    return Stage(env, CartPoleEnv(plant, BalanceTask(noise=NOISE)), 0)
+    judge = CartPoleEnv(plant, BalanceTask(noise=NOISE))
+    # In the training the losses tell of what isn't finite, without a look at each step.
+    return Stage(env, FiniteNumbers(judge, ROBOT), 0)
 
 
 def gymnasium_stage(env_id: str, env_kwargs: dict[str, Any]) -> Stage:

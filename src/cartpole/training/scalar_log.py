@@ -46,15 +46,15 @@ class ScalarLog:
     ) -> None:
         path = folder / NAME
         points = _cut(path, length, say) if length else []
+        if not points:  # a full disk fails here, and not in TensorBoard's thread
+            path.write_text(HEADER, encoding="utf-8")
+        self._file = path.open("a", encoding="utf-8")
         for old in folder.glob(EVENTS):
             old.unlink()
         self._writer = SummaryWriter(str(folder))
         _add_settings(self._writer, settings)
         for point in points:
             self._writer.add_scalar(*point)
-        self._file = path.open("a" if points else "w", encoding="utf-8")
-        if not points:
-            self._file.write(HEADER)
 
     def add(self, step: int, values: dict[str, float]) -> None:
         """Writes one row for each tag.

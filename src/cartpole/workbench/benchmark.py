@@ -1,17 +1,18 @@
 """`benchmark`: every variant over several seeds, each run's figures, and what they come to."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from cartpole.errors import CartpoleError
-from cartpole.workbench.episodes import play
-from cartpole.workbench.players import load_player
+from cartpole.workbench.comparison import greedy, tried
 from cartpole.workbench.runs import (
     CONFIRMED,
     EVALUATION,
+    Curve,
     Run,
     evaluation_curve,
     open_run,
@@ -34,7 +35,7 @@ class Row:
     evaluations: float | None  # mean of all evaluations during the training
     avg20: float | None  # largest mean return of 20 training episodes in a row
     solved_step: int | None  # of the first evaluation at or above the line
-    solved_seconds: float | None  # of wall time since the training began, evaluations included
+    solved_seconds: float | None  # since the training began, evaluations included, pauses not
     steps: int | None
     episodes: int | None
     seconds: float | None
@@ -56,14 +57,14 @@ def examine(job: Job, episodes: int, say: Callable[[str], None]) -> Row:
     summary = job.summary()
     if not summary.get("complete"):
         faults.append(str(summary.get("failure") or "not complete"))
-    step, seconds = _solved(run)
+    step, seconds = tried(lambda: _solved(run, job), faults) or (None, None)
     returns = summary.get("returns") or []
     return Row(
         job.variant.name,
         job.seed,
-        _greedy(run, "best", episodes, say, faults),
-        _greedy(run, "last", episodes, say, faults),
-        _mean_evaluation(run),
+        tried(lambda: greedy(run, episodes, "best", say), faults),
+        tried(lambda: greedy(run, episodes, "last", say), faults),
+        tried(lambda: _mean_evaluation(run), faults),
         float(_means(returns).max()) if len(returns) >= AVERAGE else None,
         step,
         seconds,
@@ -71,27 +72,13 @@ def examine(job: Job, episodes: int, say: Callable[[str], None]) -> Row:
         summary.get("episodes"),
         summary.get("seconds"),
         job.cost().get("cpu_seconds"),
-        "; ".join(faults),
+        "; ".join(dict.fromkeys(faults)),
     )
 
 
 def _nothing(job: Job, fault: str) -> Row:
     empty = {each.name: None for each in fields(Row)}
     return Row(**{**empty, "variant": job.variant.name, "seed": job.seed, "fault": fault})  # type: ignore[arg-type]
-
-
-def _greedy(
-    run: Run, which: str, episodes: int, say: Callable[[str], None], faults: list[str]
-) -> float | None:
-    try:
-        player = load_player(run, which, say=say)
-        try:
-            return play(player, episodes, run.seed).mean_return
-        finally:
-            player.env.close()
-    except CartpoleError as error:
-        faults.append(str(error))
-        return None
 
 
 def _means(returns: list[float]) -> np.ndarray:
@@ -103,19 +90,28 @@ def _mean_evaluation(run: Run) -> float | None:
     return float(values.mean()) if len(values) else None
 
 
-def _solved(run: Run) -> tuple[int | None, float | None]:
+def _solved(run: Run, job: Job) -> tuple[int, float | None] | None:
     """Step and seconds of the first evaluation at the line; a confirmed one, where there are such."""
     line = threshold(run.env_id)
     if line is None:
-        return None, None
+        return None
     curve = evaluation_curve(run, CONFIRMED)
     if not len(curve.values):
         curve = evaluation_curve(run, EVALUATION)
     above = np.flatnonzero(curve.values >= line)
-    if not len(above):
-        return None, None
-    first = above[0]
-    return int(curve.steps[first]), round(float(curve.times[first] - run.config["began"]), 1)
+    return (int(curve.steps[above[0]]), _seconds(run, job, curve, above[0])) if len(above) else None
+
+
+def _seconds(run: Run, job: Job, curve: Curve, index: int) -> float | None:
+    """How long it had trained until a point of a curve, without the pauses of its benchmark."""
+    until, began = float(curve.times[index]), run.config.get("began")
+    spans = job.cost().get("spans", [])
+    pauses = [
+        following - ended
+        for (_, ended), (following, _) in zip(spans[:-1], spans[1:], strict=True)
+        if following <= until
+    ]
+    return None if began is None else round(until - began - sum(pauses), 1)
 
 
 def table(rows: Sequence[Row], with_faults: bool = True) -> str:
@@ -126,39 +122,58 @@ def table(rows: Sequence[Row], with_faults: bool = True) -> str:
     return _markdown(lines)
 
 
-def summary_table(rows: Sequence[Row], line: float | None) -> str:
-    """A line for each variant: how many seeds reach the line, and statistics over all seeds."""
+def summary_table(rows: Sequence[Row], lines_of: Mapping[str, float | None]) -> str:
+    """A line for each variant: how many seeds reach the line, and statistics over all seeds.
+
+    Where a seed has no figure, it says over how many the statistic is.
+
+    Args:
+        lines_of: the variants' returns from which they count as solved.
+    """
     head = ["variant", "seeds solved", "best: mean ± std", "IQM [95 %]", "final: IQM [95 %]",
             "evaluations: IQM [95 %]", "median steps to solve", "most", "median seconds", "most"]  # fmt: skip
     lines = [head, ["---"] * len(head)]
     for name in dict.fromkeys(row.variant for row in rows):
-        lines.append([name, *_summary([row for row in rows if row.variant == name], line)])
+        own = [row for row in rows if row.variant == name]
+        lines.append([name, *_summary(own, lines_of.get(name))])
     return _markdown(lines)
 
 
 def _summary(rows: list[Row], line: float | None) -> list[str]:
     best = [row.best for row in rows if row.best is not None]
-    solved = "-" if line is None else f"{sum(each >= line for each in best)} of {len(rows)}"
-    spread = f"{np.mean(best):.1f} ± {np.std(best, ddof=1):.1f}" if len(best) > 1 else "-"
-    steps = [np.inf if row.solved_step is None else row.solved_step for row in rows]
-    seconds = [row.seconds for row in rows if row.seconds is not None] or [np.nan]
+    steps = [math.inf if row.solved_step is None else row.solved_step for row in rows]
+    never = "-" if line is None else "never"
+    seconds = [row.seconds for row in rows if row.seconds is not None]
     return [
-        solved,
-        spread,
-        *(_iqm([getattr(row, name) for row in rows]) for name in ("best", "final", "evaluations")),
-        *(("never" if value == np.inf else f"{value:.0f}") for value in (np.median(steps), max(steps))),
-        f"{np.median(seconds):.1f}",
-        f"{max(seconds):.1f}",
+        _solved_count(rows, best, line),
+        f"{np.mean(best):.1f} ± {np.std(best, ddof=1):.1f}{_of(best, rows)}" if len(best) > 1 else "-",
+        *(_iqm(rows, name) for name in ("best", "final", "evaluations")),
+        *((never if value == math.inf else f"{value:.0f}") for value in (np.median(steps), max(steps))),
+        f"{np.median(seconds):.1f}{_of(seconds, rows)}" if seconds else "-",
+        f"{max(seconds):.1f}" if seconds else "-",
     ]  # fmt: skip
 
 
-def _iqm(values: list[float | None]) -> str:
-    present = np.array([value for value in values if value is not None])
-    if not len(present):
+def _solved_count(rows: list[Row], best: list[float], line: float | None) -> str:
+    """A seed without a figure hasn't solved it."""
+    failed = sum(bool(row.fault) for row in rows)
+    reached = sum(each >= line for each in best) if line is not None else 0
+    text = "-" if line is None and best else f"{reached} of {len(rows)}"
+    return f"{text}, {failed} failed" if failed else text
+
+
+def _of(present: Sequence[float], rows: Sequence[Row]) -> str:
+    return "" if len(present) == len(rows) else f" ({len(present)} of {len(rows)})"
+
+
+def _iqm(rows: list[Row], name: str) -> str:
+    present = [value for row in rows if (value := getattr(row, name)) is not None]
+    if not present:
         return "-"
-    found = describe(present)
+    found = describe(np.array(present))
     interval = found.iqm_interval
-    return f"{found.iqm:.1f}" + (f" [{interval[0]:.1f}, {interval[1]:.1f}]" if interval else "")
+    text = f"{found.iqm:.1f}" + (f" [{interval[0]:.1f}, {interval[1]:.1f}]" if interval else "")
+    return text + _of(present, rows)
 
 
 def _cell(value: Any) -> str:

@@ -49,10 +49,10 @@ def examine(run: Run, episodes: int, which: str, say: Callable[[str], None]) -> 
         episodes: greedy ones for the score; 0: the mean of the last training episodes.
     """
     faults: list[str] = []
-    summary = _tried(lambda: summary_of(run), faults) or {}
-    curve = _tried(lambda: training_curve(run), faults)
+    summary = tried(lambda: summary_of(run), faults) or {}
+    curve = tried(lambda: training_curve(run), faults)
     trained = None if curve is None else float(curve.values[-LAST:].mean())
-    score = trained if not episodes else _tried(lambda: _greedy(run, episodes, which, say), faults)
+    score = trained if not episodes else tried(lambda: greedy(run, episodes, which, say), faults)
     if summary.get("failure"):
         faults.append(str(summary["failure"]))
     return Row(
@@ -64,12 +64,13 @@ def examine(run: Run, episodes: int, which: str, say: Callable[[str], None]) -> 
         0 if curve is None else len(curve.values),
         int(summary.get("steps") or (0 if curve is None else curve.steps[-1])),
         summary.get("seconds"),
-        _solved_step(run),
-        "; ".join(faults),
+        tried(lambda: _solved_step(run), faults),
+        "; ".join(dict.fromkeys(faults)),
     )
 
 
-def _tried(find: Callable[[], Any], faults: list[str]) -> Any:
+def tried(find: Callable[[], Any], faults: list[str]) -> Any:
+    """What `find` gives; None, and a fault more, if it can't."""
     try:
         return find()
     except CartpoleError as error:
@@ -77,7 +78,12 @@ def _tried(find: Callable[[], Any], faults: list[str]) -> Any:
         return None
 
 
-def _greedy(run: Run, episodes: int, which: str, say: Callable[[str], None]) -> float:
+def greedy(run: Run, episodes: int, which: str, say: Callable[[str], None]) -> float:
+    """Mean return of a checkpoint's greedy episodes.
+
+    Raises:
+        CartpoleError: if it can't be played.
+    """
     player = load_player(run, which, say=say)
     try:
         return play(player, episodes, run.seed).mean_return

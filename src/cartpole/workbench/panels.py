@@ -34,11 +34,12 @@ def evaluation_panels(runs: Sequence[Run]) -> Figure:
     figure = new_figure(max(SIZE[0] * columns, 6.0), SIZE[1] * rows + 0.6)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     first, behind = next(iter(variants.items()))
+    lines = {run.experiment: threshold(run.env_id) for run in runs}
     for axes, (name, curves) in zip(grid.flat, variants.items(), strict=False):
         if name != first:
             draw_band(axes, behind, "tab:gray", first)
         draw_band(axes, curves, "tab:blue", name)
-        _finish(axes, f"{name} ({len(curves)} seeds)", threshold(runs[0].env_id))
+        _finish(axes, f"{name} ({len(curves)} seeds)", lines[name])
     for axes in grid.flat[len(variants) :]:
         axes.set_axis_off()
     figure.supxlabel("step of the environment", fontsize="medium")

@@ -10,7 +10,7 @@ import numpy as np
 
 from cartpole.errors import CartpoleError
 from cartpole.training import pg_policy, run_checkpoints
-from cartpole.training.dqn_policy import load_policy
+from cartpole.training.dqn_policy import policy_of
 from cartpole.workbench.runs import POLICY_GRADIENT, Run
 
 WHICH = ("best", "last")
@@ -76,7 +76,7 @@ def candidates(run: Run, which: str) -> list[Path]:
 
 
 def _dqn(run: Run, path: Path, state: dict[str, Any], options: dict[str, Any]) -> Player:
-    policy = load_policy(path, **options)
+    policy = policy_of(state, str(path), options)
     agent = policy.agent
 
     def preference(observations: np.ndarray) -> np.ndarray:

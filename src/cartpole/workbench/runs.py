@@ -55,7 +55,7 @@ class Curve(NamedTuple):
 
     steps: np.ndarray
     values: np.ndarray
-    times: np.ndarray  # of the clock [s since 1970]; not a number where nobody noted it
+    times: np.ndarray  # of the clock [s since 1970]
 
 
 def open_run(folder: Path) -> Run:
@@ -159,7 +159,7 @@ def training_curve(run: Run) -> Curve:
     Raises:
         CartpoleError: if no episode has ended yet, or the figures can't be read.
     """
-    curve = _scalars(run, RETURN) if (run.folder / SCALARS).exists() else _from_summary(run)
+    curve = _scalars(run, RETURN)
     if not len(curve.values):
         raise CartpoleError(f"{run.folder}: no episode has ended yet")
     return curve
@@ -191,13 +191,6 @@ def _scalars(run: Run, tag: str) -> Curve:
     except (KeyError, ValueError, TypeError, csv.Error) as error:
         raise CartpoleError(f"{path} isn't the table of a training: {error}") from error
     return Curve(*np.array(points, dtype=float).reshape(-1, 3).T)
-
-
-def _from_summary(run: Run) -> Curve:
-    summary = summary_of(run)
-    lengths, returns = summary.get("lengths", []), summary.get("returns", [])
-    steps = np.cumsum(np.asarray(lengths, float))
-    return Curve(steps, np.asarray(returns, float), np.full(len(steps), np.nan))
 
 
 def threshold(env_id: str) -> float | None:

@@ -63,6 +63,7 @@ class SB3Training:
             self._model.get_env().close()
             raise
         self._saved_at = -1  # [steps]
+        self._is_written = True  # whatever was to be
         self._log: ScalarLog
         self._began = time.monotonic()
 
@@ -94,8 +95,7 @@ class SB3Training:
         except CartpoleError as error:
             failure = error
         except OSError as error:
-            place = error.filename or self._folder
-            failure = CartpoleError(f"can't write {place}: {error.strerror}")
+            failure = self._not_written(error)
         except _LEARNING as error:
             failure = self._explained(error)
         finally:
@@ -202,10 +202,15 @@ class SB3Training:
                 learning_curve(path, history.lengths, history.returns, title)
             run_folder.write_summary(self._folder / "summary.json", self._summary(failure))
         except OSError as error:
-            failure = failure or CartpoleError(f"can't write to {self._folder}: {error.strerror}")
+            problem = self._not_written(error)
+            failure = problem if self._interrupt.requested() else failure or problem
         self._tell()
-        if failure and not self._interrupt.requested():
+        if failure and not (self._interrupt.requested() and self._is_written):
             raise CartpoleError(f"{failure}; stopped after {self._steps} steps{self._how_to_go_on}")
+
+    def _not_written(self, error: OSError) -> CartpoleError:
+        self._is_written = False
+        return CartpoleError(f"can't write {error.filename or self._folder}: {error.strerror}")
 
     @property
     def _how_to_go_on(self) -> str:

@@ -1,17 +1,27 @@
 """What `benchmark` trains: variants of a training, from config/benchmark.yaml or from flags."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from cartpole.errors import CartpoleError
-from cartpole.training import dqn_settings
+from cartpole.training import dqn_settings, pg_settings
 from cartpole.training.config_file import default_file, read_section
+from cartpole.training.run_record import is_plain
+from cartpole.workbench import sb3_settings
 from cartpole.workbench.algorithms import ALGORITHMS, DQN
+from cartpole.workbench.runs import POLICY_GRADIENT
 
 CONFIG = "benchmark.yaml"
-SPECIAL = ("preset", "config")  # which section of the algorithm's file, or which other file
+# Flags that are no options: which section of the algorithm's file, or which other file.
+SPECIAL = {DQN: ("preset", "config")}
+OTHERS_SPECIAL = ("config",)
+KNOWN = {DQN: dqn_settings.OPTIONS, POLICY_GRADIENT: pg_settings.OPTIONS}
+NAME = re.compile(r"\w[\w.+-]*")  # of a variant, which is a folder's too
+MOST_SEEDS = 10_000
 OWN = ("seed", "run_dir", "exp_name")  # the benchmark gives these
+SEEDS = 5  # unless somebody says otherwise
 KEYS = ("about", "seeds", "common", "variants")
 
 
@@ -38,27 +48,42 @@ def read_suite(name: str, path: Path | None = None) -> Suite:
     """A suite of a file, by default of config/benchmark.yaml.
 
     Raises:
-        CartpoleError: if the file has no such suite, or an option in it doesn't exist.
+        CartpoleError: if the file has no such suite, or it makes no sense.
     """
     path = path or default_file(CONFIG)
     section = read_section(path, None, name)
     unknown = [key for key in section if key not in KEYS]
     if unknown or not isinstance(section.get("variants"), dict) or not section["variants"]:
         raise CartpoleError(f"{path}: a suite has variants, and perhaps {', '.join(KEYS[:-1])}")
-    common = section.get("common") or {}
+    origin = f"{path}, {name}"
+    common = _options(section.get("common"), f"{origin}: common")
     variants = tuple(
-        make_variant(f"{path}, {name}", key, {**common, **(own or {})})
+        make_variant(origin, str(key), {**common, **_options(own, f"{origin}: {key}")})
         for key, own in section["variants"].items()
     )
-    return Suite(name, str(section.get("about", "")), int(section.get("seeds", 5)), variants)
+    seeds = section.get("seeds", SEEDS)
+    if type(seeds) is not int or not 1 <= seeds <= MOST_SEEDS:
+        raise CartpoleError(f"{origin}: seeds is a number from 1 to {MOST_SEEDS}, not {seeds!r}")
+    return Suite(name, str(section.get("about", "")), seeds, variants)
+
+
+def _options(value: Any, origin: str) -> dict[str, Any]:
+    if value is None:
+        return {}
+    if not isinstance(value, dict) or not is_plain(value):
+        raise CartpoleError(f"{origin} has options with plain values, not {value!r}")
+    return value
 
 
 def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
-    """A variant, its options checked for their names.
+    """A variant; the options of our own algorithms are checked for names and types.
 
     Raises:
-        CartpoleError: if there is no such algorithm or option; `origin` says where it stands.
+        CartpoleError: if there is no such algorithm or option, or the name is none for a folder;
+            `origin` says where it stands.
     """
+    if not NAME.fullmatch(name):
+        raise CartpoleError(f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}")
     rest = dict(options)
     algorithm = str(rest.pop("algo", DQN))
     if algorithm not in ALGORITHMS:
@@ -66,27 +91,41 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
     taken = [key for key in rest if key in OWN]
     if taken:
         raise CartpoleError(f"{origin}: {taken[0]} is given by the benchmark")
-    if algorithm == DQN:
-        dqn_settings.OPTIONS.read(
-            {key: value for key, value in rest.items() if key not in SPECIAL}, origin
-        )
+    if algorithm in KNOWN:
+        rest = {key: value for key, value in rest.items() if value is not None}
+        KNOWN[algorithm].read(_without_special(algorithm, rest), f"{origin}: {name}")
     return Variant(name, algorithm, rest)
+
+
+def check_stable_baselines3(variant: Variant) -> None:
+    """Looks whether Stable-Baselines3 is there, and takes the options, if the variant is of it.
+
+    Raises:
+        CartpoleError: if not.
+    """
+    if variant.algorithm in sb3_settings.CLASSES:
+        sb3_settings.choose(variant.algorithm, arguments(variant, 0, Path("run"))[2:])
+
+
+def _without_special(algorithm: str, options: dict[str, Any]) -> dict[str, Any]:
+    special = SPECIAL.get(algorithm, OTHERS_SPECIAL)
+    return {key: value for key, value in options.items() if key not in special}
 
 
 def arguments(variant: Variant, seed: int, folder: Path) -> list[str]:
     """What `workbench.py train` is told for one run."""
-    special = {key: value for key, value in variant.options.items() if key in SPECIAL}
+    rest = _without_special(variant.algorithm, variant.options)
+    special = {key: value for key, value in variant.options.items() if key not in rest}
     own = {"run_dir": folder, "exp_name": variant.name, "seed": seed, **special}
     flags = [f"--{key.replace('_', '-')}={value}" for key, value in own.items()]
-    rest = [
-        f"{key}={_text(value)}" for key, value in variant.options.items() if key not in SPECIAL
-    ]
-    return ["--algo", variant.algorithm, *flags, *(["--params", *rest] if rest else [])]
+    pairs = [f"{key}={_text(value)}" for key, value in rest.items()]
+    return ["--algo", variant.algorithm, *flags, *(["--params", *pairs] if pairs else [])]
 
 
 def _text(value: Any) -> str:
+    """As `train` reads it, Stable-Baselines3's options as YAML."""
     if isinstance(value, list | tuple):
-        return ",".join(map(str, value))
+        return f"[{','.join(map(str, value))}]"
     if isinstance(value, dict):
         return ",".join(f"{key}={each}" for key, each in value.items())
-    return str(value)
+    return "null" if value is None else str(value)

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import socket
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ from threading import Lock
 from typing import Any
 
 from cartpole.errors import CartpoleError
+from cartpole.training import run_folder
 from cartpole.training.interrupt import Interrupt
 from cartpole.training.run_checkpoints import LAST
 from cartpole.workbench.files import write_json
@@ -52,8 +54,8 @@ class Job:
         """Whether there is nothing left to train."""
         return bool(self.summary().get("complete"))
 
-    def cost(self) -> dict[str, float]:
-        """Seconds of the clock and of the processor, for the whole command."""
+    def cost(self) -> dict[str, Any]:
+        """Seconds of the clock and of the processor, for the whole command, and when it ran."""
         return _read(self.cost_file)
 
 
@@ -82,7 +84,7 @@ class Trainings:
         """Runs what isn't done yet; ends the processes if the user interrupts.
 
         Raises:
-            CartpoleError: if a folder can't be written to.
+            CartpoleError: if a folder can't be written to, or another training runs in it.
         """
         open_jobs = [job for job in jobs if not job.is_done()]
         with ThreadPoolExecutor(at_once) as pool:
@@ -114,43 +116,56 @@ class Trainings:
             raise CartpoleError(f"can't train into {job.folder}: {error.strerror}") from error
 
     def _run_process(self, job: Job, log: Any) -> None:
-        began = time.monotonic()
+        began = time.time()
         with self._lock:
             if self._stopped:
                 return
             process = subprocess.Popen(
                 command(job),
-                env=os.environ | ONE_CORE,
+                env=os.environ | ONE_CORE | own_master(),
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )
             self._running.add(process.pid)
-        # wait4 tells what this one process took; getrusage knows only the sum of all.
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        with self._lock:
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+        with self._lock:  # its number is free again only now: nobody else's process is ended
+            # wait4 tells what this one process took; getrusage knows only the sum of all.
+            _, status, usage = os.wait4(process.pid, 0)
             self._running.discard(process.pid)
-        self._note(job, time.monotonic() - began, usage.ru_utime + usage.ru_stime)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        self._note(job, (began, time.time()), usage.ru_utime + usage.ru_stime)
         self._say(_told(job, process.returncode))
 
-    def _note(self, job: Job, seconds: float, cpu_seconds: float) -> None:
+    def _note(self, job: Job, span: tuple[float, float], cpu_seconds: float) -> None:
         """Adds to what earlier parts of an interrupted training took."""
         before = job.cost()
         cost = {
-            "command_seconds": round(before.get("command_seconds", 0.0) + seconds, 1),
+            "command_seconds": round(before.get("command_seconds", 0.0) + span[1] - span[0], 1),
             "cpu_seconds": round(before.get("cpu_seconds", 0.0) + cpu_seconds, 1),
+            "spans": [*before.get("spans", []), [round(each, 1) for each in span]],
         }
         write_json(job.cost_file, cost)
 
 
+def own_master() -> dict[str, str]:
+    """The address of a master of a training's own: two robots can't have the same one."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        return {"ROS_MASTER_URI": f"http://127.0.0.1:{probe.getsockname()[1]}"}
+
+
 def command(job: Job) -> list[str]:
-    """What is run: a new training, or one that goes on."""
+    """What is run: a new training, or one that goes on.
+
+    Raises:
+        CartpoleError: if one runs there, which has outlived its benchmark.
+    """
     begin = [sys.executable, "-m", "cartpole.workbench", "train"]
-    if (job.folder / LAST).exists():
-        return [*begin, f"--resume={job.folder}"]
-    if job.folder.exists():  # it ended before its first checkpoint
-        shutil.rmtree(job.folder)
+    if job.folder.exists():
+        with run_folder.held(job.folder):
+            if (job.folder / LAST).exists():
+                return [*begin, f"--resume={job.folder}"]
+            shutil.rmtree(job.folder)  # it ended before its first checkpoint
     return [*begin, *arguments(job.variant, job.seed, job.folder)]
 
 

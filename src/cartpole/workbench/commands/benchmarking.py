@@ -1,6 +1,7 @@
 """benchmark: one training or several variants of it, over several seeds."""
 
 import argparse
+import contextlib
 import datetime
 import json
 import os
@@ -23,12 +24,17 @@ from cartpole.workbench.curves import learning_curves
 from cartpole.workbench.files import write_figure, write_file, write_json
 from cartpole.workbench.panels import evaluation_panels
 from cartpole.workbench.players import warn
-from cartpole.workbench.runs import Run, is_run, open_run, threshold
-from cartpole.workbench.suites import Suite, make_variant, read_suite
+from cartpole.workbench.runs import Run, open_run, threshold
+from cartpole.workbench.suites import (
+    SEEDS,
+    Suite,
+    check_stable_baselines3,
+    make_variant,
+    read_suite,
+)
 from cartpole.workbench.trainings import Job, Trainings
 
 RECORD = "suite.json"
-SEEDS = 5
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
@@ -38,7 +44,7 @@ def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
         help="a section of config/benchmark.yaml; without one, the training that --algo, --env-id "
         "and --params name")  # fmt: skip
     add("--suites", type=Path, metavar="FILE", help="other suites than config/benchmark.yaml's")
-    add("--algo", choices=ALGORITHMS, default=DQN, help="default dqn")
+    add("--algo", choices=ALGORITHMS, help="default dqn")
     add("--env-id", metavar="ID", help="default CartPole-v1")
     add("--params", nargs="+", default=[], metavar="KEY=VALUE", help="options of the training")
     add("--seeds", type=number(1), metavar="N", help=f"how many (the suite's, or {SEEDS})")
@@ -56,10 +62,12 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """Trains what isn't trained yet, then writes results.md, results.json and two pictures.
 
     Raises:
-        CartpoleError: if a name is unknown, the folder holds another benchmark, or no run could
-            be made.
+        CartpoleError: if a name is unknown, the folder holds another benchmark or one runs in
+            it, or no run could be made.
     """
     suite = _suite(arguments)
+    for variant in suite.variants:
+        check_stable_baselines3(variant)
     folder = (arguments.out or Path("runs/benchmark") / suite.name).resolve()
     seeds = range(arguments.first_seed, arguments.first_seed + (arguments.seeds or suite.seeds))
     _claim(folder, suite)
@@ -68,12 +76,14 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         for variant in suite.variants
         for seed in seeds
     ]
-    interrupt.defer()
-    Trainings(_say).run(jobs, arguments.jobs, interrupt)
-    if interrupt.requested():
-        _say("interrupted; the same command goes on")
-        return
-    _report(folder, suite, jobs, arguments)
+    with run_folder.held(folder):
+        interrupt.defer()
+        Trainings(_say).run(jobs, arguments.jobs, interrupt)
+        if interrupt.requested():
+            _say("interrupted; the same command goes on")
+            return
+        interrupt.at_once()  # what follows takes minutes, and can be made again
+        _report(folder, suite, jobs, arguments)
 
 
 def _say(text: str) -> None:
@@ -82,12 +92,17 @@ def _say(text: str) -> None:
 
 def _suite(arguments: argparse.Namespace) -> Suite:
     if arguments.suite:
-        if arguments.env_id or arguments.params:
-            raise CartpoleError("a suite says itself what is trained: no --env-id, no --params")
+        if arguments.algo or arguments.env_id or arguments.params:
+            raise CartpoleError(
+                "a suite says itself what is trained: no --algo, no --env-id, no --params"
+            )
         return read_suite(arguments.suite, arguments.suites)
-    env_id = arguments.env_id or "CartPole-v1"
-    options = {"algo": arguments.algo, "env_id": env_id, **key_values(arguments.params, "--params")}
-    name = f"{arguments.algo}__{env_id.replace('/', '-').replace(':', '-')}"
+    if arguments.suites:
+        raise CartpoleError(f"which suite of {arguments.suites}? Name one")
+    algorithm = arguments.algo or DQN
+    given = {"env_id": arguments.env_id or "CartPole-v1", **key_values(arguments.params, "--params")}
+    options = {"algo": algorithm, **given}
+    name = f"{algorithm}__{given['env_id'].replace('/', '-').replace(':', '-')}"
     return Suite(name, "", SEEDS, (make_variant("--params", name, options),))
 
 
@@ -108,16 +123,16 @@ def _claim(folder: Path, suite: Suite) -> None:
 
 
 def _report(folder: Path, suite: Suite, jobs: list[Job], arguments: argparse.Namespace) -> None:
+    runs = _readable(jobs)
     rows = [benchmark.examine(job, arguments.episodes, warn) for job in jobs]
     if all(row.steps is None for row in rows):
         raise CartpoleError(f"no training came to anything; see {jobs[0].log}")
-    line = _line(jobs)
-    tables = [benchmark.summary_table(rows, line), benchmark.table(rows)]
-    head = f"# {suite.name}\n\n{suite.about}\n\n{_machine(arguments, line)}"
+    lines = {run.experiment: threshold(run.env_id) for run in runs}
+    tables = [benchmark.summary_table(rows, lines), benchmark.table(rows)]
+    head = f"# {suite.name}\n\n{suite.about}\n\n{_machine(arguments, set(lines.values()))}"
     text = "\n\n".join([head, *tables]) + "\n"
     write_file(folder / "results.md", lambda stream: stream.write(text.encode()))
     write_json(folder / "results.json", _content(rows, arguments))
-    runs = [open_run(job.folder) for job in jobs if is_run(job.folder)]
     for name, draw in (("curves", learning_curves), ("evaluations", evaluation_panels)):
         _draw(folder / f"{name}.png", draw, runs)
     _say("\n\n".join(reversed(tables)))
@@ -134,15 +149,18 @@ def _draw(path: Path, draw: Callable[[list[Run]], Figure], runs: list[Run]) -> N
     write_figure(path, figure)
 
 
-def _line(jobs: list[Job]) -> float | None:
-    """The return from which the environment counts as solved, if all runs have the same."""
-    lines = {threshold(open_run(job.folder).env_id) for job in jobs if is_run(job.folder)}
-    return lines.pop() if len(lines) == 1 else None
+def _readable(jobs: list[Job]) -> list[Run]:
+    """The runs whose record can be read; the row of each other one says why not."""
+    found = []
+    for job in jobs:
+        with contextlib.suppress(CartpoleError):
+            found.append(open_run(job.folder))
+    return found
 
 
-def _machine(arguments: argparse.Namespace, line: float | None) -> str:
+def _machine(arguments: argparse.Namespace, lines: set[float | None]) -> str:
     about = f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
-    solved = "" if line is None else f" Solved: {line:g}."
+    solved = "".join(f" Solved: {line:g}." for line in lines if line is not None)
     return (
         f"{datetime.date.today().isoformat()}, {about}, {arguments.jobs} at a time. Best and final: "
         f"mean return of {arguments.episodes} greedy episodes that nothing was chosen by.{solved}"
