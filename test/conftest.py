@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import signal
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -32,6 +33,15 @@ def new_engine(request: pytest.FixtureRequest) -> Callable:
     from bullet_gazebo.physics.engines import make_engine
 
     return partial(make_engine, request.param)
+
+
+@pytest.fixture
+def signals() -> Iterator[None]:
+    """Gives signals back after a command that takes them over, as if in a process of its own."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture(scope="session")

@@ -29,20 +29,6 @@ CARTPOLE = {  # options of a training that is quick and uses everything there is
 }
 
 
-class InterruptAfter(Interrupt):
-    """Ctrl-C, pressed when the training asks for the n-th time."""
-
-    def __init__(self, asked: int) -> None:
-        super().__init__()
-        self._left = asked
-
-    def requested(self) -> bool:
-        self._left -= 1
-        if self._left <= 0:
-            self.signal = 2
-        return super().requested()
-
-
 def train(
     folder: Path,
     interrupt: Interrupt | None = None,

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 import torch
-from unit.dqn_runs import flags, without_doubles
+from unit.dqn_runs import InterruptAfter, flags, without_doubles
 from unit.learning_fakes import Dicing, FakePlant, OnlyOne, register_with
-from unit.pg_runs import CARTPOLE, InterruptAfter, assert_same_run, checkpoint, resume, train
+from unit.pg_runs import CARTPOLE, assert_same_run, checkpoint, resume, train
 
 from cartpole.envs.bullet_plant import BulletPlant
 from cartpole.errors import CartpoleError

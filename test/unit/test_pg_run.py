@@ -7,15 +7,15 @@ from pathlib import Path
 import pytest
 import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
-from unit.dqn_runs import points, rows, without_doubles
+from unit.dqn_runs import InterruptAfter, points, rows, without_doubles
 from unit.learning_fakes import Dicing, FakePlant, OnlyOne, register_with
-from unit.pg_runs import CARTPOLE, InterruptAfter, checkpoint, resume, train
+from unit.pg_runs import CARTPOLE, checkpoint, resume, train
 
 from cartpole.errors import CartpoleError
-from cartpole.training import checkpoints, pg_keeper, pg_run
+from cartpole.training import checkpoints, pg_keeper, pg_run, run_checkpoints
 from cartpole.training.evaluation import Evaluation
 from cartpole.training.interrupt import Interrupt
-from cartpole.training.pg_policy import load_policy
+from cartpole.training.pg_policy import policy_of
 from cartpole.training.pg_stage import gymnasium_stage
 
 DOCUMENTS = {"Reward", "Value Loss", "Policy Loss"}
@@ -181,7 +181,7 @@ def test_a_policy_is_the_best_one_only_if_more_episodes_confirm_it(
 
 def test_the_best_policy_comes_back_from_its_folder(tmp_path: Path) -> None:
     train(tmp_path, **CARTPOLE)
-    policy = load_policy(tmp_path)
+    policy = policy_of(run_checkpoints.read(tmp_path / "best.pt"), "best.pt", {})
     observation, _ = policy.env.reset(seed=0)
     assert policy.agent.probabilities(observation).sum() == pytest.approx(1.0)
     assert policy.choice.run.env_id == "CartPole-v1"

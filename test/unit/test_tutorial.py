@@ -8,10 +8,9 @@ thirty of them takes minutes; the long test starts them.
 
 import re
 import shlex
-import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,6 +18,8 @@ import pytest
 
 from cartpole.training import dqn_cli
 from cartpole.workbench import cli
+
+pytestmark = pytest.mark.usefixtures("signals")
 
 ROOT = Path(__file__).resolve().parents[2]
 ENGLISH, CHINESE = (ROOT / "docs" / name for name in ("tutorial_dqn.md", "tutorial_dqn.zh.md"))
@@ -70,15 +71,6 @@ def shortened(line: str) -> list[str]:
     if "--resume" in words:
         key = f"{script} --resume"
     return [*words[1:], *SHORTER.get(key, "").split()]
-
-
-@pytest.fixture(autouse=True)
-def signals() -> Iterator[None]:
-    """The commands take over signals, as in a process of their own."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 def as_process(words: list[str]) -> tuple[int, str]:

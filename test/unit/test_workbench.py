@@ -3,8 +3,6 @@
 import json
 import os
 import shutil
-import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +12,7 @@ from unit import workbench_runs
 
 from cartpole.workbench import cli
 
-
-@pytest.fixture(autouse=True)
-def signals() -> Iterator[None]:
-    """The commands take over signals, as in a process of their own."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
+pytestmark = pytest.mark.usefixtures("signals")
 
 
 @pytest.fixture(scope="module")

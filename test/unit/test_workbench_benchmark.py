@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -28,6 +27,8 @@ from cartpole.workbench.suites import (
 )
 from cartpole.workbench.trainings import Job, Trainings
 
+pytestmark = pytest.mark.usefixtures("signals")
+
 QUICK = {"total_timesteps": 300, "learning_starts": 50, "batch_size": 8, "hidden_sizes": [8],
          "eval_frequency": 150, "eval_episodes": 1, "confirm_episodes": 1}  # fmt: skip
 SUITE = """
@@ -40,15 +41,6 @@ two:
     plain: {double: false, env_kwargs: {sutton_barto_reward: true}}
     broken: {env_id: NoSuch-v0}
 """
-
-
-@pytest.fixture(autouse=True)
-def signals() -> Iterator[None]:
-    """The commands take over signals, as in a process of their own."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """Trainings with Stable-Baselines3: the same run folder, and algorithms that don't fit."""
 
 import json
-import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,19 +16,10 @@ from unit import workbench_runs
 from cartpole.errors import CartpoleError
 from cartpole.workbench import cli
 
-pytestmark = pytest.mark.extras("stable_baselines3")
+pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.extras("stable_baselines3")]
 
 OFF_POLICY = {"total_timesteps": 200, "learning_starts": 50, "buffer_size": 500, "n_steps": None,
               "batch_size": 16, "env_id": "Pendulum-v1", "eval_frequency": 100}  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def signals() -> Iterator[None]:
-    """The commands take over signals, as in a process of their own."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 @pytest.fixture(scope="module")

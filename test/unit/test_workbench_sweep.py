@@ -2,7 +2,6 @@
 
 import json
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +15,8 @@ from cartpole.workbench.sweep import Sweep, run_sweep
 from cartpole.workbench.sweep_ranges import Range, read_ranges
 from cartpole.workbench.sweep_trainers import names_of
 
-pytestmark = pytest.mark.extras("optuna", "stable_baselines3")
+pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.extras("optuna", "stable_baselines3")]
 RANGES = {"x": Range(-10.0, 10.0, False, ()), "kind": Range(0, 0, False, ("a", "b"))}
-
-
-@pytest.fixture(autouse=True)
-def signals() -> Iterator[None]:
-    """The commands take over signals, as in a process of their own."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 def sweep(folder: Path, trials: int, seeds: int = 1) -> Sweep:

@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import gymnasium
@@ -15,20 +14,11 @@ from unit import dqn_runs, workbench_runs
 from cartpole.errors import CartpoleError
 from cartpole.workbench import cli
 
-pytestmark = pytest.mark.extras("stable_baselines3")
+pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.extras("stable_baselines3")]
 PPO = ["train", "--algo", "ppo", "--env-id", "CartPole-v1", "--n-steps", "64", "--net-arch", "8"]
 SAC = {"env_id": "Pendulum-v1", "total_timesteps": 260, "learning_starts": 50, "buffer_size": 100,
        "batch_size": 8, "net_arch": "8", "eval_frequency": 0, "checkpoint_frequency": 50,
        "n_steps": None}  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def signals() -> Iterator[None]:
-    """The commands take over signals, as in a process of their own."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 @pytest.fixture

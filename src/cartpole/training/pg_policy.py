@@ -1,7 +1,7 @@
 """Agents for environments: new ones, and those that a training left in its folder."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -16,7 +16,6 @@ from cartpole.agents.reinforce import ReinforceAgent
 from cartpole.errors import CartpoleError
 from cartpole.training.environments import discrete_actions, make_environment
 from cartpole.training.pg_settings import Choice, from_config
-from cartpole.training.run_checkpoints import LAST, candidates, read
 
 SCALE = (0.4, 1.0, 0.2, 2.0)  # [m], [m/s], [rad], [rad/s]: what an observation comes to
 
@@ -57,24 +56,22 @@ def hyperparameters(choice: Choice) -> dict[str, Any]:
     }
 
 
-def load_policy(path: Path, **env_options: Any) -> Policy:
-    """The agent of a checkpoint; of a run folder the best one, or else the last.
+def policy_of(content: dict[str, Any], origin: str, env_options: Mapping[str, Any]) -> Policy:
+    """The agent of a checkpoint that was read already.
 
     Args:
-        path: a checkpoint or a run folder.
+        content: what `run_checkpoints.read` gave.
+        origin: its file, for the errors.
         env_options: further options of the environment, as `render_mode`.
 
     Raises:
-        CartpoleError: if it can't be read, or its environment can't be made.
+        CartpoleError: if it isn't policy gradient's, or its environment can't be made.
     """
-    if path.is_dir():
-        path = next(iter(candidates(path, best_first=True)), path / LAST)
-    content = read(path)
-    choice = from_config(content.get("config"), str(path))
+    choice = from_config(content.get("config"), origin)
     env = make_environment(choice.run.env_id, {**choice.run.env_kwargs, **env_options})
     try:
         agent = make_agent(choice, env)
-        restore(agent, content, str(path))
+        restore(agent, content, origin)
     except CartpoleError:
         env.close()
         raise

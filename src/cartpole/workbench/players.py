@@ -89,7 +89,7 @@ def _dqn(run: Run, path: Path, state: dict[str, Any], options: dict[str, Any]) -
 def _policy_gradient(
     run: Run, path: Path, state: dict[str, Any], options: dict[str, Any]
 ) -> Player:
-    policy = pg_policy.load_policy(path, **options)
+    policy = pg_policy.policy_of(state, str(path), options)
     agent = policy.agent
 
     def preference(observations: np.ndarray) -> np.ndarray:
