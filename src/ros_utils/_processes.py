@@ -29,6 +29,7 @@ from ros_utils import _endings, _log, _procfs, _registry, _target
 
 # A caller that a shell put into the background ignores Ctrl-C, and so would all that it starts.
 LISTENING = ("env", "--default-signal=INT")
+COLLECTED = 5.0  # [s] from the end of a process's main thread to its exit code, at most
 
 
 class CannotStart(Exception):
@@ -218,10 +219,28 @@ def end(entries: Sequence[_registry.Entry]) -> bool:
         if wave:
             left = _endings.end(wave, reap)
             gone = gone and not left
-            _registry.remove({entry.token for entry in wave} - left)
+            ended = {entry.token for entry in wave} - left
+            gone = _collect(ended) and gone
+            _registry.remove(ended)
     with _lock:
         _handles[:] = [handle for handle in _handles if handle.process.poll() is None]
     return gone
+
+
+def _collect(tokens: set[str]) -> bool:
+    """Waits for the exit codes of those that are our children; False if one doesn't come.
+
+    The main thread's end looks like the process's in /proc, but on a busy machine other threads may
+    take a while, and until then the process has no exit code.
+    """
+    with _lock:
+        ours = [handle.process for handle in _handles if handle.entry.token in tokens]
+    try:
+        for process in ours:
+            process.wait(COLLECTED)
+    except subprocess.TimeoutExpired:
+        return False
+    return True
 
 
 def reap() -> None:

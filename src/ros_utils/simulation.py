@@ -73,6 +73,7 @@ class Simulation:
         if not isinstance(started, Started):
             raise CannotSimulate(f"no simulator at {self.master_uri}; the log says why")
         self._started = started
+        self._closed = False
 
     @property
     def log_file(self) -> str | None:
@@ -103,10 +104,14 @@ class Simulation:
         Returns:
             True if nothing is left.
         """
-        if not self.running and not _is_up(self.master_uri):
+        if self._closed:  # the port may be somebody else's master's by now
             return True
-        with self.active():
-            return ros_node.ros_kill_all_processes()
+        if self.running or _is_up(self.master_uri):
+            with self.active():
+                self._closed = ros_node.ros_kill_all_processes()
+        else:
+            self._closed = True
+        return self._closed
 
     def __enter__(self) -> Simulation:
         return self

@@ -73,6 +73,21 @@ def test_what_is_started_is_remembered_and_forgotten_once_ended():
     assert not os.path.exists(_registry.path())
 
 
+LINGERING = """
+import ctypes, threading, time
+threading.Thread(target=time.sleep, args=(1.0,)).start()
+ctypes.CDLL(None).pthread_exit(None)
+"""
+
+
+def test_a_program_whose_threads_outlive_its_main_thread_has_ended_when_it_is_said_so():
+    handle = _processes.start([sys.executable, "-c", LINGERING], "node", "lingering")
+    wait_until(lambda: not runs(handle.process.pid))  # for /proc it is a zombie already
+    assert handle.exit_code() is None
+    assert _processes.end(_processes.started())
+    assert handle.exit_code() is not None
+
+
 def test_it_has_a_session_of_its_own():
     handle = _processes.start(SLEEP, "node", "sleeper")
     assert os.getsid(handle.process.pid) == handle.process.pid

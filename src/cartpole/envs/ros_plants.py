@@ -138,7 +138,7 @@ class RealtimePlant:
         self._reset = _Resetter()
         self._pause = ServiceClient("/gazebo/pause_physics", Empty)
         self._unpause = ServiceClient("/gazebo/unpause_physics", Empty)
-        self._command = rospy.Publisher(f"/{CONTROLLER}/command", Float64, queue_size=1)
+        self._command = _offer_command()
         self._newest: tuple[JointState, float] | None = None  # with its wall time [s]
         self._arrived = threading.Condition()
         self._subscriber = rospy.Subscriber(
@@ -216,13 +216,28 @@ class RealtimePlant:
         return due is None or self._newest[0].header.stamp.to_sec() > due - _EARLY
 
     def _wait_for_command_link(self) -> None:
-        deadline = time.monotonic() + STATE_TIMEOUT
+        """Offers the topic anew halfway.
+
+        A listener that asks for it between one environment's end and the next one's beginning, in the
+        same process, is turned away, and rospy doesn't ask again.
+        """
+        if self._is_linked(STATE_TIMEOUT / 2):
+            return
+        self._command.unregister()
+        self._command = _offer_command()
+        if not self._is_linked(STATE_TIMEOUT / 2):
+            raise SimulatorError(
+                f"nobody listens on {self._command.resolved_name}; is {CONTROLLER} started?"
+            )
+
+    def _is_linked(self, bound: float) -> bool:
+        """Whether somebody listens to the commands, at the latest after that time [s]."""
+        deadline = time.monotonic() + bound
         while self._command.get_num_connections() == 0:
             if time.monotonic() > deadline:
-                raise SimulatorError(
-                    f"nobody listens on {self._command.resolved_name}; is {CONTROLLER} started?"
-                )
+                return False
             time.sleep(0.01)
+        return True
 
     def vary(self, variation: Variation) -> None:
         """See `Plant.vary`."""
@@ -233,3 +248,7 @@ class RealtimePlant:
         self._subscriber.unregister()
         self._command.unregister()
         self._variation.undo()
+
+
+def _offer_command() -> rospy.Publisher:
+    return rospy.Publisher(f"/{CONTROLLER}/command", Float64, queue_size=1)
