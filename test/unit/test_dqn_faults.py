@@ -105,6 +105,7 @@ def test_a_spoilt_observation_ends_training_and_evaluation(register, tmp_path: P
         train(tmp_path / "judged", **(options | {"eval_frequency": 20, "eval_episodes": 9}))
 
 
+@pytest.mark.extras("Box2D")
 @pytest.mark.parametrize(
     ("env_id", "options", "words"),
     [("LunarLander-v3", {"gravity": 5}, "must be between -12 and 0"),
@@ -112,8 +113,6 @@ def test_a_spoilt_observation_ends_training_and_evaluation(register, tmp_path: P
      ("CartPole-v1", {"wheels": 4}, "unexpected keyword")],
 )  # fmt: skip
 def test_options_that_an_environment_refuses(env_id: str, options: dict, words: str) -> None:
-    if env_id.startswith("Lunar"):
-        pytest.importorskip("Box2D")
     with pytest.raises(CartpoleError, match=f"can't make {env_id}: .*{words}") as raised:
         make_environment(env_id, options)
     assert "\n" not in str(raised.value)
