@@ -12,4 +12,4 @@ import sys
 from learning_suites import run
 
 if __name__ == "__main__":
-    sys.exit(run("cartpole"))
+    sys.exit(run("cartpole", "cartpole_sb3"))
