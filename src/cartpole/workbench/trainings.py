@@ -173,7 +173,13 @@ def _told(job: Job, code: int) -> str:
     name = f"{job.variant.name}, seed {job.seed}"
     summary = job.summary()
     if code or not summary:
-        return f"{name}: ended with exit code {code}, see {job.log}"
+        return f"{name}: ended with exit code {code}, see {job.log}{_last_words(job)}"
     best = summary.get("best")
     found = f"best evaluation {best[1]:.1f} at step {best[0]}" if best else "no evaluation"
     return f"{name}: {summary['steps']} steps in {summary['seconds']:.1f} s, {found}"
+
+
+def _last_words(job: Job) -> str:
+    """What a training that failed said at its end."""
+    lines = job.log.read_text(encoding="utf-8", errors="replace").split("\n")
+    return next((f": {line}" for line in reversed(lines) if line.strip()), "")
