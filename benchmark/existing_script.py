@@ -24,7 +24,7 @@ import time
 import uuid
 from pathlib import Path
 
-from cartpole.training.plots import learning_curve
+from rl_workbench.training.run.learning_curve import learning_curve
 
 ROOT = Path(__file__).resolve().parent.parent
 SCRIPT = ROOT.parent / "shared" / "pg_script" / "launch_robot_test.py"

@@ -18,9 +18,9 @@ import reporting
 import torch
 from stable_baselines3 import DQN
 
-from cartpole.training.dqn_run import DQNTraining
-from cartpole.training.dqn_settings import choose
-from cartpole.training.interrupt import Interrupt
+from rl_workbench.training.dqn.run import DQNTraining
+from rl_workbench.training.dqn.settings import choose
+from rl_workbench.training.run.interrupt import Interrupt
 
 ENV_ID = "CartPole-v1"
 # What both know, by our names; the first is the tutorial's, the second the tuned one's.

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from cartpole.workbench.cli import main
+from rl_workbench.cli import main
 
 
 def run(*suites: str) -> int:

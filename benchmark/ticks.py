@@ -17,9 +17,9 @@ from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.physics.bullet import BulletEngine
+from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
+from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.urdf import parse_urdf
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.robot import Robot
 from bullet_gazebo.simulator import Simulator

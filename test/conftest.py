@@ -16,7 +16,7 @@ from rostest_plugin import pytest_collect_file
 __all__ = ["pytest_collect_file"]
 
 # Nodes of rostest files: only roslaunch can run them.
-collect_ignore_glob = ["ros/*.py"]
+collect_ignore_glob = ["ros/**/*.py"]
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -30,7 +30,7 @@ ENGINES = ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
 @pytest.fixture(params=ENGINES)
 def new_engine(request: pytest.FixtureRequest) -> Callable:
     """Makes a physics engine; a test that asks for it runs with each of them."""
-    from bullet_gazebo.physics.engines import make_engine
+    from bullet_gazebo.physics.engines.registry import make_engine
 
     return partial(make_engine, request.param)
 

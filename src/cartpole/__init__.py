@@ -4,13 +4,6 @@ Importing this registers the environments `cartpole/Balance-v0`, `cartpole/Class
 `cartpole/SwingUp-v0` with Gymnasium; what they are made of is loaded when one is made.
 """
 
-from importlib.util import find_spec
-from pkgutil import extend_path
+from cartpole.registration import register_environments
 
-# The generated part of this package, cartpole.srv, lies in another folder of the catkin workspace.
-__path__ = extend_path(__path__, __name__)
-
-if find_spec("gymnasium"):  # the simulator, which needs our messages, runs without it
-    from cartpole.registration import register_environments
-
-    register_environments()
+register_environments()

@@ -1,7 +1,10 @@
 """Errors whose text is meant for the user: shown as one line, never as a traceback."""
 
 
-class CartpoleError(RuntimeError):
+from rl_workbench.errors import WorkbenchError
+
+
+class CartpoleError(WorkbenchError):
     """Something the user can mend; the text says what is wrong and what to do."""
 
 

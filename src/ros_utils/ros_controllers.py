@@ -12,9 +12,10 @@ from collections.abc import Sequence
 
 from controller_manager_msgs.srv import ListControllerTypes, SwitchController
 
-from ros_utils import _log, _services
-from ros_utils._controller_calls import names, service_name, states, until_ok
-from ros_utils._controller_loading import (
+from ros_utils._internal import log as _log
+from ros_utils._internal import services as _services
+from ros_utils._internal.controller_calls import names, service_name, states, until_ok
+from ros_utils._internal.controller_loading import (
     load_controller_list_srv,
     load_controller_srv,
     unload_controller_list_srv,

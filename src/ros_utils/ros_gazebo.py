@@ -6,9 +6,9 @@ with. A failure is logged, never raised. Positions are in [m], orientations are 
 is all zeros means no rotation.
 """
 
-from ros_utils._gazebo_calls import GAZEBO, TIMEOUT
-from ros_utils._gazebo_launch import close_Gazebo, launch_Gazebo
-from ros_utils._gazebo_physics import (
+from ros_utils._internal.gazebo.calls import GAZEBO, TIMEOUT
+from ros_utils._internal.gazebo.launch import close_Gazebo, launch_Gazebo
+from ros_utils._internal.gazebo.physics import (
     gazebo_get_gravity,
     gazebo_get_max_update_rate,
     gazebo_get_ODE_physics,
@@ -21,20 +21,20 @@ from ros_utils._gazebo_physics import (
     gazebo_set_physics_properties,
     gazebo_set_time_step,
 )
-from ros_utils._gazebo_spawn import gazebo_delete_model
-from ros_utils._gazebo_spawn_sdf import (
+from ros_utils._internal.gazebo.spawn import gazebo_delete_model
+from ros_utils._internal.gazebo.spawn_sdf import (
     gazebo_spawn_sdf_param,
     gazebo_spawn_sdf_path,
     gazebo_spawn_sdf_pkg,
     gazebo_spawn_sdf_string,
 )
-from ros_utils._gazebo_spawn_urdf import (
+from ros_utils._internal.gazebo.spawn_urdf import (
     gazebo_spawn_urdf_param,
     gazebo_spawn_urdf_path,
     gazebo_spawn_urdf_pkg,
     gazebo_spawn_urdf_string,
 )
-from ros_utils._gazebo_state import (
+from ros_utils._internal.gazebo.state import (
     gazebo_apply_joint_effort,
     gazebo_get_joint_properties,
     gazebo_get_link_state,
@@ -45,7 +45,7 @@ from ros_utils._gazebo_state import (
     gazebo_set_model_configuration,
     gazebo_set_model_state,
 )
-from ros_utils._gazebo_time import (
+from ros_utils._internal.gazebo.time import (
     gazebo_pause_physics,
     gazebo_reset_sim,
     gazebo_reset_world,

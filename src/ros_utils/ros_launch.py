@@ -6,9 +6,15 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 
-from ros_utils import _log, _master, _nodes, _packages, _processes, _target, _waiting
-from ros_utils._started import Started
-from ros_utils._waiting import Outcome
+from ros_utils._internal import log as _log
+from ros_utils._internal import master as _master
+from ros_utils._internal import packages as _packages
+from ros_utils._internal import target as _target
+from ros_utils._internal import waiting as _waiting
+from ros_utils._internal.processes import nodes as _nodes
+from ros_utils._internal.processes import processes as _processes
+from ros_utils._internal.processes.started import Started
+from ros_utils._internal.waiting import Outcome
 
 SETTLE = 5.0  # [s] at most, for the nodes of a launch file to register after their processes run
 STABLE = 0.3  # [s] without a further process: roslaunch has started them all

@@ -7,7 +7,10 @@ from typing import Any
 import rosparam
 import yaml
 
-from ros_utils import _log, _master, _packages, _params
+from ros_utils._internal import log as _log
+from ros_utils._internal import master as _master
+from ros_utils._internal import packages as _packages
+from ros_utils._internal import params as _params
 
 
 def ros_load_yaml_from_pkg(pkg_name: str, file_name: str, ns: str = "/") -> bool:

@@ -9,7 +9,10 @@ from xml.parsers.expat import ExpatError
 
 import xacro
 
-from ros_utils import _log, _master, _packages, _params
+from ros_utils._internal import log as _log
+from ros_utils._internal import master as _master
+from ros_utils._internal import packages as _packages
+from ros_utils._internal import params as _params
 
 _lock = threading.Lock()  # xacro keeps its state in module variables
 

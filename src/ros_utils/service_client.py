@@ -6,7 +6,8 @@ from typing import Any
 
 import rospy
 
-from ros_utils import _master, _tcpros
+from ros_utils._internal import master as _master
+from ros_utils._internal import tcpros as _tcpros
 
 TIMEOUT = 5.0  # [s] of wall time
 

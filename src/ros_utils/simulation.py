@@ -19,8 +19,10 @@ import socket
 from types import TracebackType
 from typing import Any
 
-from ros_utils import _master, _target, ros_gazebo, ros_node
-from ros_utils._started import Started
+from ros_utils import ros_gazebo, ros_node
+from ros_utils._internal import master as _master
+from ros_utils._internal import target as _target
+from ros_utils._internal.processes.started import Started
 
 LOOPBACK = "127.0.0.1"
 

@@ -1,4 +1,4 @@
-"""Moving a world in lock-step from Python: a client for `/gazebo/step_world` (srv/StepWorld.srv).
+"""Moving a world in lock-step from Python: a client for `/gazebo/step_world` (bullet_gazebo_msgs/StepWorld).
 
     client = StepClient()
     client.reset({"cart_pole": 0.1}, {"cart_pole": -0.5})
@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 from numbers import Integral
 from typing import Any
 
-from cartpole.srv import StepWorld, StepWorldRequest, StepWorldResponse
+from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
+
 from ros_utils.service_client import ServiceClient, ServiceFailed, ServiceGone
 
 STEP_SERVICE = "/gazebo/step_world"

@@ -8,7 +8,8 @@ from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.physics.engines import make_engine
+from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.properties import (
     JointProperties,
@@ -16,7 +17,6 @@ from bullet_gazebo.physics.properties import (
     set_joint_properties,
     set_link_properties,
 )
-from bullet_gazebo.physics.urdf import parse_urdf
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.robot import Robot
 from bullet_gazebo.simulator import Simulator
@@ -49,7 +49,7 @@ class BulletPlant:
     Args:
         control_period: simulated time [s] of one action.
         height: of the stand above the ground [m].
-        engine: "bullet", or "mujoco"; see `bullet_gazebo.physics.engines`.
+        engine: "bullet", or "mujoco"; see `bullet_gazebo.physics.engines.registry`.
 
     Raises:
         ValueError: if the period isn't a whole number of physics steps, or there is no such

@@ -75,7 +75,8 @@ class LockstepPlant:
     deterministic = shared = True
 
     def __init__(self, ticks: int | None = None) -> None:
-        from cartpole.srv import StepWorld, StepWorldRequest
+        from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+
         from ros_utils.step_client import time_of
 
         self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True)

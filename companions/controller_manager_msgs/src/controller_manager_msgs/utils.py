@@ -1,18 +1,18 @@
 """Helpers around the controller manager's interface, under the name that rqt's plugins import."""
 
-from bullet_gazebo.ros.controller_filters import (
-    filter_by_hardware_interface,
-    filter_by_name,
-    filter_by_resources,
-    filter_by_state,
-    filter_by_type,
-)
-from bullet_gazebo.ros.manager_discovery import (
+from bullet_gazebo.ros.clients.manager_discovery import (
     ControllerLister,
     ControllerManagerLister,
     get_controller_managers,
     get_rosparam_controller_names,
     is_controller_manager,
+)
+from bullet_gazebo.ros.control.controller_filters import (
+    filter_by_hardware_interface,
+    filter_by_name,
+    filter_by_resources,
+    filter_by_state,
+    filter_by_type,
 )
 
 __all__ = [

@@ -1,0 +1,225 @@
+"""A model inside PyBullet."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+import pybullet
+
+from bullet_gazebo.physics.description import Inertia, ModelDescription
+from bullet_gazebo.physics.engine import Body, Twist
+from bullet_gazebo.physics.engines.bullet.contacts import (
+    check_meshes,
+    choose_self_collisions,
+    set_friction,
+)
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
+
+NO_SPEED_LIMIT = 1e9  # [rad/s, m/s]; PyBullet clamps joint speeds at 100 unless told otherwise
+BASE = -1
+
+
+class BulletBody(Body):
+    """A multi-body of PyBullet; its default motors and dampings are off."""
+
+    def __init__(
+        self,
+        client: int,
+        body: int,
+        description: ModelDescription,
+        pose: Pose,
+        weightless: set[tuple[int, int]],
+        offsets: Mapping[str, Pose],
+    ) -> None:
+        """`offsets` are frames of links, as seen from the engine's, where they differ."""
+        self.id = body
+        self._client = client
+        self._weightless = weightless
+        self._offsets = offsets
+        joints = {name: i for i, name in enumerate(self._engine_joints())}
+        self.joint_names = tuple(
+            name for name, joint in description.joints.items() if joint.movable and name in joints
+        )
+        self._indices = [joints[name] for name in self.joint_names]
+        self._links = {description.root: BASE} | {
+            joint.child: joints[name] for name, joint in description.joints.items()
+        }
+        self.link_names = tuple(
+            name
+            for name, link in description.links.items()
+            if name in self._links and not link.part_of
+        )
+        self._fixed = description.fixed_base
+        dynamics = pybullet.getDynamicsInfo(body, BASE, client)
+        check_meshes(client, body, self._links, description)
+        self._com = Pose(dynamics[3], dynamics[4])  # the engine turns it onto the principal axes
+        if is_plane(description):
+            self._com = description.links[description.root].collisions[0].pose
+        self._free_from_defaults(description)
+        self._states: Callable[[], Sequence[Sequence[float]]] = tuple  # of a body without joints
+        if self._indices:
+            self._states = partial(pybullet.getJointStates, body, self._indices, client)
+        self._efforts = partial(
+            pybullet.setJointMotorControlArray, body, self._indices, pybullet.TORQUE_CONTROL,
+            physicsClientId=client,
+        )  # fmt: skip
+        if not is_plane(description):
+            self.reset_base(pose)
+
+    def _engine_joints(self) -> list[str]:
+        """Names of the joints, in the engine's order."""
+        count = pybullet.getNumJoints(self.id, physicsClientId=self._client)
+        return [pybullet.getJointInfo(self.id, i, self._client)[1].decode() for i in range(count)]
+
+    def _free_from_defaults(self, description: ModelDescription) -> None:
+        """Nothing acts but what the model says: no damping, no friction motors, no clamped speeds."""
+        pybullet.changeDynamics(
+            self.id, BASE, linearDamping=0.0, angularDamping=0.0, maxJointVelocity=NO_SPEED_LIMIT,
+            physicsClientId=self._client,
+        )  # fmt: skip
+        for name, index in zip(self.joint_names, self._indices, strict=True):
+            joint = description.joints[name]
+            pybullet.changeDynamics(
+                self.id, index, linearDamping=0.0, angularDamping=0.0, jointDamping=joint.damping,
+                maxJointVelocity=NO_SPEED_LIMIT, physicsClientId=self._client,
+            )  # fmt: skip
+            # A velocity motor at speed 0 with a bounded force is dry friction; force 0 switches it off.
+            pybullet.setJointMotorControl2(
+                self.id, index, pybullet.VELOCITY_CONTROL, force=joint.friction,
+                physicsClientId=self._client,
+            )  # fmt: skip
+
+        set_friction(self._client, self.id, self._links, description)
+        choose_self_collisions(self._client, self.id, self._links, description)
+        for name in self.link_names:
+            link = description.links[name]
+            self.set_link_gravity(name, link.gravity)
+            if link.inertia is not None and not description.static:
+                self._keep_moments(self._links[name], link.inertia)
+
+    def _keep_moments(self, index: int, inertia: Inertia) -> None:
+        """PyBullet takes moments that no real body has (a > b + c) for none at all, ODE as they are.
+
+        The products of such a tensor are left out.
+        """
+        if not any(pybullet.getDynamicsInfo(self.id, index, self._client)[2]):
+            pybullet.changeDynamics(
+                self.id, index, localInertiaDiagonal=_moments(inertia), physicsClientId=self._client
+            )
+
+    def set_link_gravity(self, name: str, on: bool) -> None:
+        key = (self.id, self._links[name])
+        if on:
+            self._weightless.discard(key)
+        else:
+            self._weightless.add(key)
+
+    def link_gravity(self, name: str) -> bool:
+        return (self.id, self._links[name]) not in self._weightless
+
+    def joint_states(self) -> Sequence[Sequence[float]]:
+        return self._states()
+
+    def apply_efforts(self, efforts: Sequence[float]) -> None:
+        self._efforts(forces=efforts)
+
+    def add_effort(self, index: int, effort: float) -> None:
+        # The engine sums torques up until the step, and forgets them then.
+        pybullet.setJointMotorControl2(
+            self.id, self._indices[index], pybullet.TORQUE_CONTROL, force=effort,
+            physicsClientId=self._client,
+        )  # fmt: skip
+
+    def add_wrench(self, link: str, force: Vector, torque: Vector) -> None:
+        index = self._links[link]
+        if index == BASE:
+            com = pybullet.getBasePositionAndOrientation(self.id, self._client)[0]
+        else:
+            com = pybullet.getLinkState(self.id, index, 0, 1, self._client)[0]
+        world = pybullet.WORLD_FRAME
+        pybullet.applyExternalForce(self.id, index, force, com, world, self._client)
+        pybullet.applyExternalTorque(self.id, index, torque, world, self._client)
+
+    def set_inertia(self, link: str, old: Inertia | None, new: Inertia) -> bool:
+        index = self._links[link]
+        if self._offsets.get(link, Pose()) != Pose():
+            return False  # the engine's link has other axes
+        if old is None or old.com != new.com or not (_is_diagonal(old) and _is_diagonal(new)):
+            return False  # the engine can't move or turn a link's principal axes
+        axes = pybullet.getDynamicsInfo(self.id, index, self._client)[2]
+        if max(abs(a - b) for a, b in zip(axes, _moments(old), strict=True)) > 1e-9 * max(axes):
+            return False
+        pybullet.changeDynamics(
+            self.id, index, mass=new.mass, localInertiaDiagonal=_moments(new),
+            physicsClientId=self._client,
+        )  # fmt: skip
+        return True
+
+    def set_damping(self, index: int, damping: float) -> None:
+        pybullet.changeDynamics(
+            self.id, self._indices[index], jointDamping=damping, physicsClientId=self._client
+        )
+
+    def set_limits(self, index: int, lower: float, upper: float) -> None:
+        pybullet.changeDynamics(
+            self.id, self._indices[index], jointLowerLimit=lower, jointUpperLimit=upper,
+            physicsClientId=self._client,
+        )  # fmt: skip
+
+    def set_motor(self, index: int, velocity: float, effort: float) -> None:
+        pybullet.setJointMotorControl2(
+            self.id, self._indices[index], pybullet.VELOCITY_CONTROL, targetVelocity=velocity,
+            force=effort, physicsClientId=self._client,
+        )  # fmt: skip
+
+    def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
+        pybullet.resetJointState(self.id, self._indices[index], position, velocity, self._client)
+
+    def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
+        # PyBullet's base pose and velocity are those of the centre of mass, not of the link's frame.
+        com = pose.compose(self._com)
+        pybullet.resetBasePositionAndOrientation(
+            self.id, com.position, com.orientation, physicsClientId=self._client
+        )
+        if not self._fixed:
+            linear, angular = twist
+            arm = subtract(com.position, pose.position)
+            pybullet.resetBaseVelocity(
+                self.id, add(linear, cross(angular, arm)), angular, physicsClientId=self._client
+            )
+
+    def link_state(self, name: str) -> tuple[Pose, Twist]:
+        index = self._links[name]
+        if index == BASE:
+            return self._base_state()
+        state = pybullet.getLinkState(
+            self.id,
+            index,
+            computeLinkVelocity=1,
+            computeForwardKinematics=1,
+            physicsClientId=self._client,
+        )
+        pose = Pose(state[4], state[5])
+        if name in self._offsets:
+            pose = pose.compose(self._offsets[name])
+        arm = subtract(pose.position, state[0])
+        return pose, (add(state[6], cross(state[7], arm)), state[7])
+
+    def _base_state(self) -> tuple[Pose, Twist]:
+        com = Pose(*pybullet.getBasePositionAndOrientation(self.id, self._client))
+        linear, angular = pybullet.getBaseVelocity(self.id, self._client)
+        pose = com.compose(self._com.inverse())
+        return pose, (add(linear, cross(angular, subtract(pose.position, com.position))), angular)
+
+
+def _moments(inertia: Inertia) -> Vector:
+    return (inertia.ixx, inertia.iyy, inertia.izz)
+
+
+def _is_diagonal(inertia: Inertia) -> bool:
+    return inertia.ixy == inertia.ixz == inertia.iyz == 0.0
+
+
+def is_plane(description: ModelDescription) -> bool:
+    """Whether the model is a plane and nothing else: that needs no file."""
+    shapes = [shape for link in description.links.values() for shape in link.collisions]
+    return len(description.links) == len(shapes) == 1 and shapes[0].kind == "plane"

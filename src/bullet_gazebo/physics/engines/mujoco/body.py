@@ -1,0 +1,179 @@
+"""A model inside MuJoCo."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    Inertia,
+    Joint,
+    ModelDescription,
+)
+from bullet_gazebo.physics.engine import Body, Twist
+from bullet_gazebo.physics.engines.mujoco.model import Elements, wxyz
+from bullet_gazebo.physics.engines.mujoco.state import Motion, MujocoState
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector, conjugate, rotate
+
+FREE_POSITIONS, FREE_VELOCITIES = 7, 6  # of a free base
+
+
+@dataclass
+class JointSettings:
+    """What can be changed of a joint: [N m s/rad, N s/m], [rad, m], [rad/s, m/s], [N m, N]."""
+
+    damping: float
+    lower: float
+    upper: float
+    speed: float
+    effort: float
+
+    @classmethod
+    def of(cls, joint: Joint) -> "JointSettings":
+        lower, upper = (joint.lower, joint.upper) if joint.bounded else (1.0, -1.0)
+        return cls(joint.damping, lower, upper, 0.0, joint.friction)
+
+
+class MujocoBody(Body):
+    """The bodies and joints of one model; `bind` finds them again after the world was compiled anew."""
+
+    def __init__(
+        self,
+        state: MujocoState,
+        description: ModelDescription,
+        pose: Pose,
+        compile_anew: Callable[[], None],
+    ) -> None:
+        """`compile_anew` makes the world's model from its bodies' present settings."""
+        self.description = description
+        self.pose = pose  # of the root link; of one that is free, where it was loaded
+        self.link_names = tuple(description.links)
+        joints = [] if description.static else description.movable_joints
+        self.joint_names = tuple(joint.name for joint in joints)
+        self.inertias = {name: link.inertia for name, link in description.links.items()}
+        self._gravity = {name: link.gravity for name, link in description.links.items()}
+        self._joints = [JointSettings.of(joint) for joint in joints]
+        self._state = state
+        self._compile_anew = compile_anew
+
+    def bind(self, elements: Elements) -> None:
+        """Takes its places in a newly compiled model, and puts its settings into it."""
+        model, data = self._state.model, self._state.data
+        self._ids = {name: body.id for name, body in elements.bodies.items()}
+        self._indices = [elements.joints[name].id for name in self.joint_names]
+        self._q = model.jnt_qposadr[self._indices].tolist()
+        self._v = model.jnt_dofadr[self._indices].tolist()
+        self._free = None
+        if elements.free is not None:
+            index = elements.free.id
+            self._free = int(model.jnt_qposadr[index]), int(model.jnt_dofadr[index])
+        self._qpos, self._qvel, self._qfrc = data.qpos, data.qvel, data.qfrc_applied
+        for link, moments in elements.moments.items():
+            model.body_inertia[self._ids[link]] = moments
+        for name, on in self._gravity.items():
+            self._weigh(name, on)
+        for index, joint in enumerate(self._joints):
+            self.set_damping(index, joint.damping)
+            self.set_limits(index, joint.lower, joint.upper)
+            self.set_motor(index, joint.speed, joint.effort)
+
+    def motion(self) -> Motion:
+        """Returns a copy of its state, joint by joint and base last."""
+        q, v = self._places()
+        wrenches = self._state.data.xfrc_applied[list(self._ids.values())]
+        return Motion(self._qpos[q], self._qvel[v], self._qfrc[v], wrenches)
+
+    def move(self, motion: Motion) -> None:
+        """Takes over a state of its own from before the world was compiled anew."""
+        q, v = self._places()
+        self._qpos[q], self._qvel[v] = motion.positions, motion.velocities
+        self._qfrc[v] = motion.efforts
+        self._state.data.xfrc_applied[list(self._ids.values())] = motion.wrenches
+        self._state.loaded = self._state.stale = True
+
+    def _places(self) -> tuple[list[int], list[int]]:
+        if self._free is None:
+            return self._q, self._v
+        q, v = self._free
+        return [*self._q, *range(q, q + FREE_POSITIONS)], [*self._v, *range(v, v + FREE_VELOCITIES)]
+
+    def joint_states(self) -> Sequence[Sequence[float]]:
+        return list(zip(self._qpos[self._q].tolist(), self._qvel[self._v].tolist(), strict=True))
+
+    def apply_efforts(self, efforts: Sequence[float]) -> None:
+        for place, effort in zip(self._v, efforts, strict=True):
+            self._qfrc[place] += effort
+        self._state.loaded = True
+
+    def add_effort(self, index: int, effort: float) -> None:
+        self._qfrc[self._v[index]] += effort
+        self._state.loaded = True
+
+    def add_wrench(self, link: str, force: Vector, torque: Vector) -> None:
+        self._state.data.xfrc_applied[self._ids[link]] += np.array((*force, *torque))
+        self._state.loaded = True
+
+    def set_inertia(self, link: str, old: Inertia | None, new: Inertia) -> bool:
+        before = self.inertias[link]
+        self.inertias[link] = new
+        try:
+            self._compile_anew()
+        except DescriptionError:
+            self.inertias[link] = before
+            return False
+        return True
+
+    def set_damping(self, index: int, damping: float) -> None:
+        self._joints[index].damping = damping
+        self._state.model.dof_damping[self._v[index]] = damping
+
+    def set_limits(self, index: int, lower: float, upper: float) -> None:
+        joint, model = self._joints[index], self._state.model
+        joint.lower, joint.upper = lower, upper
+        model.jnt_limited[self._indices[index]] = lower <= upper
+        model.jnt_range[self._indices[index]] = lower, upper
+
+    def set_motor(self, index: int, velocity: float, effort: float) -> None:
+        joint, place = self._joints[index], self._v[index]
+        joint.speed, joint.effort = velocity, effort
+        self._state.model.dof_frictionloss[place] = effort
+        if velocity and effort:
+            self._state.speeds[place] = velocity
+        else:
+            self._state.speeds.pop(place, None)
+
+    def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
+        self._qpos[self._q[index]] = position
+        self._qvel[self._v[index]] = velocity
+        self._state.stale = True
+
+    def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
+        self._state.stale = True
+        orientation = wxyz(pose.orientation)
+        if self._free is None:
+            self.pose = pose
+            root = self._ids[self.description.root]
+            self._state.model.body_pos[root] = pose.position
+            self._state.model.body_quat[root] = orientation
+            return
+        q, v = self._free
+        self._qpos[q : q + FREE_POSITIONS] = (*pose.position, *orientation)
+        turning = rotate(conjugate(pose.orientation), twist[1])  # MuJoCo has it in the body's axes
+        self._qvel[v : v + FREE_VELOCITIES] = (*twist[0], *turning)
+
+    def link_state(self, name: str) -> tuple[Pose, Twist]:
+        return self._state.link(self._ids[name])
+
+    def set_link_gravity(self, name: str, on: bool) -> None:
+        self._gravity[name] = on
+        self._weigh(name, on)
+
+    def _weigh(self, name: str, on: bool) -> None:
+        model = self._state.model
+        model.body_gravcomp[self._ids[name]] = 0.0 if on else 1.0
+        if not on:
+            model.flg_gravcomp = True
+
+    def link_gravity(self, name: str) -> bool:
+        return self._gravity[name]

@@ -1,0 +1,35 @@
+"""Physics engines by the names that `physics:=` knows. Each is imported when it is asked for."""
+
+import importlib.util
+
+from bullet_gazebo.physics.engine import Engine
+
+BULLET = ("ode", "bullet", "simbody", "dart")  # Gazebo's names: PyBullet stands in for all of them
+MUJOCO = "mujoco"
+ENGINES = (*BULLET, MUJOCO)
+
+
+class EngineError(ValueError):
+    """A physics engine that is not known, or not installed; the text says what to do."""
+
+
+def make_engine(name: str = BULLET[0]) -> Engine:
+    """Returns a new, empty engine. Errors: EngineError."""
+    if name == MUJOCO:
+        return _mujoco()
+    if name not in ENGINES:
+        raise EngineError(f"physics engine '{name}' is not known; there are {', '.join(ENGINES)}")
+    from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
+
+    return BulletEngine()
+
+
+def _mujoco() -> Engine:
+    if importlib.util.find_spec("mujoco") is None:
+        raise EngineError(
+            "physics engine 'mujoco' is not installed; './ws extras' in the checkout of cartpole "
+            "installs it, or 'pip install mujoco' elsewhere"
+        )
+    from bullet_gazebo.physics.engines.mujoco.engine import MujocoEngine
+
+    return MujocoEngine()

@@ -1,0 +1,1 @@
+"""Model and world files: URDF, SDF, and what engines are given."""

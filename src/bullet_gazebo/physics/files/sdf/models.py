@@ -1,0 +1,206 @@
+"""Reads SDF models, version 1.4 to 1.7 (sdformat.org), into a ModelDescription.
+
+Links keep their frames; joints become parent-relative. Nested and included models melt into the outer
+one, their links and joints named `nested::name`. In a static model links may stand by themselves.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from xml.etree.ElementTree import Element
+
+from bullet_gazebo.physics import elements
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    Joint,
+    Link,
+    ModelDescription,
+    Plugin,
+)
+from bullet_gazebo.physics.elements import named, parse_xml, shown, truth
+from bullet_gazebo.physics.files.sdf.frames import Frames, read_pose
+from bullet_gazebo.physics.files.sdf.geometry import ShapeReader, read_inertia
+from bullet_gazebo.physics.files.sdf.include import Origin, open_include
+from bullet_gazebo.physics.files.sdf.joints import WORLD, JointReader, ends
+from bullet_gazebo.physics.files.urdf_extensions import name_sensor, read_plugin
+from bullet_gazebo.physics.lumping import detach_from_world
+from bullet_gazebo.physics.meshes.mesh_files import MeshFinder, Resources
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.tree import find_roots, unique
+
+MAX_NESTING = 10
+VERSION = re.compile(r"1\.(\d+)(\.\d+)?")
+NEWEST = (1, 7)
+
+
+@dataclass
+class _Parts:
+    """What a model and the models in it consist of, in the outer model's frame."""
+
+    links: list[Link] = field(default_factory=list)
+    poses: dict[str, Pose] = field(default_factory=dict)
+    joints: list[Joint] = field(default_factory=list)
+    plugins: list[Plugin] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+
+def parse_sdf(
+    text: str, source: str = "SDF", resources: Resources | None = None
+) -> ModelDescription:
+    """Returns the first model of an SDF text, in the file's pose if it gives one (`initial_pose`).
+
+    Errors: DescriptionError with `source`, the place and the fault, in one line.
+    """
+    with elements.place(source):
+        root = parse_xml(text)
+        origin = Origin(resources or Resources(), sdf_version(root))
+        model = first_entity(root)
+        if model.tag == "include":
+            model, origin = open_include(model, origin)
+        return read_model(model, origin)
+
+
+def sdf_version(root: Element) -> tuple[int, int]:
+    """Returns the version of an `<sdf>` or `<gazebo>` root. Errors: DescriptionError."""
+    if root.tag not in ("sdf", "gazebo"):
+        raise DescriptionError(f"the root element is <{shown(root.tag)}>, not <sdf>")
+    match = VERSION.fullmatch(root.get("version", "1.4").strip())
+    if match is None:
+        raise DescriptionError(
+            f"<sdf version>: '{shown(root.get('version', ''))}' is no version 1.x"
+        )
+    return 1, int(match.group(1))
+
+
+def first_entity(root: Element) -> Element:
+    """Returns the first model, `<include>` or light under the root, or else in its world."""
+    if len(root) and root[0].tag == "light":
+        return root[0]
+    for parent in (root, *root.findall("world")):
+        for element in parent:
+            if element.tag in ("model", "include"):
+                return element
+    raise DescriptionError("there is no <model>")
+
+
+def read_model(element: Element, origin: Origin) -> ModelDescription:
+    """Returns the model of a `<model>` element. Errors: DescriptionError."""
+    name = named(element, "model")
+    with elements.place(f"model '{shown(name)}'"):
+        static = truth(element.findtext("static"))
+        parts = _read_parts(element, origin, static, MAX_NESTING)
+        if origin.version > NEWEST:
+            parts.warnings.append("written for a newer SDF than 1.7: what is new in it is ignored")
+        model = _assemble(name, parts, static)
+        model.initial_pose = read_pose(element, "model")[0]
+        return model
+
+
+def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
+    poses = {WORLD: Pose(), **parts.poses}
+    if static:
+        parts.joints = [joint for joint in parts.joints if joint.parent != WORLD]
+    elif any(joint.parent == WORLD for joint in parts.joints):
+        parts.links.insert(0, Link(WORLD))
+    links, joints = unique(parts.links, "link"), unique(parts.joints, "joint")
+    roots = find_roots(links, joints)
+    if len(roots) > 1 and not static:
+        raise DescriptionError(
+            f"links {roots[:10]} are not joined to each other; make them models of their own, "
+            "or the model static"
+        )
+    model = ModelDescription(name, links, joints, roots[0], poses[roots[0]])
+    model.islands = {root: poses[root].relative_to(poses[roots[0]]) for root in roots[1:]}
+    model.plugins, model.warnings, model.left_out = parts.plugins, parts.warnings, parts.left_out
+    model.static = static
+    detach_from_world(model)
+    return model
+
+
+def _read_parts(model: Element, origin: Origin, static: bool, depth: int) -> _Parts:
+    """`depth` models may still be nested in this one."""
+    if depth == 0:
+        raise DescriptionError(f"models are nested more than {MAX_NESTING} deep")
+    parts, frames = _Parts(), Frames()
+    nested = list(_nested(model, origin, static, depth))
+    _name_frames(model, frames)
+    for name, element, inner in nested:
+        frames.add(name, *read_pose(element, f"model '{name}'"))
+        for link, pose in inner.poses.items():
+            frames.add(f"{name}::{link}", pose, name)
+    collide = truth(model.findtext("self_collide"))
+    for element in model.findall("link"):
+        read = _read_link(element, origin, frames, parts, static)
+        read.self_collide = truth(element.findtext("self_collide"), default=collide)
+        parts.links.append(read)
+    for name, _, inner in nested:
+        _take_over(parts, inner, name)
+    parts.poses = {link.name: frames.resolve(link.name) for link in parts.links}
+    joints = JointReader(frames, origin.version, parts.warnings)
+    parts.joints += [joints.read(element) for element in model.findall("joint")]
+    parts.plugins += [read_plugin(element) for element in model.findall("plugin")]
+    return parts
+
+
+def _nested(
+    model: Element, origin: Origin, static: bool, depth: int
+) -> Iterator[tuple[str, Element, _Parts]]:
+    for element in model:
+        if element.tag not in ("model", "include"):
+            continue
+        inner, source = element, origin
+        if element.tag == "include":
+            inner, source = open_include(element, origin)
+        name = named(inner, "model")
+        with elements.place(f"model '{shown(name)}'"):
+            yield name, inner, _read_parts(inner, source, static, depth - 1)
+
+
+def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
+    for link in inner.links:
+        link.name = f"{prefix}::{link.name}"
+    for joint in inner.joints:
+        joint.name, joint.child = f"{prefix}::{joint.name}", f"{prefix}::{joint.child}"
+        joint.parent = joint.parent if joint.parent == WORLD else f"{prefix}::{joint.parent}"
+        # The nested model's own frame was the world to it; a joint to the world has to know better.
+        if joint.parent == WORLD:
+            raise DescriptionError(
+                f"joint '{joint.name}': a nested model can't be joined to the world"
+            )
+    parts.links += inner.links
+    parts.joints += inner.joints
+    parts.plugins += inner.plugins
+    parts.warnings += inner.warnings
+    parts.left_out += inner.left_out
+
+
+def _name_frames(model: Element, frames: Frames) -> None:
+    for element in model.findall("link"):
+        name = named(element, "link")
+        frames.add(name, *read_pose(element, f"link '{name}'"))
+    for element in model.findall("joint"):
+        name = named(element, "joint")
+        pose, relative_to = read_pose(element, f"joint '{name}'")
+        frames.add(name, pose, relative_to or ends(element, "child"))
+    for element in model.findall("frame"):
+        name = named(element, "frame")
+        pose, relative_to = read_pose(element, f"frame '{name}'")
+        frames.add(name, pose, relative_to or element.get("attached_to", ""))
+
+
+def _read_link(
+    element: Element, origin: Origin, frames: Frames, parts: _Parts, static: bool
+) -> Link:
+    name = named(element, "link")
+    where = f"link '{name}'"
+    meshes = MeshFinder(origin.resources, origin.folder, parts.warnings)
+    shapes = ShapeReader(meshes, frames, parts.warnings)
+    link = Link(name, read_inertia(element, where, static))
+    link.collisions = list(shapes.read(element, "collision", where))
+    link.visuals = list(shapes.read(element, "visual", where))
+    if not static and any(shape.kind == "plane" for shape in link.collisions):
+        raise DescriptionError(f"{where}: a plane can only be part of a static model")
+    link.gravity = truth(element.findtext("gravity"), default=True)
+    parts.left_out += [name_sensor(sensor, where) for sensor in element.findall("sensor")]
+    return link

@@ -1,0 +1,171 @@
+"""Reads SDF world files: models, lights, gravity and the physics' step."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from bullet_gazebo.physics import elements
+from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
+from bullet_gazebo.physics.elements import named, numbers, parse_xml, shown, truth
+from bullet_gazebo.physics.files.sdf.frames import read_pose
+from bullet_gazebo.physics.files.sdf.geometry import read_color, value
+from bullet_gazebo.physics.files.sdf.include import Origin, included_name, open_include
+from bullet_gazebo.physics.files.sdf.models import read_model, sdf_version
+from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.physics.pose import Pose, Vector
+from bullet_gazebo.physics.world import GRAVITY, TIME_STEP, ground_plane
+
+UPDATE_RATE = 1000.0  # [Hz], SDF's default
+ITERATIONS = 50  # of the solver, SDF's default
+NOT_SIMULATED = ("actor", "population", "road", "plugin", "joint")
+
+
+@dataclass
+class WorldDescription:
+    """What a world file holds. `left_out` names what nothing here simulates."""
+
+    name: str = "default"
+    models: dict[str, ModelDescription] = field(default_factory=dict)
+    lights: dict[str, Light] = field(default_factory=dict)
+    gravity: Vector = GRAVITY
+    time_step: float = TIME_STEP  # [s]
+    update_rate: float = UPDATE_RATE  # [Hz of wall time]; 0 means as fast as possible
+    iterations: int | None = None  # None: the engine's own
+    warnings: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+
+def empty_world() -> WorldDescription:
+    """Returns a world with a ground plane and a sun."""
+    return WorldDescription(models={"ground_plane": ground_plane()}, lights={"sun": sun()})
+
+
+def sun() -> Light:
+    """Returns Gazebo's `sun`."""
+    return Light(
+        "sun",
+        diffuse=(0.8, 0.8, 0.8, 1.0),
+        specular=(0.2, 0.2, 0.2, 1.0),
+        attenuation_constant=0.9,
+        attenuation_linear=0.01,
+        attenuation_quadratic=0.001,
+        direction=(-0.5, 0.1, -0.9),
+        pose=Pose((0.0, 0.0, 10.0)),
+        cast_shadows=True,
+        kind="directional",
+    )
+
+
+def load_world(path: Path, resources: Resources) -> WorldDescription:
+    """Reads a world file.
+
+    Errors: DescriptionError, in one line, if the file as a whole can't be used. A model that can't be
+    read is left out, with a warning.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DescriptionError(f"{path}: it can't be read: {error}") from error
+    with elements.place(str(path)):
+        return parse_world(text, resources, path.parent)
+
+
+def parse_world(text: str, resources: Resources, folder: Path | None = None) -> WorldDescription:
+    """As load_world, from the text; relative names are looked up in `folder`."""
+    root = parse_xml(text)
+    origin = Origin(resources, sdf_version(root), folder)
+    element = root.find("world")
+    if element is None:
+        raise DescriptionError("there is no <world>")
+    world = WorldDescription(element.get("name", "") or "default")
+    _read_physics(world, element)
+    for child in element:
+        if child.tag in ("model", "include", "light"):
+            _add(world, child, origin)
+        elif child.tag in NOT_SIMULATED:
+            world.left_out.append(f"{child.tag} '{shown(child.get('name', ''))}'")
+    return world
+
+
+def read_light(element: Element) -> Light:
+    """Returns the light of a `<light>` element. Errors: DescriptionError."""
+    name = named(element, "light")
+    where = f"light '{shown(name)}'"
+    pose, _ = read_pose(element, where)
+    light = Light(name, pose=pose, kind=element.get("type", "point"))
+    for key in ("diffuse", "specular"):
+        text = element.findtext(key)
+        if text is not None:
+            setattr(light, key, read_color(text, f"{where}: <{key}>"))
+    for key in ("constant", "linear", "quadratic"):
+        attribute = f"attenuation_{key}"
+        default = getattr(light, attribute)
+        setattr(light, attribute, value(element, f"attenuation/{key}", where, default))
+    direction = element.findtext("direction")
+    if direction is not None:
+        x, y, z = numbers(direction, f"{where}: <direction>", 3)
+        light.direction = (x, y, z)
+    light.cast_shadows = truth(element.findtext("cast_shadows"))
+    return light
+
+
+def _add(world: WorldDescription, element: Element, origin: Origin) -> None:
+    """One model or light; its faults leave out it alone."""
+    try:
+        if element.tag == "include":
+            found = included(element, origin)
+            if isinstance(found, (Light, ModelDescription)):
+                _keep(world, found)
+                return
+            element, origin = found
+        _keep(world, read_light(element) if element.tag == "light" else read_model(element, origin))
+    except DescriptionError as error:
+        world.warnings.append(f"{error}; it is left out")
+
+
+def included(include: Element, origin: Origin) -> Light | ModelDescription | tuple[Element, Origin]:
+    """What an `<include>` brings; ground_plane and sun are there without any file."""
+    try:
+        return open_include(include, origin)
+    except DescriptionError:
+        name = included_name(include)
+        if name not in ("ground_plane", "sun"):
+            raise
+    entity = ground_plane() if name == "ground_plane" else sun()
+    entity.name = (include.findtext("name") or "").strip() or entity.name
+    if include.find("pose") is not None:
+        pose, _ = read_pose(include, f"<include> of '{entity.name}'")
+        if isinstance(entity, Light):
+            entity.pose = pose
+        else:
+            entity.initial_pose = pose
+    return entity
+
+
+def _keep(world: WorldDescription, entity: Light | ModelDescription) -> None:
+    kept: dict = world.lights if isinstance(entity, Light) else world.models
+    if entity.name in kept:
+        raise DescriptionError(f"'{shown(entity.name)}' is there twice")
+    kept[entity.name] = entity
+
+
+def _read_physics(world: WorldDescription, element: Element) -> None:
+    """Gravity and the physics profile, the default one if there are several."""
+    profiles = element.findall("physics")
+    profile = next(
+        (p for p in profiles if truth(p.get("default"))), profiles[0] if profiles else None
+    )
+    gravity = element.findtext("gravity")
+    if gravity is None and profile is not None:
+        gravity = profile.findtext("gravity")  # SDF 1.4
+    if gravity is not None:
+        x, y, z = numbers(gravity, "<gravity>", 3)
+        world.gravity = (x, y, z)
+    world.time_step = value(profile, "max_step_size", "<physics>", TIME_STEP)
+    world.update_rate = value(profile, "real_time_update_rate", "<physics>", UPDATE_RATE)
+    if profile is not None and profile.find("ode/solver/iters") is not None:
+        world.iterations = int(value(profile, "ode/solver/iters", "<physics>", ITERATIONS))
+    if not 0.0 < world.time_step <= 1.0:
+        raise DescriptionError(f"<max_step_size>: {world.time_step} is not between 0 and 1 s")
+    if world.update_rate < 0.0:
+        raise DescriptionError(f"<real_time_update_rate>: {world.update_rate} is negative")

@@ -1,0 +1,251 @@
+"""Executable `spawn_model` of package gazebo_ros (contract: gazebo_api.md section 4.3)."""
+
+import argparse
+import contextlib
+import math
+import sys
+import threading
+from collections.abc import Sequence
+from typing import Any
+from xml.etree import ElementTree
+
+import rospy
+from gazebo_msgs.srv import DeleteModel, GetWorldProperties
+from geometry_msgs.msg import Point, Pose, Quaternion
+from std_srvs.srv import Empty
+
+from bullet_gazebo.ros.clients import gazebo_interface
+from bullet_gazebo.ros.wire.limited_call import CallFailed, call_limited
+from bullet_gazebo.ros.wire.signals import Ending, init_node
+
+POLL = 0.1  # [s of wall time]
+REMIND = 10.0  # [s of wall time]
+FAREWELL = 3.0  # [s] for what has to be done during shutdown
+INTERRUPTED = -1
+INCLUDE = '<sdf version="1.6"><world name="default"><include><uri>model://{}</uri></include></world></sdf>'
+
+
+class CannotSpawn(Exception):
+    """There is nothing that could be spawned; the text says why."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Spawns one model; returns the exit code: 0, 1 if that failed, 2 for a wrong command line."""
+    command_line = list(sys.argv if argv is None else argv)
+    options = parse(rospy.myargv(command_line)[1:])
+    # Here, because a thread that waits for standard input can't be ended.
+    piped = sys.stdin.read() if options.stdin else ""
+
+    def work() -> int:
+        init_node("spawn_model", command_line)
+        try:
+            return _run(options, piped)
+        except CannotSpawn as fault:
+            if rospy.is_shutdown():  # then every call fails
+                return INTERRUPTED
+            rospy.logerr("spawn_model: %s", fault)
+            return 1
+
+    code = Ending().run(work, interrupted=INTERRUPTED)
+    if code == INTERRUPTED:
+        print("spawn_model: interrupted before it was done", file=sys.stderr)
+        return 1
+    return code
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Reads the command line; a wrong one ends the program with exit code 2."""
+    parser = argparse.ArgumentParser(prog="spawn_model", description="Spawn a model.")
+    kind = parser.add_mutually_exclusive_group(required=True)
+    kind.add_argument("-urdf", action="store_true", help="the model is a URDF")
+    kind.add_argument("-sdf", action="store_true", help="the model is an SDF")
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("-file", help="read it from a file")
+    source.add_argument("-param", help="read it from a parameter")
+    source.add_argument("-database", metavar="MODEL", help="model://MODEL, on GAZEBO_MODEL_PATH")
+    source.add_argument("-stdin", action="store_true", help="read it from standard input")
+    parser.add_argument("-model", required=True, metavar="NAME", help="name of the new model")
+    parser.add_argument(
+        "-reference_frame", default="", help="model or link that the pose refers to"
+    )
+    parser.add_argument("-gazebo_namespace", default="/gazebo", help="of the simulator's services")
+    parser.add_argument("-robot_namespace", help="of the model's plugins; default: the node's")
+    parser.add_argument("-unpause", action="store_true", help="let time run afterwards")
+    parser.add_argument("-wait", metavar="MODEL", help="wait for another model first")
+    for name, what in zip("xyzRPY", ("[m]",) * 3 + ("[rad]",) * 3, strict=True):
+        parser.add_argument(f"-{name}", type=float, default=0.0, help=what)
+    parser.add_argument(
+        "-J", nargs=2, action="append", default=[], dest="joints", metavar=("JOINT", "POSITION"),
+        help="initial position of a joint [rad, m]; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("-package_to_model", action="store_true",
+                        help="meshes: model:// instead of package://")  # fmt: skip
+    parser.add_argument("-b", dest="bond", action="store_true", help="stay; delete it at the end")
+    options = parser.parse_args([_not_an_option(argument) for argument in arguments])
+    options.joints = [(name, _position(parser, text)) for name, text in options.joints]
+    return options
+
+
+def _not_an_option(argument: str) -> str:
+    """argparse takes -1e-05 for an option; with a blank in front it is a value."""
+    try:
+        float(argument)
+    except ValueError:
+        return argument
+    return f" {argument}" if argument.startswith("-") else argument
+
+
+def _position(parser: argparse.ArgumentParser, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        parser.error(f"argument -J: {text!r} is no number")
+
+
+def _run(options: argparse.Namespace, piped: str) -> int:
+    gazebo = options.gazebo_namespace.rstrip("/")
+    if options.wait:
+        _wait_for_model(gazebo, options.wait)
+    xml = _prepared(_read(options, piped), options.package_to_model)
+    gazebo_interface.wait_for_service(f"{gazebo}/spawn_{'urdf' if options.urdf else 'sdf'}_model")
+    with _Bond(gazebo, options.model) if options.bond else contextlib.nullcontext():
+        _spawn(options, xml, gazebo)
+    placed = _place_joints(options, gazebo)
+    if options.unpause:
+        _call(f"{gazebo}/unpause_physics", Empty)
+    if options.bond:
+        rospy.loginfo("spawn_model: '%s' stays until this node is shut down", options.model)
+        rospy.spin()
+    return 0 if placed else 1
+
+
+def _spawn(options: argparse.Namespace, xml: str, gazebo: str) -> None:
+    spawn = (
+        gazebo_interface.spawn_urdf_model_client
+        if options.urdf
+        else gazebo_interface.spawn_sdf_model_client
+    )
+    namespace = options.robot_namespace
+    if namespace is None:
+        namespace = rospy.get_namespace()
+    if not spawn(options.model, xml, namespace, _pose(options), options.reference_frame, gazebo):
+        raise CannotSpawn(f"'{options.model}' was not spawned")
+
+
+class _Bond:
+    """Deletes the model when the node is shut down, also in the middle of the spawning.
+
+    The block of its ``with`` statement is the spawning.
+    """
+
+    def __init__(self, gazebo: str, model: str) -> None:
+        self._service, self._model = f"{gazebo}/delete_model", model
+        self._spawned = False
+        self._over = threading.Event()
+        rospy.on_shutdown(self._release)
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._spawned = kind is None
+        self._over.set()
+
+    def _release(self) -> None:
+        if not self._over.wait(FAREWELL) or not self._spawned:
+            return
+        try:
+            call_limited(self._service, DeleteModel, self._model, timeout=FAREWELL)
+        except CallFailed as fault:
+            print(f"spawn_model: '{self._model}' was not deleted: {fault}", file=sys.stderr)
+
+
+def _place_joints(options: argparse.Namespace, gazebo: str) -> bool:
+    if not options.joints:
+        return True
+    names = [name for name, _ in options.joints]
+    positions = [position for _, position in options.joints]
+    return bool(
+        gazebo_interface.set_model_configuration_client(options.model, "", names, positions, gazebo)
+    )
+
+
+def _wait_for_model(gazebo: str, name: str) -> None:
+    """Also sees models of a paused world, whose state topics are silent."""
+    service = f"{gazebo}/get_world_properties"
+    gazebo_interface.wait_for_service(service)
+    rospy.loginfo("spawn_model: waiting for model '%s'", name)
+    waited = 0.0
+    while name not in _call(service, GetWorldProperties).model_names:
+        if rospy.is_shutdown():
+            raise rospy.ROSInterruptException("shut down")
+        rospy.rostime.wallsleep(POLL)
+        waited += POLL
+        if waited >= REMIND:
+            waited = 0.0
+            rospy.logwarn("spawn_model: still waiting for model '%s'", name)
+
+
+def _call(service: str, kind: type) -> Any:
+    try:
+        return rospy.ServiceProxy(service, kind)()
+    except rospy.ServiceException as fault:
+        raise CannotSpawn(f"{service}: {fault}") from fault
+
+
+def _read(options: argparse.Namespace, piped: str) -> str:
+    if options.stdin:
+        text, origin = piped, "standard input"
+    elif options.file is not None:
+        text, origin = _read_file(options.file), options.file
+    elif options.param is not None:
+        text, origin = _read_param(options.param), f"parameter {rospy.resolve_name(options.param)}"
+    else:
+        return INCLUDE.format(options.database)
+    if not text.strip():
+        raise CannotSpawn(f"{origin} is empty")
+    return text
+
+
+def _read_file(path: str) -> str:
+    try:
+        with open(path, encoding="utf-8") as file:
+            return file.read()
+    except (OSError, UnicodeDecodeError) as fault:
+        raise CannotSpawn(f"{path} can't be read: {fault}") from fault
+
+
+def _read_param(name: str) -> str:
+    try:
+        return str(rospy.get_param(name))
+    except KeyError as fault:
+        raise CannotSpawn(f"parameter {rospy.resolve_name(name)} is not set") from fault
+
+
+def _prepared(text: str, package_to_model: bool) -> str:
+    """Returns the XML without comments and declaration, as the service gets it from Gazebo's tool."""
+    try:
+        # From bytes: text with an encoding in its declaration is refused otherwise.
+        root = ElementTree.fromstring(text.encode())
+    except ElementTree.ParseError as fault:
+        raise CannotSpawn(f"the model is no valid XML: {fault}") from fault
+    if package_to_model:
+        for mesh in root.iter("mesh"):
+            name = mesh.get("filename", "")
+            if name.startswith("package://"):
+                mesh.set("filename", "model://" + name.removeprefix("package://"))
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _pose(options: argparse.Namespace) -> Pose:
+    """Returns the pose: -R, -P, -Y are rotations about the fixed x, y and z axis, in this order."""
+    cr, sr = math.cos(options.R / 2), math.sin(options.R / 2)
+    cp, sp = math.cos(options.P / 2), math.sin(options.P / 2)
+    cy, sy = math.cos(options.Y / 2), math.sin(options.Y / 2)
+    turn = Quaternion(
+        x=sr * cp * cy - cr * sp * sy,
+        y=cr * sp * cy + sr * cp * sy,
+        z=cr * cp * sy - sr * sp * cy,
+        w=cr * cp * cy + sr * sp * sy,
+    )
+    return Pose(Point(options.x, options.y, options.z), turn)

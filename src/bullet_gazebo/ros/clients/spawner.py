@@ -1,0 +1,209 @@
+"""Executable `spawner` of package controller_manager: loads and starts controllers, and keeps them.
+
+It stays until it is shut down, and then stops and unloads its controllers (ros_control.md section
+2).
+"""
+
+import argparse
+import functools
+import os
+import sys
+import threading
+from collections.abc import Callable, Sequence
+
+import rosparam
+import rospy
+import yaml
+from std_msgs.msg import Bool
+
+from bullet_gazebo.ros.clients.manager_client import STRICT, ManagerClient
+from bullet_gazebo.ros.wire.limited_call import CallFailed
+from bullet_gazebo.ros.wire.signals import Ending, init_node
+
+SERVICES = ("load_controller", "switch_controller", "unload_controller")
+FAREWELL = 3.0  # [s] for each call during shutdown; the simulator may have gone before us
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the spawner until its node is shut down.
+
+    Returns:
+        The exit code: 0, or 1 if no controller manager was found or a file can't be read.
+    """
+    command_line = list(sys.argv if argv is None else argv)
+    options = _parse(rospy.myargv(command_line)[1:])
+
+    def work() -> int:
+        init_node("spawner", command_line)
+        try:
+            return _work(ManagerClient(options.namespace), options)
+        except (ValueError, OSError) as fault:
+            rospy.logerr("Controller Spawner: %s", fault)
+            return 1
+
+    return Ending().run(work, interrupted=0)
+
+
+def _work(manager: ManagerClient, options: argparse.Namespace) -> int:
+    if options.wait_for:
+        _wait_for_topic(options.wait_for, options.timeout)
+    missing = _find(manager, options.timeout)
+    if missing:
+        rospy.logwarn(
+            "Controller Spawner couldn't find the expected controller_manager ROS interface:"
+            " no service %s",
+            missing,
+        )
+        return 1
+    names = [name for each in options.controllers for name in _names(each, options.namespace)]
+    _Spawner(manager).run(names, options.stopped)
+    return 0
+
+
+def _find(manager: ManagerClient, timeout: float | None) -> str | None:
+    """Waits for the manager; returns the service that is missing after the time limit.
+
+    While simulated time stands at zero the simulator isn't ready yet, and the wait begins anew.
+    """
+    while missing := manager.wait(SERVICES, timeout):
+        if not rospy.get_param("/use_sim_time", False) or rospy.get_rostime():
+            return missing
+        rospy.logwarn(
+            "Controller Spawner: still waiting for %s, as simulated time hasn't begun", missing
+        )
+    return None
+
+
+def _parse(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="spawner", description="Load, start and keep controllers")
+    parser.add_argument("--stopped", action="store_true", help="load, but don't start")
+    parser.add_argument("--wait-for", metavar="TOPIC", help="first wait for true on a Bool topic")
+    parser.add_argument("--namespace", default="", help="of the controller manager")
+    parser.add_argument("--timeout", type=float, default=30.0, help="for services [s]; <= 0: none")
+    parser.add_argument("--no-timeout", action="store_true", help="wait for ever")
+    parser.add_argument("--shutdown-timeout", type=float, help="ignored")
+    parser.add_argument("controllers", nargs="+", help="names, or YAML files of controllers")
+    options = parser.parse_intermixed_args(arguments)
+    if options.no_timeout or options.timeout <= 0:
+        options.timeout = None
+    return options
+
+
+def _wait_for_topic(topic: str, timeout: float | None) -> None:
+    """Waits for `true`; goes on without it after the time limit."""
+    arrived = threading.Event()
+
+    def hear(message: Bool) -> None:
+        if message.data:
+            arrived.set()
+
+    rospy.loginfo("Controller Spawner: Waiting for true on %s", topic)
+    listener = rospy.Subscriber(topic, Bool, hear)
+    waited = 0.0
+    while not arrived.wait(0.1):
+        waited += 0.1
+        if rospy.is_shutdown():
+            raise rospy.ROSInterruptException("shut down")
+        if timeout is not None and waited > timeout:
+            rospy.logwarn("Controller Spawner: no true on %s in %g s; going on", topic, timeout)
+            break
+    listener.unregister()
+
+
+def _names(argument: str, namespace: str) -> list[str]:
+    """Returns the controllers that an argument stands for: itself, or those of a YAML file.
+
+    A file's parameters are loaded first.
+
+    Raises:
+        ValueError, OSError: the file can't be read, or is no YAML mapping.
+    """
+    if not os.path.isfile(argument):
+        return [argument]
+    try:
+        with open(argument, encoding="utf-8") as file:
+            documents = rosparam.load_str(file.read(), argument)
+    except (yaml.YAMLError, TypeError) as fault:
+        raise ValueError(f"{argument}: {' '.join(str(fault).split())}") from fault
+    if not all(isinstance(parameters, dict) for parameters, _ in documents):
+        raise ValueError(f"{argument}: expected a mapping from controller names to parameters")
+    for parameters, _ in documents:
+        rosparam.upload_params(rospy.resolve_name(namespace), parameters)
+    return [str(name) for parameters, _ in documents for name in parameters]
+
+
+class _Spawner:
+    """Loads and starts controllers, and takes them away when the node is shut down."""
+
+    def __init__(self, manager: ManagerClient) -> None:
+        self._manager = manager
+        self._loaded: list[str] = []
+        self._leaving = False
+        self._turn = threading.Lock()  # held while the manager does something for us
+
+    def run(self, names: Sequence[str], stopped: bool) -> None:
+        """Returns when the node is shut down."""
+        # First of all: a shutdown in the middle of the loading unloads what has been loaded by then.
+        rospy.on_shutdown(self._leave)
+        for name in names:
+            self._in_turn(functools.partial(self._load, name))
+        rospy.loginfo("Controller Spawner: Loaded controllers: %s", ", ".join(self._loaded))
+        if not stopped:
+            self._in_turn(self._start)
+        rospy.spin()
+
+    def _in_turn(self, action: Callable[[], None]) -> None:
+        with self._turn:
+            if self._leaving:
+                raise rospy.ROSInterruptException("shut down")
+            action()
+
+    def _load(self, name: str) -> None:
+        rospy.loginfo("Loading controller: %s", name)
+        try:
+            if self._manager.load(name):
+                self._loaded.append(name)
+            else:
+                rospy.logerr("Failed to load %s", name)
+        except CallFailed as fault:
+            rospy.logerr("Failed to load %s: %s", name, fault)
+
+    def _start(self) -> None:
+        names = ", ".join(self._loaded)
+        try:
+            if self._manager.switch(self._loaded, [], STRICT):
+                rospy.loginfo("Started controllers: %s", names)
+            else:
+                rospy.logerr("Failed to start controllers: %s", names)
+        except CallFailed as fault:
+            rospy.logerr("Failed to start controllers: %s: %s", names, fault)
+
+    def _leave(self) -> None:
+        """Stops the running ones of our controllers and unloads all, last one first."""
+        self._leaving = True
+        # A call that is under way may load one more. It isn't waited for for ever.
+        if self._turn.acquire(timeout=FAREWELL):
+            self._turn.release()
+        if not self._loaded:
+            return
+        rospy.loginfo("Shutting down spawner. Stopping and unloading controllers...")
+        try:
+            self._stop()
+            rospy.loginfo("Unloading all loaded controllers...")
+            for name in reversed(self._loaded):
+                self._unload(name)
+        except CallFailed as fault:
+            rospy.logwarn("Controller Spawner error while taking down controllers: %s", fault)
+
+    def _stop(self) -> None:
+        rospy.loginfo("Stopping all controllers...")
+        # Somebody else may have stopped one: asking to stop that too would leave the others on.
+        running = [name for name in self._manager.running(FAREWELL) if name in self._loaded]
+        self._manager.switch([], running, STRICT, FAREWELL)
+
+    def _unload(self, name: str) -> None:
+        rospy.loginfo("Trying to unload %s", name)
+        if self._manager.unload(name, FAREWELL):
+            rospy.loginfo("Succeeded in unloading %s", name)
+        else:
+            rospy.logerr("Failed to unload %s", name)

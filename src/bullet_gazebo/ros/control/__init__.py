@@ -1,0 +1,1 @@
+"""gazebo_ros_control: the plugin, the controller manager's services, controllers' topics."""

@@ -1,0 +1,174 @@
+"""The six services of a controller manager (contract: ros_control.md sections 1.2 to 1.7)."""
+
+import threading
+import traceback
+from collections.abc import Callable
+
+import rosgraph
+import rospy
+from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
+from controller_manager_msgs.srv import (
+    ListControllers,
+    ListControllersRequest,
+    ListControllersResponse,
+    ListControllerTypes,
+    ListControllerTypesRequest,
+    ListControllerTypesResponse,
+    LoadController,
+    LoadControllerRequest,
+    ReloadControllerLibraries,
+    ReloadControllerLibrariesRequest,
+    SwitchController,
+    SwitchControllerRequest,
+    UnloadController,
+    UnloadControllerRequest,
+)
+
+from bullet_gazebo.control.controllers.base import Controller
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.manager import ControllerManager, Listed
+from bullet_gazebo.control.user_types import find_type
+from bullet_gazebo.ros.control.controller_ports import ControllerPorts
+from bullet_gazebo.ros.wire.thinning import Thinner
+from bullet_gazebo.simulator import Simulator
+
+BASE_CLASS = "controller_interface::ControllerBase"
+
+
+class ControllerServices:
+    """Serves one manager. All calls answer at once, also while the world is paused."""
+
+    def __init__(
+        self, sim: Simulator, thinner: Thinner, manager: ControllerManager, namespace: str
+    ) -> None:
+        self._sim = sim
+        self._thinner = thinner
+        self._manager = manager
+        self._namespace = namespace
+        self._ports: dict[str, ControllerPorts] = {}
+        self._one_at_a_time = threading.Lock()
+        self._gone = False
+        manager.on_fault = _report_fault
+        self._services = [
+            self._advertise("list_controllers", ListControllers, self._list),
+            self._advertise("list_controller_types", ListControllerTypes, self._list_types),
+            self._advertise("load_controller", LoadController, self._load),
+            self._advertise("unload_controller", UnloadController, self._unload),
+            self._advertise("switch_controller", SwitchController, self._switch),
+            self._advertise("reload_controller_libraries", ReloadControllerLibraries, self._reload),
+        ]
+
+    def shutdown(self) -> None:
+        """Takes the services and all controllers' topics away."""
+        for service in self._services:
+            service.shutdown("the model was deleted")
+        with self._one_at_a_time:
+            self._gone = True
+            self._close_all()
+
+    def _advertise(self, name: str, kind: type, handler: Callable) -> rospy.Service:
+        def handle(request: object) -> object:
+            with self._one_at_a_time:
+                if self._gone:  # rospy keeps persistent connections to a service that is shut down
+                    raise rospy.ServiceException("the model was deleted")
+                return handler(request)
+
+        full = rospy.names.ns_join(self._namespace, f"controller_manager/{name}")
+        return rospy.Service(full, kind, handle)
+
+    def _list(self, request: ListControllersRequest) -> ListControllersResponse:
+        with self._sim.lock:
+            listed = self._manager.listed()
+        return ListControllersResponse([_state(entry) for entry in listed])
+
+    def _list_types(self, request: ListControllerTypesRequest) -> ListControllerTypesResponse:
+        types = sorted(self._manager.types)
+        return ListControllerTypesResponse(types, [BASE_CLASS] * len(types))
+
+    def _load(self, request: LoadControllerRequest) -> bool:
+        # An empty name would fetch the whole namespace, and resolve to it.
+        if not rosgraph.names.is_legal_name(request.name):
+            return _refused(ControlError(f"'{request.name}' is not a legal name of a controller"))
+        params = rospy.get_param(rospy.names.ns_join(self._namespace, request.name), None)
+        try:
+            self._know_type(params)
+            with self._sim.lock:
+                controller = self._manager.load(request.name, params)
+            self._ports[request.name] = self._open(controller)
+        except ControlError as error:
+            return _refused(error)
+        return True
+
+    def _know_type(self, params: object) -> None:
+        """Imports a user's own type; not under the simulator's lock, for it takes a while."""
+        kind = params.get("type") if isinstance(params, dict) else None
+        if isinstance(kind, str) and kind not in self._manager.types:
+            found = find_type(kind)
+            if found is not None:
+                self._manager.types[kind] = found
+
+    def _open(self, controller: Controller) -> ControllerPorts:
+        try:
+            return ControllerPorts(self._sim, self._thinner, controller, self._namespace)
+        except (rospy.ROSException, KeyError, TypeError, ValueError) as error:
+            with self._sim.lock:
+                self._manager.unload(controller.name)
+            raise ControlError(f"the topics of '{controller.name}': {error!r}") from error
+
+    def _unload(self, request: UnloadControllerRequest) -> bool:
+        try:
+            with self._sim.lock:
+                self._manager.unload(request.name)
+        except ControlError as error:
+            return _refused(error)
+        self._ports.pop(request.name).shutdown()
+        return True
+
+    def _switch(self, request: SwitchControllerRequest) -> bool:
+        if request.strictness == 0:
+            rospy.logwarn("Controller manager: strictness was not set, best effort is used.")
+        try:
+            with self._sim.lock:
+                self._manager.switch(
+                    request.start_controllers, request.stop_controllers, request.strictness
+                )
+        except ControlError as error:
+            return _refused(error)
+        return True
+
+    def _reload(self, request: ReloadControllerLibrariesRequest) -> bool:
+        with self._sim.lock:
+            loaded = [entry.name for entry in self._manager.listed()]
+        if loaded and not request.force_kill:
+            return _refused(
+                ControlError(f"Controllers {loaded} are loaded and force_kill is not set.")
+            )
+        self._close_all()
+        return True
+
+    def _close_all(self) -> None:
+        with self._sim.lock:
+            self._manager.unload_all()
+        for ports in self._ports.values():
+            ports.shutdown()
+        self._ports.clear()
+
+
+def _refused(error: ControlError) -> bool:
+    """A refused request is ok=false, and its reason stands in the log (ros_control.md section 1.3)."""
+    rospy.logerr("Controller manager: %s", error)
+    return False
+
+
+def _report_fault(controller: Controller, error: BaseException) -> None:
+    rospy.logerr(
+        "Controller '%s' (%s) is stopped, because it raised:\n%s",
+        controller.name, controller.type_name, "".join(traceback.format_exception(error)),
+    )  # fmt: skip
+
+
+def _state(entry: Listed) -> ControllerState:
+    claims = [
+        HardwareInterfaceResources(c.hardware_interface, list(c.resources)) for c in entry.claims
+    ]
+    return ControllerState(entry.name, entry.state, entry.type_name, claims)

@@ -1,0 +1,1 @@
+"""The node `gazebo`: start, plugins, state topics."""

@@ -1,0 +1,77 @@
+"""libgazebo_ros_joint_state_publisher.so: joint states of a model without ros_control.
+
+As in gazebo_plugins: `jointName` lists the joints, `updateRate` is in Hz of simulated time
+(100 by default), `robotNamespace` is where the topic `joint_states` is.
+"""
+
+import re
+
+import rospy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from bullet_gazebo.ros.plugins import PluginContext
+from bullet_gazebo.ros.wire.conversions import NANOSECONDS, to_time
+
+FILENAME = "libgazebo_ros_joint_state_publisher.so"
+QUEUE = 1000
+RATE = "100.0"  # [Hz]
+
+
+class JointStatePlugin:
+    """Publishes position [rad, m] and velocity of the named joints, in the order of the list."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self._model = context.model
+        self._names = _joints(context)
+        self._period = _period(context)
+        self._last = context.sim.now
+        namespace = rospy.names.ns_join(rospy.get_namespace(), context.namespace)
+        topic = rospy.names.ns_join(namespace, "joint_states")
+        self._publisher = rospy.Publisher(topic, JointState, queue_size=QUEUE, tcp_nodelay=True)
+        context.on_update(self._update)
+
+    def shutdown(self) -> None:
+        self._publisher.unregister()
+
+    def _update(self, now: int) -> None:
+        if now < self._last:  # time was reset: the next state is due now
+            self._last = now - self._period
+        if now - self._last < self._period:
+            return
+        # The next one is due a period after this one was, however late it came.
+        self._last = max(self._last + self._period, now - self._period)
+        if self._publisher.get_num_connections():
+            self._publish(now)
+
+    def _publish(self, now: int) -> None:
+        states = [self._model.joint_state(name) for name in self._names]
+        message = JointState(
+            header=Header(stamp=to_time(now)),
+            name=self._names,
+            position=[position for position, _ in states],
+            velocity=[velocity for _, velocity in states],
+        )
+        self._publisher.publish(message)
+
+
+def _joints(context: PluginContext) -> list[str]:
+    """Returns the listed joints that the model has; the others are a warning."""
+    listed = [name for name in re.split(r"[\s,]+", context.text("jointName", "")) if name]
+    unknown = [name for name in listed if name not in context.model.joint_names]
+    if unknown or not listed:
+        rospy.logwarn(
+            "%s: model '%s' has no joint %s", FILENAME, context.model.name, unknown or "listed"
+        )
+    return [name for name in listed if name not in unknown]
+
+
+def _period(context: PluginContext) -> int:
+    """Returns the time between two messages [ns]; 0 for one at every step."""
+    text = context.text("updateRate", RATE)
+    try:
+        rate = float(text)
+    except ValueError:
+        rospy.logwarn("%s: updateRate '%s' is no number; %s Hz is used", FILENAME, text, RATE)
+        rate = float(RATE)
+    return round(NANOSECONDS / rate) if rate > 0.0 else 0

@@ -1,0 +1,130 @@
+"""/clock, model_states and link_states (contract: gazebo_api.md section 1.3)."""
+
+from collections.abc import Callable
+from functools import partial
+
+import rospy
+import rospy.impl.simtime
+from gazebo_msgs.msg import LinkStates, ModelStates
+from rosgraph_msgs.msg import Clock
+
+from bullet_gazebo.ros.wire.conversions import to_pose_msg, to_time, to_twist_msg
+from bullet_gazebo.ros.wire.thinning import ThinnedTopic, Thinner
+from bullet_gazebo.simulator import Simulator
+
+QUEUE = 10
+
+
+class Audience(rospy.SubscribeListener):
+    """Counts a topic's subscribers, so that nothing is made up for nobody."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.size = 0
+
+    def peer_subscribe(
+        self, topic_name: str, topic_publish: Callable, peer_publish: Callable
+    ) -> None:
+        self.size += 1
+
+    def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
+        self.size = num_peers
+
+
+class StateTopic(ThinnedTopic):
+    """A topic that shows the state before each step, while somebody listens."""
+
+    def __init__(
+        self, name: str, kind: type, sim: Simulator, thinner: Thinner, make: Callable[[], object]
+    ) -> None:
+        self._audience = Audience()
+        self._sim = sim
+        self._make = make
+        publisher = rospy.Publisher(
+            name, kind, subscriber_listener=self._audience, queue_size=QUEUE, tcp_nodelay=True
+        )
+        # A sample only says that there is news: states are many, and made up when they are sent.
+        super().__init__(thinner, lambda now: publisher.publish(make()))
+
+    def __call__(self, now: int) -> None:
+        if self._audience.size:
+            self.send(now)
+
+    def flush(self) -> None:
+        with self._sim.lock:  # making it up looks at the world
+            super().flush()
+
+
+class ClockTopic(ThinnedTopic):
+    """/clock: on every tick, or at a frequency."""
+
+    def __init__(self, sim: Simulator, thinner: Thinner, frequency: float) -> None:
+        """`frequency` [Hz of simulated time] is ~pub_clock_frequency; 0 means every tick."""
+        super().__init__(thinner, self._publish_time)
+        self._publisher = rospy.Publisher("/clock", Clock, queue_size=QUEUE, tcp_nodelay=True)
+        self._period = round(1e9 / frequency) if frequency > 0 else 0
+        self._last = -self._period
+        # With use_sim_time:=false this node, like all others, goes by the wall clock.
+        self._sets_own_time = bool(rospy.get_param("/use_sim_time", True))
+        if self._sets_own_time:
+            _stop_listening_to_clock()
+            rospy.rostime._set_rostime(to_time(sim.now))
+
+    def __call__(self, now: int) -> None:
+        if self._period and 0 <= now - self._last < self._period:  # negative after a reset: publish
+            return
+        self._last = now
+        self.send(now)
+
+    def _publish_time(self, now: int) -> None:
+        time = to_time(now)
+        if self._sets_own_time:
+            rospy.rostime._set_rostime(time)
+        self._publisher.publish(Clock(time))
+
+
+def _stop_listening_to_clock() -> None:
+    """Ends rospy's own subscription to the topic that this node itself publishes.
+
+    With /use_sim_time every node hears /clock. For the node that makes the time that is a message a
+    millisecond over a socket to itself, a good part of its CPU time; the publisher tells rospy directly.
+    rospy offers no way to say so, hence its private names.
+    """
+    subscription = getattr(rospy.impl.simtime, "_clock_sub", None)
+    if subscription is not None:
+        subscription.unregister()
+
+
+def advertise_states(
+    sim: Simulator, thinner: Thinner, clock_frequency: float, network: bool
+) -> None:
+    """Publishes /clock and, with `network`, the state topics, as the simulation ticks."""
+    sim.listeners.append(ClockTopic(sim, thinner, clock_frequency))
+    if network:
+        for name, kind, make in (
+            ("~link_states", LinkStates, _link_states),
+            ("~model_states", ModelStates, _model_states),
+        ):
+            sim.listeners.append(StateTopic(name, kind, sim, thinner, partial(make, sim)))
+
+
+def _model_states(sim: Simulator) -> ModelStates:
+    states = [(model.name, *model.state()) for model in sim.world.models.values()]
+    return ModelStates(
+        name=[name for name, _, _ in states],
+        pose=[to_pose_msg(pose) for _, pose, _ in states],
+        twist=[to_twist_msg(twist) for _, _, twist in states],
+    )
+
+
+def _link_states(sim: Simulator) -> LinkStates:
+    states = [
+        (f"{model.name}::{link}", *model.link_state(link))
+        for model in sim.world.models.values()
+        for link in model.link_names
+    ]
+    return LinkStates(
+        name=[name for name, _, _ in states],
+        pose=[to_pose_msg(pose) for _, pose, _ in states],
+        twist=[to_twist_msg(twist) for _, _, twist in states],
+    )

@@ -1,0 +1,180 @@
+"""What a request of step_world asks for, checked as a whole before any of it is done."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import rospy
+from bullet_gazebo_msgs.srv import StepWorldRequest
+
+from bullet_gazebo.control.controllers.base import Controller, Input
+from bullet_gazebo.control.errors import FAULTS, ControlError
+from bullet_gazebo.control.joint import JointHandle
+from bullet_gazebo.control.manager import RUNNING
+from bullet_gazebo.physics.model import Model
+from bullet_gazebo.robot import Robot
+from bullet_gazebo.ros.wire.checks import LARGEST
+from bullet_gazebo.simulator import Simulator
+
+MAX_TICKS = 1_000_000  # a request beyond this is a mistake, and would take minutes
+Placing = tuple[dict[str, float], dict[str, float]]
+"""Positions [rad, m] and velocities [rad/s, m/s] of joints by plain name."""
+
+
+class StepPlan:
+    """Joints to place, by model, commands to controllers, and those to joints, to be held."""
+
+    def __init__(self, sim: Simulator, request: StepWorldRequest) -> None:
+        """The caller holds the simulator's lock. Errors: ControlError says what is wrong."""
+        self._sim = sim
+        _check_ticks(request)
+        self.placed = self._placing(request)
+        self.commands = self._controllers(request)
+        self.held = self._joints(request)
+
+    def _placing(self, request: StepWorldRequest) -> dict[Model, Placing]:
+        names, velocities = request.joints, request.velocities or [0.0] * len(request.joints)
+        _check_list("joints", names, "positions", request.positions)
+        _check_list("joints", names, "velocities", velocities)
+        placed: dict[Model, Placing] = {}
+        for name, position, velocity in zip(names, request.positions, velocities, strict=True):
+            model, joint = self._movable_joint(name)
+            if joint in placed.get(model, ({}, {}))[0]:
+                raise ControlError(f"joints names '{model.name}::{joint}' twice")
+            positions, speeds = placed.setdefault(model, ({}, {}))
+            positions[joint] = position
+            speeds[joint] = velocity
+        return placed
+
+    def _movable_joint(self, name: str) -> tuple[Model, str]:
+        """Returns the model and the plain name of the joint of that plain or scoped name."""
+        world = self._sim.world
+        found = world.joint(name)
+        if found is None or found[1] not in found[0].joint_names:
+            raise ControlError(f"there is no movable joint '{name}'")
+        if name == found[1] and sum(name in m.joint_names for m in world.models.values()) > 1:
+            raise ControlError(f"several models have a joint '{name}'; write model::{name}")
+        return found
+
+    def _controllers(self, request: StepWorldRequest) -> list[Callable[[], None]]:
+        """Each controller takes as many numbers as its command topic does."""
+        left = list(request.commands)
+        _check_numbers("commands", left)
+        commands = []
+        seen: set[int] = set()
+        for name in request.controllers:
+            controller = self._controller(name)
+            if id(controller) in seen:
+                raise ControlError(f"controllers names one twice: '{name}'")
+            seen.add(id(controller))
+            port = _command_port(controller)
+            single = port.kind == "Float64"
+            count = 1 if single else len(controller.claimed)
+            values, left = left[:count], left[count:]
+            if len(values) < count:
+                raise ControlError(
+                    f"{len(request.controllers)} controllers but {len(request.commands)} commands"
+                )
+            commands.append(_sending(port, values[0] if single else values))
+        if left:
+            raise ControlError(
+                f"{len(request.controllers)} controllers but {len(request.commands)} commands"
+            )
+        return commands
+
+    def _joints(self, request: StepWorldRequest) -> list[Callable[[], None]]:
+        _check_list("commanded_joints", request.commanded_joints, "joint_commands", request.joint_commands)
+        joints = [self._free_joint(name) for name in request.commanded_joints]
+        if len({id(joint) for joint in joints}) < len(joints):
+            raise ControlError(f"commanded_joints names one twice: {list(request.commanded_joints)}")
+        pairs = zip(joints, request.joint_commands, strict=True)
+        return [_commanding(joint, value) for joint, value in pairs]
+
+    def _controller(self, name: str) -> Controller:
+        """Returns the running controller of that plain or full name."""
+        found = [
+            controller
+            for robot in self._sim.robots
+            for controller in robot.manager.loaded
+            if name in (controller.name, rospy.names.ns_join(robot.namespace, controller.name))
+        ]
+        if not found:
+            raise ControlError(f"no controller named '{name}' is loaded")
+        if len(found) > 1:
+            raise ControlError(f"several robots have a controller '{name}'; write /namespace/{name}")
+        if found[0].state != RUNNING:
+            raise ControlError(f"controller '{name}' is {found[0].state}, not running")
+        return found[0]
+
+    def _free_joint(self, name: str) -> JointHandle:
+        """Returns the controllable joint of that plain or scoped name, if no running controller has it."""
+        found = [
+            (robot, joint)
+            for robot in self._sim.robots
+            for joint in robot.hardware.joints.values()
+            if name in (joint.name, f"{robot.model.name}::{joint.name}")
+        ]
+        if not found:
+            raise ControlError(f"no robot has a joint '{name}' with a transmission")
+        if len(found) > 1:
+            raise ControlError(f"several robots have a joint '{name}'; write model::{name}")
+        _check_free(*found[0])
+        return found[0][1]
+
+
+def _check_ticks(request: StepWorldRequest) -> None:
+    begins = request.reset != StepWorldRequest.NONE or bool(request.joints)
+    if not (0 if begins else 1) <= request.ticks <= MAX_TICKS:
+        raise ControlError(
+            f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call"
+            + (", or 0 with a reset" if request.ticks == 0 else "")
+        )
+    if request.reset > StepWorldRequest.SIMULATION:
+        raise ControlError(f"reset is {request.reset}: 0 (none), 1 (world) or 2 (simulation)")
+    if request.seed and request.reset == StepWorldRequest.NONE:
+        raise ControlError(f"seed is {request.seed}, which goes with a reset only")
+
+
+def _check_list(names: str, one: Sequence[str], values: str, other: Sequence[float]) -> None:
+    if len(one) != len(other):
+        raise ControlError(f"{len(one)} {names} but {len(other)} {values}")
+    if len(set(one)) < len(one):
+        raise ControlError(f"{names} names one twice: {list(one)}")
+    _check_numbers(values, other)
+
+
+def _check_numbers(what: str, values: Sequence[float]) -> None:
+    for value in values:
+        if not math.isfinite(value):
+            raise ControlError(f"{what} has {value}, which is not finite")
+        if abs(value) > LARGEST:
+            raise ControlError(f"{what} has {value}; it can't be beyond {LARGEST:g}")
+
+
+def _command_port(controller: Controller) -> Input:
+    for port in controller.inputs:
+        if port.topic == "command" and port.kind in ("Float64", "Float64MultiArray"):
+            return port
+    raise ControlError(f"controller '{controller.name}' ({controller.type_name}) takes no numbers")
+
+
+def _check_free(robot: Robot, joint: JointHandle) -> None:
+    for controller in robot.manager.loaded:
+        if controller.state == RUNNING and joint.name in controller.claimed:
+            raise ControlError(f"joint '{joint.name}' belongs to controller '{controller.name}'")
+
+
+def _sending(port: Input, value: float | Sequence[float]) -> Callable[[], None]:
+    def send() -> None:
+        try:
+            port.receive(value)
+        except FAULTS as error:
+            raise ControlError(f"the reader of '{port.topic}' raised {error!r}") from error
+
+    return send
+
+
+def _commanding(joint: JointHandle, value: float) -> Callable[[], None]:
+    def command() -> None:
+        joint.command = value
+
+    return command

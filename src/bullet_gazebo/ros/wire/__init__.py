@@ -1,0 +1,1 @@
+"""Between rospy and the rest: messages, connections, signals, thinning."""

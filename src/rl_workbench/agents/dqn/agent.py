@@ -1,0 +1,246 @@
+"""The DQN agent: acts, remembers, learns; knows neither environments nor files."""
+
+import json
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import nn
+
+from rl_workbench.agents.dqn.networks import DuelingQNetwork, FlatParameters, QNetwork, fast_values
+from rl_workbench.agents.dqn.normalisation import Normaliser
+from rl_workbench.agents.dqn.replay import Batch, ReplayBuffer
+from rl_workbench.agents.dqn.returns import NStepReturns
+from rl_workbench.agents.dqn.schedules import Epsilon, learning_rate
+from rl_workbench.agents.dqn.settings import DQNSettings
+from rl_workbench.errors import WorkbenchError
+
+
+class Learned(NamedTuple):
+    """Of the last gradient step of a round: the loss, and the mean of the Q-values."""
+
+    td_loss: float
+    q_values: float
+
+
+class DQNAgent:
+    """Learns a network of Q-values from single steps.
+
+    Its generators, for exploring and for drawing batches, are its own; so is the one that makes
+    the first weights. The same seed and the same steps give the same bits.
+
+    Args:
+        settings: the options.
+        observation_size: D; observations are float32 of shape (D,).
+        actions: A; actions are 0 to A - 1.
+        seed: of weights, exploration and batches.
+        device: where the networks are.
+    """
+
+    def __init__(
+        self,
+        settings: DQNSettings,
+        observation_size: int,
+        actions: int,
+        seed: int = 0,
+        device: str = "cpu",
+    ) -> None:
+        self.settings = settings
+        self.actions = actions
+        self._device = torch.device(device)
+        self.q_net = self._network(observation_size, seed)
+        self.target_net = self._network(observation_size, seed).requires_grad_(False).eval()
+        self._flat, self._target = FlatParameters(self.q_net), FlatParameters(self.target_net)
+        self._optimizer = torch.optim.Adam([self._flat.vector], settings.learning_rate, fused=True)
+        self._loss = nn.functional.mse_loss if settings.loss == "mse" else nn.functional.huber_loss
+        self.buffer = ReplayBuffer(settings.buffer_size, observation_size)
+        self.normaliser = Normaliser(observation_size) if settings.normalize_observations else None
+        self._returns = NStepReturns(settings.n_step, settings.gamma)
+        self._epsilon = Epsilon(settings)
+        self._explore, self._draw = (np.random.default_rng([seed, use]) for use in (0, 1))
+        self._values = self._fast_values()
+        self.steps = 0  # of the environment
+        self.gradient_steps = 0
+
+    def _network(self, observation_size: int, seed: int) -> nn.Module:
+        kind = DuelingQNetwork if self.settings.dueling else QNetwork
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            network = kind(observation_size, self.actions, self.settings.hidden_sizes)
+        return network.to(self._device)
+
+    def _fast_values(self) -> Callable[[np.ndarray], np.ndarray]:
+        if self._device.type == "cpu":
+            return fast_values(self.q_net)
+        return lambda observation: self.q_values(observation[None])[0]
+
+    @property
+    def epsilon(self) -> float:
+        """The probability that the next action is a random one."""
+        return self._epsilon.value
+
+    def act(self, observation: np.ndarray) -> int:
+        """A random action with probability epsilon, else the best."""
+        if self._explore.random() < self._epsilon.value:
+            return int(self._explore.integers(self.actions))
+        return self.act_greedily(observation)
+
+    def act_greedily(self, observation: np.ndarray) -> int:
+        """The action of the highest value."""
+        if self.normaliser is not None:
+            observation = self.normaliser(observation)
+        return int(self._values(observation).argmax())
+
+    @torch.no_grad()
+    def q_values(self, observations: np.ndarray) -> np.ndarray:
+        """The value of each action, (N, A), for observations (N, D)."""
+        values: np.ndarray = self.q_net(self._inputs(observations)).cpu().numpy()
+        return values
+
+    def _inputs(self, observations: np.ndarray) -> torch.Tensor:
+        if self.normaliser is not None:
+            observations = self.normaliser(observations)
+        return torch.from_numpy(observations).to(self._device)
+
+    def observe(
+        self,
+        step: tuple[np.ndarray, int, float],
+        following: np.ndarray,
+        terminated: bool,
+        truncated: bool,
+    ) -> None:
+        """Remembers one step: (observation, action, reward), and what followed."""
+        observation, action, reward = step
+        if self.normaliser is not None:
+            self.normaliser.add(observation)
+        scaled = (observation, action, reward * self.settings.reward_scale)
+        ended = terminated or truncated
+        valued = not (terminated if self.settings.bootstrap_truncated else ended)
+        for transition in self._returns.add(scaled, following, ended, valued):
+            self.buffer.push(transition)
+        self.steps += 1
+        self._epsilon.step_done(self.steps)
+
+    def episode_done(self) -> None:
+        """Tells of an episode's end, or that an episode under way isn't continued."""
+        self._returns.clear()
+        self._epsilon.episode_done()
+
+    @property
+    def is_due(self) -> bool:
+        """Whether a round of learning comes after this step."""
+        settings = self.settings
+        return (
+            self.steps >= settings.learning_starts
+            and self.steps % settings.train_frequency == 0
+            and len(self.buffer) >= min(settings.batch_size, settings.buffer_size)
+        )
+
+    def learn(self) -> Learned:
+        """One round: as many gradient steps as the settings say.
+
+        Raises:
+            WorkbenchError: if the loss or the gradient isn't finite; the weights are as they were
+                before that gradient step.
+        """
+        settings = self.settings
+        self._optimizer.param_groups[0]["lr"] = learning_rate(settings, self.steps)
+        batch = self.buffer.sample(settings.batch_size, self._draw, settings.gradient_steps)
+        for index in range(settings.gradient_steps):
+            learned = self._gradient_step(self._tensors(batch, index))
+        self._epsilon.learned()
+        return learned
+
+    def _tensors(self, batch: Batch, index: int) -> tuple[torch.Tensor, ...]:
+        return (
+            self._inputs(batch.observations[index]),
+            *(torch.from_numpy(column[index]).to(self._device) for column in batch[1:3]),
+            self._inputs(batch.next_observations[index]),
+            torch.from_numpy(batch.discounts[index]).to(self._device),
+        )
+
+    def _gradient_step(self, tensors: tuple[torch.Tensor, ...]) -> Learned:
+        observations, actions, rewards, following, discounts = tensors
+        chosen = self.q_net(observations).gather(1, actions.unsqueeze(1)).squeeze(1)
+        loss = self._loss(chosen, rewards + discounts * self._next_values(following))
+        learned = Learned(loss.item(), chosen.detach().mean().item())
+        self._flat.gradient.zero_()
+        loss.backward()
+        self._clip(learned.td_loss)
+        self._optimizer.step()
+        self.gradient_steps += 1
+        if self.gradient_steps % self.settings.target_network_frequency == 0:
+            self._target.follow(self._flat, self.settings.tau)
+        return learned
+
+    @torch.no_grad()
+    def _next_values(self, following: torch.Tensor) -> torch.Tensor:
+        rated = self.target_net(following)
+        if not self.settings.double:
+            return rated.max(1).values
+        best = self.q_net(following).argmax(1, keepdim=True)
+        return rated.gather(1, best).squeeze(1)
+
+    def _clip(self, loss: float) -> None:
+        """Scales the gradient down; refuses one that would spoil the weights."""
+        norm = self._flat.gradient.norm().item()
+        if not (math.isfinite(loss) and math.isfinite(norm)):
+            raise WorkbenchError(
+                f"the loss is {loss} and the gradient's norm {norm} at step {self.steps}; the "
+                "networks were left unchanged; try a smaller learning_rate or reward_scale"
+            )
+        if 0 < self.settings.max_grad_norm < norm:
+            self._flat.gradient.mul_(self.settings.max_grad_norm / norm)
+
+    def policy_state(self) -> dict[str, Any]:
+        """What acting needs: `q_net`, `target_net`, `epsilon`, and the normaliser if there is one."""
+        return {
+            "q_net": _copied(self.q_net),
+            "target_net": _copied(self.target_net),
+            "epsilon": self._epsilon.value,
+            "normaliser": self.normaliser.state_dict() if self.normaliser else None,
+        }
+
+    def load_policy_state(self, state: dict[str, Any]) -> None:
+        """Takes over what `policy_state` gave; a file of the document's has no normaliser."""
+        self.q_net.load_state_dict(state["q_net"])
+        self.target_net.load_state_dict(state["target_net"])
+        self._epsilon.value = state["epsilon"]
+        if self.normaliser is not None:
+            self.normaliser.load_state_dict(state["normaliser"])
+
+    def state_dict(self) -> dict[str, Any]:
+        """Everything that the next step depends on; tensors, numbers and text only.
+
+        Optimiser and replay share their memory: write or copy it before the next step.
+        """
+        return {
+            **self.policy_state(),
+            "optimizer": self._optimizer.state_dict(),
+            "replay": self.buffer.state_dict(),
+            "window": self._returns.state_dict(),
+            "generators": [_written(self._explore), _written(self._draw)],
+            "steps": self.steps,
+            "gradient_steps": self.gradient_steps,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Takes over what `state_dict` gave."""
+        self.load_policy_state(state)
+        self._optimizer.load_state_dict(state["optimizer"])
+        self.buffer.load_state_dict(state["replay"])
+        self._returns.load_state_dict(state["window"])
+        for generator, text in zip((self._explore, self._draw), state["generators"], strict=True):
+            generator.bit_generator.state = json.loads(text)
+        self.steps, self.gradient_steps = state["steps"], state["gradient_steps"]
+
+
+def _copied(network: nn.Module) -> dict[str, torch.Tensor]:
+    """The state_dict in memory of its own: the parameters are parts of one vector."""
+    return {name: tensor.detach().cpu().clone() for name, tensor in network.state_dict().items()}
+
+
+def _written(generator: np.random.Generator) -> str:
+    return json.dumps(generator.bit_generator.state)

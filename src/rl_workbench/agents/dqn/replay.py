@@ -1,0 +1,120 @@
+"""The replay buffer: transitions in preallocated arrays, drawn uniformly."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+
+from rl_workbench.errors import WorkbenchError
+
+
+class Transition(NamedTuple):
+    """One step, or n of them in one: what Q(observation, action) is compared with.
+
+    `discount` multiplies the next observation's value: gamma^n, or 0 where the episode ended.
+    """
+
+    observation: np.ndarray  # (D,) float32
+    action: int
+    reward: float  # the discounted sum over n steps
+    next_observation: np.ndarray  # (D,) float32
+    discount: float
+
+
+class Batch(NamedTuple):
+    """Transitions as arrays; K rounds of B transitions each."""
+
+    observations: np.ndarray  # (K, B, D) float32
+    actions: np.ndarray  # (K, B) int64
+    rewards: np.ndarray  # (K, B) float32
+    next_observations: np.ndarray  # (K, B, D) float32
+    discounts: np.ndarray  # (K, B) float32
+
+
+class ReplayBuffer:
+    """Keeps the newest `capacity` transitions.
+
+    Memory is reserved, not touched, so that a large buffer costs nothing before it is filled.
+
+    Raises:
+        WorkbenchError: if the memory isn't there.
+    """
+
+    def __init__(self, capacity: int, observation_size: int) -> None:
+        shape = (capacity, observation_size)
+        try:
+            self._observations = np.zeros(shape, np.float32)
+            self._next_observations = np.zeros(shape, np.float32)
+            self._actions = np.zeros(capacity, np.int64)
+            self._rewards = np.zeros(capacity, np.float32)
+            self._discounts = np.zeros(capacity, np.float32)
+        except MemoryError as error:
+            raise WorkbenchError(
+                f"no memory for {capacity} transitions; take a smaller buffer_size"
+            ) from error
+        self.capacity = capacity
+        self._size = 0
+        self._next = 0  # where the next transition goes
+
+    def __len__(self) -> int:
+        return self._size
+
+    def push(self, transition: Transition) -> None:
+        """Adds a transition, in the oldest one's place once the buffer is full."""
+        index = self._next
+        self._observations[index] = transition.observation
+        self._actions[index] = transition.action
+        self._rewards[index] = transition.reward
+        self._next_observations[index] = transition.next_observation
+        self._discounts[index] = transition.discount
+        self._next = (index + 1) % self.capacity
+        self._size = max(self._size, index + 1)
+
+    def sample(self, batch_size: int, rng: np.random.Generator, rounds: int = 1) -> Batch:
+        """Draws `rounds` batches; within a batch no transition comes twice.
+
+        A buffer that holds fewer than `batch_size` gives all it has.
+        """
+        count = min(batch_size, self._size)
+        if count == self._size:
+            indices = np.tile(np.arange(count), (rounds, 1))
+        else:
+            indices = np.empty((rounds, count), np.int64)
+            for row in indices:
+                row[:] = rng.choice(self._size, count, replace=False, shuffle=False)
+        return Batch(
+            self._observations[indices],
+            self._actions[indices],
+            self._rewards[indices],
+            self._next_observations[indices],
+            self._discounts[indices],
+        )
+
+    def state_dict(self) -> dict[str, Any]:
+        """The filled part as tensors that share its memory, and where the next one goes."""
+        arrays = {name: torch.from_numpy(array[: self._size]) for name, array in self._columns()}
+        return {**arrays, "next": self._next}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Takes over what `state_dict` gave.
+
+        Raises:
+            WorkbenchError: if it doesn't fit into this buffer.
+        """
+        size = len(state["actions"])
+        if size > self.capacity or not 0 <= state["next"] < max(self.capacity, 1):
+            raise WorkbenchError(f"a buffer of {self.capacity} can't hold {size} transitions")
+        for name, array in self._columns():
+            if state[name].shape[1:] != array.shape[1:]:
+                raise WorkbenchError(f"the transitions' {name} have another shape")
+            array[:size] = state[name].numpy()
+        self._size, self._next = size, state["next"]
+
+    def _columns(self) -> list[tuple[str, np.ndarray]]:
+        return [
+            ("observations", self._observations),
+            ("actions", self._actions),
+            ("rewards", self._rewards),
+            ("next_observations", self._next_observations),
+            ("discounts", self._discounts),
+        ]

@@ -1,0 +1,1 @@
+"""Learning from whole episodes by policy gradient."""

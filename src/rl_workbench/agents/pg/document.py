@@ -1,0 +1,222 @@
+"""Policy gradient with a value baseline: a linear softmax policy, one update per episode.
+
+The algorithm of the existing script: the advantage of a step is its discounted return less
+the value network's estimate before the update; the policy's loss is the sum, not the mean,
+of -log pi(a|s) A; the value's loss is the mean squared error to the returns.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import nn
+
+from rl_workbench.agents.pg.two_networks import TwoNetworks
+from rl_workbench.errors import WorkbenchError
+
+GAMMA = 0.99
+POLICY_LEARNING_RATE = 0.01
+VALUE_LEARNING_RATE = 0.1
+
+
+class PolicyNetwork(nn.Module):
+    """Observation (N, 4) to the probabilities (N, 2) of the two actions."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fc = nn.Linear(4, 2)
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        return torch.softmax(self.fc(observations), dim=1)
+
+
+class ValueNetwork(nn.Module):
+    """Observation (N, 4) to the estimated return (N, 1)."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fc1 = nn.Linear(4, 10)
+        self.relu = nn.ReLU()
+        self.fc2 = nn.Linear(10, 1)
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        return self.fc2(self.relu(self.fc1(observations)))
+
+
+@dataclass
+class Episode:
+    """What happened, step by step: observation before the action, action, reward."""
+
+    observations: list[np.ndarray] = field(default_factory=list)  # each float32 (D,)
+    actions: list[int] = field(default_factory=list)
+    rewards: list[float] = field(default_factory=list)
+    final_observation: np.ndarray | None = None  # after the last step
+    terminated: bool = False  # by the task; False: it was cut off
+
+    def add(self, observation: np.ndarray, action: int, reward: float) -> None:
+        self.observations.append(observation)
+        self.actions.append(action)
+        self.rewards.append(reward)
+
+    @property
+    def length(self) -> int:
+        return len(self.rewards)
+
+    @property
+    def total_reward(self) -> float:
+        """The undiscounted sum, added in order as the document's script does."""
+        return float(sum(self.rewards))
+
+    def states(self) -> list[np.ndarray]:
+        """All observations, the final one included: T + 1.
+
+        Raises:
+            ValueError: if the episode isn't over.
+        """
+        if self.final_observation is None:
+            raise ValueError("the episode isn't over")
+        return [*self.observations, self.final_observation]
+
+    def state_dict(self) -> dict[str, Any]:
+        """Tensors and plain values, for a checkpoint.
+
+        Raises:
+            ValueError: if the episode isn't over.
+        """
+        return {
+            "observations": torch.from_numpy(np.stack(self.states())),
+            "actions": torch.tensor(self.actions),
+            "rewards": torch.tensor(self.rewards, dtype=torch.float64),
+            "terminated": self.terminated,
+        }
+
+    @classmethod
+    def from_state(cls, state: dict[str, Any]) -> "Episode":
+        """The episode that `state_dict` told of."""
+        *observations, final = state["observations"].numpy()
+        actions, rewards = state["actions"].tolist(), state["rewards"].tolist()
+        return cls(list(observations), actions, rewards, final, state["terminated"])
+
+
+class Losses(NamedTuple):
+    """The two losses of one update, taken before the weights change."""
+
+    policy: float
+    value: float
+
+
+def discounted_returns(rewards: list[float], gamma: float = GAMMA) -> np.ndarray:
+    """Each step's return, from the last step backwards: G_t = r_t + gamma G_t+1.
+
+    Returns:
+        float64, shape (len(rewards),).
+    """
+    returns = np.empty(len(rewards))
+    future = 0.0
+    for index in range(len(rewards) - 1, -1, -1):
+        future = rewards[index] + gamma * future
+        returns[index] = future
+    return returns
+
+
+class PolicyGradientAgent(TwoNetworks):
+    """Learns from whole episodes; acts from a NumPy copy of the linear policy.
+
+    Both output layers start at zero: a uniform policy, and a value of 0 everywhere. From random
+    ones, as in the document's script, several seeds in ten need more than 600 episodes: a weight
+    of the policy that starts with the wrong sign has to be unlearned, and a hidden unit that
+    starts with a negative weight to the value's output is soon dead, since returns are positive.
+
+    Args:
+        seed: makes the initial weights and the choice of actions repeatable, through
+            generators of its own.
+        random_weights: draw the output layers too, as the document's script does.
+    """
+
+    def __init__(self, seed: int = 0, random_weights: bool = False) -> None:
+        with torch.random.fork_rng():
+            torch.manual_seed(seed)
+            policy, value = PolicyNetwork(), ValueNetwork()
+        if not random_weights:
+            start_at_zero(policy.fc)
+            start_at_zero(value.fc2)
+        super().__init__(policy, value, (POLICY_LEARNING_RATE, VALUE_LEARNING_RATE), seed)
+        self._output = policy.fc
+        self.sync()
+
+    def sync(self) -> None:
+        """Copies the policy's weights to where acting reads them."""
+        self._weight = self._output.weight.detach().numpy().copy()  # (2, 4)
+        self._bias = self._output.bias.detach().numpy().copy()  # (2,)
+
+    def probability_of_zero(self, observation: np.ndarray) -> float:
+        """The policy's probability of action 0 for an observation of shape (4,).
+
+        Eight times as fast as asking torch; equal to it within float32.
+        """
+        left, right = (self._weight @ observation + self._bias).tolist()
+        return 1.0 / (1.0 + math.exp(min(right - left, 700.0)))
+
+    def probabilities(self, observation: np.ndarray) -> np.ndarray:
+        """Of both actions, (2,)."""
+        left = self.probability_of_zero(observation)
+        return np.array([left, 1.0 - left])
+
+    def act(self, observation: np.ndarray) -> int:
+        """Draws an action from the policy."""
+        return 0 if self.generator.random() < self.probability_of_zero(observation) else 1
+
+    def act_greedily(self, observation: np.ndarray) -> int:
+        """The more probable action."""
+        return 0 if self.probability_of_zero(observation) >= 0.5 else 1
+
+    def learn(self, episode: Episode) -> Losses:
+        """Updates both networks once from one episode.
+
+        Raises:
+            WorkbenchError: if a loss isn't finite; the weights are as before then.
+        """
+        observations = torch.from_numpy(np.stack(episode.observations))  # (T, 4)
+        actions = torch.tensor(episode.actions)  # (T,)
+        returns = torch.from_numpy(discounted_returns(episode.rewards))  # (T,) float64
+        values = self.value(observations).squeeze(1)  # (T,)
+        advantages = (returns - values.detach().double()).float()
+        value_loss = nn.functional.mse_loss(values, returns.float())
+        chosen = self.policy(observations).gather(1, actions.unsqueeze(1)).squeeze(1)
+        policy_loss = -torch.sum(torch.log(chosen) * advantages)
+        losses = Losses(policy_loss.item(), value_loss.item())
+        check_finite(losses)
+        descend(self.policy_optimizer, policy_loss)
+        descend(self.value_optimizer, value_loss)
+        self.sync()
+        return losses
+
+
+def check_finite(losses: Losses) -> None:
+    """Refuses losses that are no numbers with a WorkbenchError, before anything is changed."""
+    for name, loss in losses._asdict().items():
+        if not math.isfinite(loss):
+            raise WorkbenchError(f"the {name} loss is {loss}; the networks were left unchanged")
+
+
+def start_at_zero(layer: nn.Linear) -> None:
+    """Has a layer begin with an output of 0 everywhere."""
+    nn.init.zeros_(layer.weight)
+    nn.init.zeros_(layer.bias)
+
+
+def descend(optimizer: torch.optim.Optimizer, loss: torch.Tensor) -> None:
+    """One step of the optimizer down the loss.
+
+    Raises:
+        WorkbenchError: if the gradient isn't finite, as it may be where the loss is; no weight was
+            changed then.
+    """
+    optimizer.zero_grad()
+    loss.backward()
+    gradients = [weight.grad for group in optimizer.param_groups for weight in group["params"]]
+    if not math.isfinite(nn.utils.get_total_norm(gradients, math.inf)):
+        raise WorkbenchError("a gradient isn't finite; the networks were left unchanged")
+    optimizer.step()

@@ -1,0 +1,34 @@
+"""All that REINFORCE with a baseline can be told, each option with its default."""
+
+from dataclasses import dataclass
+
+from rl_workbench.option import check_options, option
+
+
+@dataclass(frozen=True)
+class ReinforceSettings:
+    """The options of the algorithm.
+
+    Raises:
+        WorkbenchError: if a value is beyond its limits; names the option and these.
+    """
+
+    gamma: float = option(0.99, "discount of rewards, for each step that they come later", 0, 1)
+    gae_lambda: float = option(
+        0.95, "of the generalised advantages; 1: whole returns, 0: one step", 0, 1
+    )
+    policy_learning_rate: float = option(0.03, "of the policy's Adam", 0, 10)
+    value_learning_rate: float = option(0.01, "of the baseline's Adam", 0, 10)
+    value_epochs: int = option(20, "steps of the baseline for each batch", 0, 10**6)
+    batch_episodes: int = option(1, "episodes for each step of the policy", 1, 10**6)
+    entropy_coefficient: float = option(0.0, "weight of the policy's entropy in its loss", 0, 1e6)
+    policy_hidden: int = option(
+        0, "units in the policy's hidden layer; 0: none, it is linear", 0, 2**16
+    )
+    value_hidden: int = option(32, "units in each of the baseline's two layers", 1, 2**16)
+    normalize_observations: bool = option(
+        False, "by mean and deviation as seen so far; switched on where no scale is known"
+    )
+
+    def __post_init__(self) -> None:
+        check_options(self)

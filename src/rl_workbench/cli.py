@@ -1,0 +1,91 @@
+"""The command workbench.py: its subcommands, errors in one line, exit codes."""
+
+import argparse
+import sys
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.options.options import unknown
+from rl_workbench.training.run.interrupt import Interrupt
+
+COMMAND = "workbench.py"
+DESCRIPTION = """\
+Looks at trainings of dqn_train.py, pg_train.py and of its own command train.
+
+RUN is a run folder, as runs/CartPole-v1__dqn__0__1700000000. No ROS master is needed.
+Exit codes: 0 done, 1 failed, 2 wrong arguments; 130 after Ctrl-C."""
+
+
+class _Command(NamedTuple):
+    """A subcommand: the module with its add_flags and run, and a line of help."""
+
+    module: str
+    help: str
+
+
+TRAIN = "train"
+COMMANDS = {
+    "eval": _Command("watching", "greedy episodes of a run: mean, deviation, every episode"),
+    "enjoy": _Command("watching", "watch greedy episodes in a window"),
+    "record": _Command("watching", "one greedy episode as GIF or MP4, without a display"),
+    "plot": _Command("drawing", "the training curves of runs as PNG"),
+    "policy": _Command("drawing", "the policy over the pole's angle and velocity as PNG"),
+    "compare": _Command("comparing", "groups of runs: table per seed, IQM, intervals, curves"),
+    "train": _Command("training", "train by DQN, policy gradient or Stable-Baselines3"),
+    "sweep": _Command("searching", "search options with Optuna"),
+    "benchmark": _Command("benchmarking", "train several seeds, or a suite; table per seed, curves"),
+}
+PACKAGE = "rl_workbench.tools.commands"
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Does what the arguments say; returns the process's exit code."""
+    argv = sys.argv[1:] if argv is None else argv
+    interrupt = Interrupt().install()
+    try:
+        if argv[:1] == [TRAIN]:  # its flags depend on the algorithm
+            return int(_module(TRAIN).train(plain(argv[1:]), interrupt))
+        arguments = parse(plain(argv))
+        _module(arguments.command).run(arguments, interrupt)
+        return interrupt.exit_code
+    except WorkbenchError as error:
+        print(f"{COMMAND}: {error}", file=sys.stderr, flush=True)
+        return interrupt.exit_code or 1
+    except KeyboardInterrupt:
+        print(f"{COMMAND}: interrupted", file=sys.stderr)
+        return interrupt.exit_code or 130
+
+
+def plain(argv: list[str]) -> list[str]:
+    """The arguments without what roslaunch adds (`__name:=`, `__log:=`)."""
+    return [each for each in argv if not (each.startswith("__") and ":=" in each)]
+
+
+def parse(argv: list[str]) -> argparse.Namespace:
+    """The arguments of the subcommand.
+
+    Raises:
+        SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
+    """
+    parser = argparse.ArgumentParser(
+        COMMAND,
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    named = next((each for each in argv if not each.startswith("-")), None)
+    if named is not None and named not in COMMANDS:
+        parser.error(unknown("command", named, list(COMMANDS)))
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, command in COMMANDS.items():
+        own = commands.add_parser(
+            name, help=command.help, description=command.help, allow_abbrev=False
+        )
+        if name == named != TRAIN:  # the others needn't be read
+            _module(name).add_flags(own, name)
+    return parser.parse_args(argv)
+
+
+def _module(command: str) -> Any:
+    return import_module(f"{PACKAGE}.{COMMANDS[command].module}")

@@ -1,0 +1,42 @@
+"""Flags that several subcommands have."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from rl_workbench.tools.runs.players import WHICH
+from rl_workbench.training.dqn.settings import OPTIONS
+
+
+def add_policy_flags(parser: argparse.ArgumentParser) -> None:
+    """Which policy of which run, and where it acts."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
+    parser.add_argument("--checkpoint", choices=WHICH, default="best",
+                        help="by evaluation, or the newest (default best)")  # fmt: skip
+    parser.add_argument("--seed", type=number(0), default=0, metavar="N",
+                        help="of the episodes (default 0)")  # fmt: skip
+    parser.add_argument("--env-kwargs", nargs="+", default=[], metavar="KEY=VALUE",
+                        help="options of the environment, as backend=ros; several with commas")  # fmt: skip
+
+
+def env_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The environment's options as values, read as `train` reads them.
+
+    Raises:
+        WorkbenchError: if one isn't KEY=VALUE.
+    """
+    text = ",".join(arguments.env_kwargs)
+    return dict(OPTIONS.read({"env_kwargs": text}, "--env-kwargs").get("env_kwargs", {}))
+
+
+def number(lowest: int) -> Any:
+    """An argparse type: a whole number from `lowest` on."""
+
+    def whole(text: str) -> int:
+        value = int(text)
+        if not lowest <= value < 2**31:
+            raise argparse.ArgumentTypeError(f"must be at least {lowest} and below 2^31: {text}")
+        return value
+
+    whole.__name__ = "whole number"  # argparse's word for it
+    return whole

@@ -1,0 +1,110 @@
+"""eval, enjoy and record: a run's policy at work."""
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from cartpole.envs.display import hindrance
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools.commands.shared import add_policy_flags, env_options, number
+from rl_workbench.tools.pictures.films import GIF_RATE, MP4_RATE, check_format, film, write_film
+from rl_workbench.tools.runs.episodes import TEST_SEED, figures, play, table, verdict
+from rl_workbench.tools.runs.players import Player, load_player
+from rl_workbench.tools.runs.runs import Run, open_run, threshold
+from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.results import check_writable, write_json
+
+
+def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
+    """Flags of one of the three."""
+    add_policy_flags(parser)
+    add = parser.add_argument
+    if command == "eval":
+        add("--episodes", type=number(1), default=100, metavar="N", help="default 100")
+        add("--json", type=Path, metavar="FILE", help="the figures; - for standard output")
+        return
+    if command == "enjoy":
+        add("--episodes", type=number(1), default=1, metavar="N", help="default 1")
+        return
+    add("--out", type=Path, required=True, metavar="FILE", help="ends in .gif or .mp4")
+    add("--max-steps", type=number(0), default=0, metavar="N",
+        help="cuts the episode off; 0: never (default)")  # fmt: skip
+    add("--scale", type=_scale, default=1.0, metavar="X",
+        help="of width and height (default 1)")  # fmt: skip
+
+
+def _scale(text: str) -> float:
+    value = float(text)
+    if not 0.05 <= value <= 4.0:
+        raise argparse.ArgumentTypeError(f"must lie between 0.05 and 4: {text}")
+    return value
+
+
+def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
+    """One of the three.
+
+    Raises:
+        WorkbenchError: if something is wrong with the run, the display or the file.
+    """
+    commands = {"eval": _eval, "enjoy": _enjoy, "record": _record}
+    commands[arguments.command](arguments, open_run(arguments.run))
+
+
+def _player(arguments: argparse.Namespace, run: Run, **options: Any) -> Player:
+    return load_player(run, arguments.checkpoint, {**env_options(arguments), **options})
+
+
+def _eval(arguments: argparse.Namespace, run: Run) -> None:
+    to_stdout = str(arguments.json) == "-"
+    if arguments.json and not to_stdout:
+        check_writable(arguments.json)
+    player = _player(arguments, run)
+    try:
+        result = play(player, arguments.episodes, arguments.seed)
+    finally:
+        player.env.close()
+    line = threshold(run.env_id)
+    found = {"run": str(run.folder), **figures(result, player.checkpoint, line)}
+    # With the figures on standard output, what people read goes beside it.
+    stream = sys.stderr if to_stdout else sys.stdout
+    print(table(result), file=stream)
+    print(verdict(found, line), file=stream)
+    if to_stdout:
+        print(json.dumps(found, indent=1))
+    elif arguments.json:
+        write_json(arguments.json, found)
+
+
+def _enjoy(arguments: argparse.Namespace, run: Run) -> None:
+    reason = hindrance()
+    if reason:
+        raise WorkbenchError(
+            f"enjoy needs a display to open a window on, and {reason}; "
+            f"record {arguments.run} --out episode.gif shows it without one"
+        )
+    player = _player(arguments, run, render_mode="human")
+    try:
+        print(table(play(player, arguments.episodes, arguments.seed)))
+    finally:
+        player.env.close()
+
+
+def _record(arguments: argparse.Namespace, run: Run) -> None:
+    check_format(arguments.out)
+    check_writable(arguments.out)
+    if hindrance():  # pygame would look for a screen, and complain that there is none
+        os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+    player = _player(arguments, run, render_mode="rgb_array")
+    fastest = GIF_RATE if arguments.out.suffix.lower() == ".gif" else MP4_RATE
+    try:
+        shown = film(player, TEST_SEED + arguments.seed, fastest, arguments.max_steps)
+    finally:
+        player.env.close()
+    write_film(arguments.out, shown, arguments.scale)
+    print(
+        f"{arguments.out}: return {shown.total_reward:.2f} in {shown.length} steps, "
+        f"{len(shown.frames)} frames, {len(shown.frames) / shown.rate:.1f} s"
+    )

@@ -1,0 +1,1 @@
+"""Curves, panels, policies and films."""

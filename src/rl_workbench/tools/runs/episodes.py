@@ -1,0 +1,60 @@
+"""`eval`: greedy episodes of a run's policy, and their figures."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools.runs.players import Player
+from rl_workbench.training.run.evaluation import Evaluation, run_greedily
+
+TEST_SEED = 5_000_000  # other episodes than those of any training or of its evaluations
+
+
+def play(player: Player, episodes: int, seed: int) -> Evaluation:
+    """Runs greedy episodes, seeded once.
+
+    Raises:
+        WorkbenchError: if the environment fails.
+    """
+    try:
+        result = run_greedily(player.env, player.act, TEST_SEED + seed, episodes)
+    except (ValueError, AssertionError) as error:
+        raise WorkbenchError(f"the policy doesn't fit the environment: {error}") from error
+    assert result is not None  # nothing told it to stop
+    return result
+
+
+def figures(result: Evaluation, checkpoint: Path, threshold: float | None) -> dict[str, Any]:
+    """Plain numbers, for JSON."""
+    returns = np.array(result.returns)
+    return {
+        "checkpoint": str(checkpoint),
+        "episodes": len(returns),
+        "mean": float(returns.mean()),
+        "std": float(returns.std()),
+        "min": float(returns.min()),
+        "max": float(returns.max()),
+        "solved": None if threshold is None else bool(returns.mean() >= threshold),
+        "returns": result.returns,
+        "lengths": result.lengths,
+    }
+
+
+def table(result: Evaluation) -> str:
+    """A line for each episode."""
+    rows = zip(result.returns, result.lengths, strict=True)
+    return "\n".join(
+        f"episode {index:4d} | return {total:9.2f} | length {length:5d}"
+        for index, (total, length) in enumerate(rows)
+    )
+
+
+def verdict(found: dict[str, Any], threshold: float | None) -> str:
+    """The line that sums it up."""
+    line = f"mean {found['mean']:.2f} ± {found['std']:.2f} over {found['episodes']} greedy episodes"
+    line += f" (min {found['min']:.2f}, max {found['max']:.2f})"
+    if threshold is not None:
+        line += f"; {'solved' if found['solved'] else 'not solved'}: the line is {threshold:g}"
+    return line

@@ -1,0 +1,1 @@
+"""Options from flags, rosparams, KEY=VALUE and YAML."""

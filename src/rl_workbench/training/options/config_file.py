@@ -1,0 +1,65 @@
+"""Tuned options in YAML: one file for each algorithm, one section for each environment."""
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.options.options import unknown
+
+TREE = Path(__file__).resolve().parents[4]
+
+
+def default_file(name: str) -> Path:
+    """The package's own config/<name>: in the source tree, or where rospkg finds the package.
+
+    Raises:
+        WorkbenchError: if it is in neither.
+    """
+    path = TREE / "config" / name
+    if path.is_file():
+        return path
+    import rospkg  # the source tree may be used without ROS
+
+    try:
+        return Path(rospkg.RosPack().get_path("cartpole")) / "config" / name
+    except rospkg.ResourceNotFound as error:
+        raise WorkbenchError(
+            f"config/{name} is neither in {TREE} nor in a package on ROS_PACKAGE_PATH"
+        ) from error
+
+
+def read_section(path: Path, env_id: str | None, preset: str | None) -> dict[str, Any]:
+    """The options of a preset, or else of an environment; none where the file has none for it.
+
+    A file without sections holds options that count for every environment.
+
+    Raises:
+        WorkbenchError: if the file can't be read, or has no such preset.
+    """
+    content = _read(path)
+    if content and not any(isinstance(value, dict) for value in content.values()):
+        if preset:
+            raise WorkbenchError(f"{path} has no sections, so no preset {preset!r} either")
+        return content
+    name = preset or env_id or ""
+    if preset and preset not in content:
+        raise WorkbenchError(f"{path}: {unknown('preset', preset, list(content))}")
+    section = content.get(name) or {}
+    if not isinstance(section, dict):
+        raise WorkbenchError(f"{path}: {name} isn't a section of options")
+    return section
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+    except OSError as error:
+        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        text = " ".join(str(error).split())
+        raise WorkbenchError(f"{path} isn't YAML: {text}") from error
+    if not isinstance(content, dict):
+        raise WorkbenchError(f"{path} isn't a YAML file of options")
+    return content

@@ -1,0 +1,203 @@
+"""Options from texts: flags, rosparams, KEY=VALUE and YAML, all through the same checks."""
+
+import argparse
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, fields
+from difflib import get_close_matches
+from types import NoneType
+from typing import Any, get_args, get_type_hints
+
+import yaml
+
+from rl_workbench.errors import WorkbenchError
+
+
+class Options:
+    """The fields of one or more dataclasses, by name.
+
+    Args:
+        classes: dataclasses whose fields were made by `rl_workbench.option.option`.
+    """
+
+    def __init__(self, *classes: type) -> None:
+        self._fields: dict[str, Field[Any]] = {}
+        self._types: dict[str, Any] = {}
+        self._owner: dict[str, type] = {}
+        for owner in classes:
+            hints = get_type_hints(owner)
+            for each in fields(owner):
+                self._fields[each.name] = each
+                self._types[each.name] = hints[each.name]
+                self._owner[each.name] = owner
+
+    @property
+    def names(self) -> list[str]:
+        """All names, in the order of their definition."""
+        return list(self._fields)
+
+    def read(self, values: Mapping[str, Any], origin: str) -> dict[str, Any]:
+        """Values as their options' types; '' and None leave an option as it is.
+
+        Raises:
+            WorkbenchError: if there is no such option, naming the nearest, or a value isn't of
+                its type; `origin` says where it stands.
+        """
+        result = {}
+        for name, value in values.items():
+            if name not in self._fields:
+                raise WorkbenchError(f"{origin}: {unknown('option', str(name), self.names)}")
+            if value is None or value == "":
+                continue
+            try:
+                result[name] = _converted(self._types[name], value)
+            except (ValueError, TypeError) as error:
+                raise WorkbenchError(f"{origin}: {name} must be {error}, not {value!r}") from error
+        return result
+
+    def make(self, owner: type, values: Mapping[str, Any]) -> Any:
+        """One of the dataclasses, from those of the values that are its own.
+
+        Raises:
+            WorkbenchError: if a value is beyond its limits.
+        """
+        return owner(
+            **{name: value for name, value in values.items() if self._owner[name] is owner}
+        )
+
+    def add_flags(self, parser: argparse.ArgumentParser) -> None:
+        """A flag for each option; those that aren't given don't appear in the result."""
+        for name, each in self._fields.items():
+            flag = f"--{name.replace('_', '-')}"
+            text = f"{each.metadata['help']} ({_default(each)})".replace("%", "%%")
+            if self._types[name] is bool:
+                action = argparse.BooleanOptionalAction
+                parser.add_argument(flag, action=action, default=argparse.SUPPRESS, help=text)
+                continue
+            parser.add_argument(
+                flag,
+                type=self._argument_type(name),
+                choices=each.metadata["choices"],
+                default=argparse.SUPPRESS,
+                metavar=None if each.metadata["choices"] else name.rsplit("_", 1)[-1].upper(),
+                help=text,
+            )
+
+    def _argument_type(self, name: str) -> Callable[[str], Any]:
+        def convert(text: str) -> Any:
+            try:
+                return _converted(self._types[name], text)
+            except ValueError as error:
+                raise argparse.ArgumentTypeError(f"must be {error}, not {text!r}") from error
+
+        return convert
+
+
+def unknown(kind: str, name: str, known: list[str]) -> str:
+    """The words for a name that doesn't exist: the nearest one, or all."""
+    near = get_close_matches(name, known, 1)
+    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+    return f"unknown {kind} {name!r}; {hint}"
+
+
+def key_values(texts: list[str], origin: str) -> dict[str, str]:
+    """KEY=VALUE texts as a dict.
+
+    Raises:
+        WorkbenchError: if one has no equals sign.
+    """
+    pairs = {}
+    for text in texts:
+        name, sign, value = text.partition("=")
+        if not sign:
+            raise WorkbenchError(f"{origin}: {text!r} isn't KEY=VALUE")
+        pairs[name.strip().replace("-", "_")] = value.strip()
+    return pairs
+
+
+def _default(each: Field[Any]) -> str:
+    value = each.default if each.default is not MISSING else None
+    return "no default" if value is None or value == "" else f"default {value}"
+
+
+def _converted(kind: Any, value: Any) -> Any:
+    """A text or a YAML value as `kind`; ValueError carries what it should have been."""
+    if NoneType in get_args(kind):
+        kind = next(each for each in get_args(kind) if each is not NoneType)
+    if kind is bool:
+        return _switch(value)
+    if kind is int:
+        return _whole(value)
+    if kind is float:
+        return _number(value)
+    if kind is str:
+        return str(value)
+    return _mapping(value) if kind is not tuple and "dict" in str(kind) else _sizes(value)
+
+
+def _switch(value: Any) -> bool:
+    words = {"true": True, "false": False}
+    text = str(value).lower()
+    if text not in words:
+        raise ValueError("true or false")
+    return words[text]
+
+
+def _number(value: Any) -> float:
+    try:
+        if isinstance(value, bool):
+            raise TypeError
+        return float(value)
+    except (ValueError, TypeError):
+        raise ValueError("a number") from None
+
+
+def _whole(value: Any) -> int:
+    """Also 5e4 and 50_000, as people write large numbers."""
+    try:
+        number = _number(value)
+        return int(value) if not isinstance(value, float) and _is_plain(value) else _exact(number)
+    except (ValueError, OverflowError):
+        raise ValueError("a whole number") from None
+
+
+def _is_plain(value: Any) -> bool:
+    return isinstance(value, int) or str(value).strip().lstrip("+-").replace("_", "").isdigit()
+
+
+def _exact(number: float) -> int:
+    if not number.is_integer():
+        raise ValueError
+    return int(number)
+
+
+def _sizes(value: Any) -> tuple[int, ...]:
+    items = value.strip("[]() ").split(",") if isinstance(value, str) else value
+    if not isinstance(items, list | tuple):
+        items = [items]
+    try:
+        return tuple(_whole(item) for item in items)
+    except ValueError:
+        raise ValueError("whole numbers, as in 128,128") from None
+
+
+def _scalar(text: str) -> Any:
+    """As YAML, but 1e-3 is a number."""
+    value = yaml.safe_load(text)
+    try:
+        return float(value) if isinstance(value, str) and value[-1:].isdigit() else value
+    except ValueError:
+        return value
+
+
+def _mapping(value: Any) -> dict[str, Any]:
+    if isinstance(value, str):
+        pairs = [pair.partition("=") for pair in value.replace(",", " ").split()]
+        try:
+            value = {name: _scalar(text) for name, _, text in pairs}
+        except yaml.YAMLError:
+            value = None
+        if not all(sign for _, sign, _ in pairs):
+            value = None
+    if not isinstance(value, dict):
+        raise ValueError("KEY=VALUE, several with commas")
+    return value

@@ -1,0 +1,1 @@
+"""What all trainings share: folder, checkpoints, log, progress, evaluation."""

@@ -1,0 +1,151 @@
+"""The figures of a training: every row in a CSV file, and the same in TensorBoard.
+
+The CSV is the record. When a training is resumed, the CSV is cut back to where the checkpoint
+was written, and TensorBoard's file is written anew from it: so neither has a row twice.
+"""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from torch.utils.tensorboard import SummaryWriter
+from torch.utils.tensorboard.summary import hparams
+
+from rl_workbench.agents.dqn.agent import Learned
+from rl_workbench.training.dqn.loop import Episode
+
+NAME = "scalars.csv"
+HEADER = "step,tag,value,wall_time\n"
+EVENTS = "events.out.tfevents.*"
+METRICS = ("eval/mean_reward", "charts/episodic_return")  # beside the settings, under HPARAMS
+
+Point = tuple[str, float, int, float]  # tag, value, step, wall time [s]
+
+
+class ScalarLog:
+    """Writes points, each with its step, tag and value.
+
+    Args:
+        folder: where both files go.
+        settings: shown as a table under TEXT, and under HPARAMS beside those of other trainings.
+        length: of the CSV [bytes] at the checkpoint that the training goes on from; 0: a new one.
+        say: is told if the CSV has lost rows since then; the training doesn't depend on them.
+
+    Raises:
+        OSError: if the disk refuses.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        settings: dict[str, object],
+        length: int = 0,
+        say: Callable[[str], None] = print,
+    ) -> None:
+        path = folder / NAME
+        points = _cut(path, length, say) if length else []
+        if not points:  # a full disk fails here, and not in TensorBoard's thread
+            path.write_text(HEADER, encoding="utf-8")
+        self._file = path.open("a", encoding="utf-8")
+        for old in folder.glob(EVENTS):
+            old.unlink()
+        self._writer = SummaryWriter(str(folder))
+        _add_settings(self._writer, settings)
+        for point in points:
+            self._writer.add_scalar(*point)
+
+    def add(self, step: int, values: dict[str, float]) -> None:
+        """Writes one row for each tag.
+
+        Raises:
+            OSError: if the disk refuses.
+        """
+        now = time.time()
+        for tag, value in values.items():
+            self._file.write(f"{step},{tag},{float(value)!r},{now:.3f}\n")
+            self._writer.add_scalar(tag, value, step, now)
+
+    def sync(self) -> int:
+        """Puts the CSV on disk; returns its length [bytes].
+
+        Raises:
+            OSError: if the disk refuses.
+        """
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        return os.fstat(self._file.fileno()).st_size
+
+    def close(self) -> None:
+        """Writes what is still in memory."""
+        self._writer.close()
+        self._file.close()
+
+
+class Figures:
+    """The observer that writes the field's tags to the log."""
+
+    def __init__(self, log: ScalarLog) -> None:
+        self._log = log
+
+    def step_done(self, steps: int) -> None:
+        """Nothing to write."""
+
+    def learned(self, steps: int, learned: Learned) -> None:
+        """The losses/ tags."""
+        values = {"losses/td_loss": learned.td_loss, "losses/q_values": learned.q_values}
+        self._log.add(steps, values)
+
+    def episode_done(self, episode: Episode) -> None:
+        """The charts/ tags."""
+        values = {
+            "charts/episodic_return": episode.total_reward,
+            "charts/episodic_length": episode.length,
+            "charts/SPS": episode.steps_per_second,
+            "charts/epsilon": episode.epsilon,
+        }
+        self._log.add(episode.steps, values)
+
+
+def _cut(path: Path, length: int, say: Callable[[str], None]) -> list[Point]:
+    """Cuts the CSV back to a length [bytes], or to what is whole of it; returns its points."""
+    content = path.read_bytes()[:length] if path.exists() else b""
+    header, *rows = content.splitlines(keepends=True) or [b""]
+    points, whole = [], len(header)
+    for row in rows:
+        point = _point(row)
+        if point is None:
+            break
+        points.append(point)
+        whole += len(row)
+    if header.decode(errors="replace") != HEADER:
+        points, whole = [], 0
+    if whole < length:
+        say(f"{path} lacks rows that it had at the checkpoint; going on without them")
+    if content:
+        os.truncate(path, whole)
+    return points
+
+
+def _point(row: bytes) -> Point | None:
+    """A row of the CSV; None if it isn't one, or not a whole one."""
+    try:
+        step, tag, value, wall_time = row.decode().split(",")
+        return (tag, float(value), int(step), float(wall_time)) if row.endswith(b"\n") else None
+    except ValueError:  # also of bytes that are no text
+        return None
+
+
+def _add_settings(writer: SummaryWriter, settings: dict[str, object]) -> None:
+    """Shows settings as a table under TEXT, and as columns under HPARAMS."""
+    rows = "\n".join(f"|{name}|{value}|" for name, value in settings.items())
+    writer.add_text("hyperparameters", f"|parameter|value|\n|-|-|\n{rows}")
+    plain = {
+        name: value if type(value) in (int, float) else str(value)  # True would become 1
+        for name, value in settings.items()
+    }
+    # Into this file: `add_hparams` would make a run of its own beside this one.
+    file: Any = writer.file_writer  # which has no type
+    for summary in hparams(plain, dict.fromkeys(METRICS, 0.0)):
+        file.add_summary(summary)

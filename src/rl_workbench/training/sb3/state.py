@@ -1,0 +1,90 @@
+"""All that a model of Stable-Baselines3 needs to go on learning, as plain values and tensors.
+
+Not in it: the state of the environment and of the random generators, and a rollout that isn't
+whole yet. So a resumed training begins a new episode, and isn't the same to the bit.
+"""
+
+from typing import Any
+
+import numpy as np
+import torch
+
+from rl_workbench.errors import WorkbenchError
+
+COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_n_calls")
+ENTROPY = "log_ent_coef"  # SAC's, no part of a network
+ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+
+
+def state_of(model: Any) -> dict[str, Any]:
+    """Networks, optimizers, counters and the filled part of a replay buffer.
+
+    Raises:
+        WorkbenchError: if a weight isn't a number any more.
+    """
+    check_weights(model)
+    parameters = model.get_parameters()
+    policy = parameters.pop("policy")
+    entropy = getattr(model, ENTROPY, None)
+    return {
+        "policy": policy,
+        "optimizers": parameters,
+        "entropy": None if entropy is None else entropy.detach(),
+        "counters": {name: getattr(model, name) for name in COUNTERS if hasattr(model, name)},
+        "buffer": _buffer_state(getattr(model, "replay_buffer", None)),
+    }
+
+
+def check_weights(model: Any) -> None:
+    """Refuses weights that are none: they would act, too, and be taken for a policy.
+
+    Raises:
+        WorkbenchError: if one isn't a number any more.
+    """
+    if not all(torch.isfinite(each).all() for each in model.policy.parameters()):
+        raise WorkbenchError("the weights are no numbers any more: a smaller learning_rate may help")
+
+
+def restore(model: Any, state: dict[str, Any], seed: int) -> None:
+    """Lets a new model go on from what `state_of` gave.
+
+    Args:
+        seed: of what is random from here on.
+
+    Raises:
+        WorkbenchError: if the state is another model's.
+    """
+    try:
+        model.set_parameters({"policy": state["policy"], **state["optimizers"]})
+        if state["entropy"] is not None:
+            getattr(model, ENTROPY).data.copy_(state["entropy"])
+        for name, value in state["counters"].items():
+            setattr(model, name, value)
+        if state["buffer"] is not None:
+            _restore_buffer(model.replay_buffer, state["buffer"])
+    except (KeyError, RuntimeError, ValueError, AttributeError) as error:
+        text = str(error).splitlines()[0]
+        raise WorkbenchError(f"the checkpoint can't be gone on from: {text}") from error
+    model.set_random_seed(seed)
+
+
+def _buffer_state(buffer: Any) -> dict[str, Any] | None:
+    if buffer is None:
+        return None
+    count = buffer.size()
+    arrays = {name: getattr(buffer, name, None) for name in ARRAYS}
+    return {
+        "position": buffer.pos,
+        "full": buffer.full,
+        "arrays": {
+            name: torch.from_numpy(array[:count])
+            for name, array in arrays.items()
+            if isinstance(array, np.ndarray)
+        },
+    }
+
+
+def _restore_buffer(buffer: Any, state: dict[str, Any]) -> None:
+    buffer.pos, buffer.full = state["position"], state["full"]
+    for name, values in state["arrays"].items():
+        getattr(buffer, name)[: len(values)] = values.numpy()

@@ -1,0 +1,1 @@
+"""Gazebo's services, launch and models."""

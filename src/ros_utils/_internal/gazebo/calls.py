@@ -1,0 +1,80 @@
+"""Calls of the simulator's services. Part of `ros_gazebo`."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import std_srvs.srv
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
+
+from ros_utils._internal import log as _log
+from ros_utils._internal import services as _services
+
+TIMEOUT = _services.TIMEOUT
+GAZEBO = "/gazebo"
+
+
+class BadNumber(ValueError):
+    """A number is not finite; the text says which."""
+
+
+def call(service: str, kind: Any, *request: Any, timeout: float, gazebo_ns: str) -> Any:
+    """The answer of a service of the simulator, or None; whatever went wrong is logged."""
+    name = f"{gazebo_ns.rstrip('/')}/{service}"
+    try:
+        answer = _services.call(name, kind, *request, timeout=timeout)
+    except _services.ServiceError as fault:
+        _log.error(str(fault))
+        return None
+    if not getattr(answer, "success", True):
+        _log.error(f"{name}: {answer.status_message}")
+    return answer
+
+
+def succeeded(answer: Any) -> bool:
+    """True for an answer that says so."""
+    return answer is not None and bool(answer.success)
+
+
+def empty_call(service: str, retries: int, timeout: float, gazebo_ns: str) -> bool:
+    """Call a service without arguments, again after a failure, at most `retries` times."""
+    name = f"{gazebo_ns.rstrip('/')}/{service}"
+    for attempt in range(1, retries + 1):
+        try:
+            _services.call(name, std_srvs.srv.Empty, timeout=timeout)
+            return True
+        except _services.Missing as fault:  # waited for already
+            _log.error(str(fault))
+            return False
+        except _services.ServiceError as fault:
+            _log.error(f"{fault} (attempt {attempt} of {retries})")
+    return False
+
+
+def make_pose(x: float, y: float, z: float, qx: float, qy: float, qz: float, qw: float) -> Pose:
+    """A pose; a quaternion that is all zeros means no rotation."""
+    if not any((qx, qy, qz, qw)):
+        qw = 1.0
+    return Pose(position=Point(x, y, z), orientation=Quaternion(qx, qy, qz, qw))
+
+
+def make_twist(linear: tuple[float, float, float], angular: tuple[float, float, float]) -> Twist:
+    """A twist [m/s, rad/s]."""
+    return Twist(Vector3(*linear), Vector3(*angular))
+
+
+def check_finite(what: str, *numbers: float) -> None:
+    """Return if all numbers are finite.
+
+    Raises:
+        BadNumber: one isn't.
+    """
+    if not all(map(math.isfinite, numbers)):
+        raise BadNumber(f"{what}: {list(numbers)} holds a number that is not finite")
+
+
+def pose_numbers(pose: Pose) -> tuple[float, ...]:
+    """Position and orientation of a pose as seven numbers."""
+    p, q = pose.position, pose.orientation
+    return (p.x, p.y, p.z, q.x, q.y, q.z, q.w)

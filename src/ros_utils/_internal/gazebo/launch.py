@@ -1,0 +1,189 @@
+"""Start and end the simulator. Part of `ros_gazebo`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+from ros_utils._internal import log as _log
+from ros_utils._internal import master as _master
+from ros_utils._internal import packages as _packages
+from ros_utils._internal import services as _services
+from ros_utils._internal import target as _target
+from ros_utils._internal import waiting as _waiting
+from ros_utils._internal.processes import nodes as _nodes
+from ros_utils._internal.processes import processes as _processes
+from ros_utils._internal.processes.started import Started
+from ros_utils._internal.waiting import Outcome
+from ros_utils.ros_launch import start_roslaunch
+
+LABEL = "Gazebo"
+NODES = ("/gazebo", "/gazebo_gui")
+READY = "pause_physics"  # the last thing that a client needs before it can begin
+
+
+def launch_Gazebo(
+    paused: bool = False,
+    use_sim_time: bool = True,
+    gui: bool = True,
+    recording: bool = False,
+    debug: bool = False,
+    verbose: bool = False,
+    output: str = "screen",
+    custom_world_path: str | None = None,
+    custom_world_pkg: str | None = None,
+    custom_world_name: str | None = None,
+    respawn_gazebo: bool = False,
+    pub_clock_frequency: int = 100,
+    server_required: bool = False,
+    gui_required: bool = False,
+    launch_new_term: bool = True,
+    *,
+    lockstep: bool = False,
+    seed: int | None = None,
+    timeout: float = 30.0,
+    extra_gazebo_args: str = "",
+    gazebo_ns: str = "/gazebo",
+    log_file: str | None = None,
+    env: Mapping[str, str] | None = None,
+    master_uri: str | None = None,
+) -> Started | bool:
+    """Run ``roslaunch gazebo_ros empty_world.launch`` and wait until the simulator answers. Starts
+    a master if needed.
+
+    If a simulator already answers under this master it is used as it is, with a warning. It is
+    ended by `close_Gazebo`, by `ros_node.ros_kill_all_processes`, and when this Python process
+    exits.
+
+    Args:
+        paused: begin with time standing still.
+        use_sim_time: let nodes use simulated time.
+        gui: with a window; without a display the simulation goes on without one.
+        recording: record the state log.
+        debug: run the server in a debugger.
+        verbose: more messages from the server.
+        output: where the simulator's output goes, "screen" or "log".
+        custom_world_path: world file; wins over the package's.
+        custom_world_pkg, custom_world_name: world file ``<pkg>/worlds/<name>``.
+        respawn_gazebo: start the server again if it dies.
+        pub_clock_frequency: messages on /clock per second of simulated time [Hz]; 0 for one each
+            step. At 1 kHz each rospy node spends a tenth of its time on them.
+        server_required: end the launch when the server ends.
+        gui_required: end the launch when the window ends.
+        launch_new_term: in an xterm, if there is a display and xterm; otherwise the output goes to
+            a log file.
+        lockstep: time moves only on request (the stand-in's own argument; Gazebo has none).
+        seed: seed of the simulator (the stand-in's own argument).
+        timeout: bound of the wait [s].
+        extra_gazebo_args: further arguments for the server.
+        gazebo_ns: where its services are expected.
+        log_file: the file for its output; None for the terminal or one of its own.
+        env: variables on top of this process's.
+        master_uri: the master to run under; None for this process's.
+
+    Returns:
+        A handle that is true, once it answers. False, with an error in the log, if package or world
+        are missing, no master can be used, the simulator ends, or it doesn't answer in time (it is
+        ended then).
+    """
+    switches = {
+        "paused": paused,
+        "use_sim_time": use_sim_time,
+        "gui": gui,
+        "recording": recording,
+        "debug": debug,
+        "verbose": verbose,
+        "output": output,
+        "respawn_gazebo": respawn_gazebo,
+        "use_clock_frequency": True,  # without it the rate has no effect
+        "pub_clock_frequency": pub_clock_frequency,
+        "server_required": server_required,
+        "gui_required": gui_required,
+    }
+    # A real gazebo_ros refuses arguments that it doesn't know, so what isn't asked for isn't
+    # mentioned.
+    asked = {
+        "lockstep": lockstep or None,
+        "seed": seed,
+        "extra_gazebo_args": extra_gazebo_args or None,
+    }
+    with _target.using(master_uri):
+        ready = f"{gazebo_ns.rstrip('/')}/{READY}"
+        if _services.answers(ready):
+            _log.warn(
+                f"{LABEL} runs already under {_master.uri()}: using it as it is"
+                " (ros_kill_all_processes ends it)"
+            )
+            return Started()
+        try:
+            asked["world_name"] = _world(custom_world_path, custom_world_pkg, custom_world_name)
+            switches.update({name: value for name, value in asked.items() if value is not None})
+            arguments = [f"{name}:={value}" for name, value in switches.items()]
+            _packages.file("gazebo_ros", "launch", "empty_world.launch")
+            command = ["gazebo_ros", "empty_world.launch", *arguments]
+            screen = output == "screen" and not launch_new_term
+            handle = start_roslaunch(command, LABEL, launch_new_term, screen, log_file, env)
+        except (_packages.NotFound, _processes.CannotStart, _master.MasterDown) as fault:
+            _log.error(f"launch_Gazebo: {fault}")
+            return False
+        outcome = _waiting.until(lambda: _services.answers(ready), handle, timeout)
+        return _report(handle, outcome, ready, timeout)
+
+
+def close_Gazebo(*, master_uri: str | None = None) -> bool:
+    """End the simulator: the launch that `launch_Gazebo` started, and the nodes /gazebo and
+    /gazebo_gui.
+
+    If the launch had brought up the master, the master ends with it.
+
+    Args:
+        master_uri: the master that it runs under; None for this process's.
+
+    Returns:
+        True if none of it is left.
+    """
+    with _target.using(master_uri):
+        nodes = {name: address for name in NODES if (address := _nodes.node_uri(name))}
+        gone = _processes.end([entry for entry in _processes.started() if entry.label == LABEL])
+        left = _nodes.shut_down_nodes(nodes)
+    if left:
+        _log.warn(f"close_Gazebo: still registered: {', '.join(left)}")
+    return gone and not left
+
+
+def _world(path: str | None, package: str | None, name: str | None) -> str | None:
+    """The world file to load, or None for the launch file's own.
+
+    Raises:
+        NotFound: no such package or file.
+    """
+    if path:
+        # A relative path may also be one that the simulator looks up on its own resource path.
+        return (
+            os.path.abspath(path)
+            if os.path.isfile(path)
+            else _packages.existing(path)
+            if os.path.isabs(path)
+            else path
+        )
+    if package and name:
+        return _packages.file(package, "worlds", name)
+    if package or name:
+        raise _packages.NotFound(
+            "a world in a package needs both custom_world_pkg and custom_world_name"
+        )
+    return None
+
+
+def _report(
+    handle: _processes.Handle, outcome: Outcome, ready: str, timeout: float
+) -> Started | bool:
+    if outcome is Outcome.READY:
+        return Started(handle)
+    if outcome is Outcome.ENDED:
+        what = f"ended with exit code {handle.exit_code()} before it answered"
+    else:
+        what = f"service {ready} doesn't answer after {timeout:g} s; ended it"
+    _processes.end([handle.entry])
+    _log.error(f"{LABEL}: {what}: {handle.reason()}{handle.where()}")
+    return False

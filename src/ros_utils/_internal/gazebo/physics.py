@@ -1,0 +1,220 @@
+"""Properties of the physics. Part of `ros_gazebo`.
+
+The service has no optional fields, so every change reads all properties, changes what is named and
+writes them back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from gazebo_msgs import srv
+from gazebo_msgs.msg import ODEPhysics
+from geometry_msgs.msg import Vector3
+
+from ros_utils._internal import log as _log
+from ros_utils._internal.gazebo.calls import (
+    GAZEBO,
+    TIMEOUT,
+    BadNumber,
+    call,
+    check_finite,
+    succeeded,
+)
+
+TIME_STEP = 0.001  # [s]
+GRAVITY = (0.0, 0.0, -9.81)  # [m/s²]
+ODE = {
+    "auto_disable_bodies": False,
+    "sor_pgs_precon_iters": 0,
+    "sor_pgs_iters": 50,
+    "sor_pgs_w": 1.3,
+    "sor_pgs_rms_error_tol": 0.0,
+    "contact_surface_layer": 0.001,
+    "contact_max_correcting_vel": 0.0,
+    "cfm": 0.0,
+    "erp": 0.2,
+    "max_contacts": 20,
+}
+
+
+def gazebo_get_physics_properties(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> Any:
+    """All properties, as gazebo_msgs/GetPhysicsProperties answers; None, with an error in the log,
+    without an answer."""
+    kind = srv.GetPhysicsProperties
+    answer = call("get_physics_properties", kind, timeout=timeout, gazebo_ns=gazebo_ns)
+    return answer if succeeded(answer) else None
+
+
+def gazebo_set_physics_properties(
+    time_step: float | None = None,
+    max_update_rate: float | None = None,
+    gravity: Sequence[float] | None = None,
+    ode_config: ODEPhysics | None = None,
+    *,
+    timeout: float = TIMEOUT,
+    gazebo_ns: str = GAZEBO,
+) -> bool:
+    """Change the properties that are given; the others stay as they are.
+
+    Args:
+        time_step: of one physics step [s], above 0.
+        max_update_rate: steps per second of wall time [Hz]; 0 is as fast as possible.
+        gravity: x, y, z [m/s²].
+        ode_config: the solver's settings.
+        timeout, gazebo_ns: see `ros_gazebo`.
+
+    Returns:
+        True if the simulator did it.
+    """
+    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    if now is None:
+        return False
+    try:
+        if time_step is not None:
+            _check_step(time_step)
+        if gravity is not None:
+            check_finite("gravity", *gravity)
+        check_finite("max_update_rate", max_update_rate or 0.0)
+    except BadNumber as fault:
+        _log.error(f"gazebo_set_physics_properties: {fault}")
+        return False
+    request = (
+        now.time_step if time_step is None else time_step,
+        now.max_update_rate if max_update_rate is None else max_update_rate,
+        now.gravity if gravity is None else Vector3(*gravity),
+        now.ode_config if ode_config is None else ode_config,
+    )
+    kind = srv.SetPhysicsProperties
+    return succeeded(
+        call("set_physics_properties", kind, *request, timeout=timeout, gazebo_ns=gazebo_ns)
+    )
+
+
+def gazebo_set_max_update_rate(
+    max_update_rate: float, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
+) -> bool:
+    """Set how fast simulated time passes.
+
+    Args:
+        max_update_rate: a FACTOR of real time, 1 for real time; 0 is as fast as possible. (The
+            getter answers in Hz; `gazebo_set_physics_properties` takes Hz.)
+        timeout, gazebo_ns: see `ros_gazebo`.
+
+    Returns:
+        True if the simulator did it.
+    """
+    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    if now is None or not now.time_step:
+        return False
+    rate = max_update_rate / now.time_step
+    return gazebo_set_physics_properties(max_update_rate=rate, timeout=timeout, gazebo_ns=gazebo_ns)
+
+
+def gazebo_get_max_update_rate(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> float:
+    """Steps per second of wall time [Hz], not a factor; 0 is as fast as possible, NaN no answer."""
+    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    return float("nan") if now is None else float(now.max_update_rate)
+
+
+def gazebo_set_time_step(
+    new_time_step: float, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
+) -> bool:
+    """Set the time of one physics step [s]; simulated time passes as fast as before.
+
+    Returns:
+        True if the simulator did it.
+    """
+    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    if now is None:
+        return False
+    try:
+        _check_step(new_time_step)
+    except BadNumber as fault:
+        _log.error(f"gazebo_set_time_step: {fault}")
+        return False
+    rate = now.max_update_rate * now.time_step / new_time_step
+    return gazebo_set_physics_properties(new_time_step, rate, timeout=timeout, gazebo_ns=gazebo_ns)
+
+
+def gazebo_get_time_step(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> float:
+    """The time of one physics step [s]; NaN without an answer."""
+    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    return float("nan") if now is None else float(now.time_step)
+
+
+def gazebo_set_gravity(
+    x: float, y: float, z: float, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
+) -> bool:
+    """Set gravity [m/s²]; True if the simulator did it."""
+    return gazebo_set_physics_properties(gravity=(x, y, z), timeout=timeout, gazebo_ns=gazebo_ns)
+
+
+def gazebo_get_gravity(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> Vector3:
+    """Gravity [m/s²]; all NaN without an answer."""
+    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    return Vector3(*(float("nan"),) * 3) if now is None else now.gravity
+
+
+def gazebo_set_ODE_physics(
+    auto_disable_bodies: bool,
+    sor_pgs_precon_iters: int,
+    sor_pgs_iters: int,
+    sor_pgs_w: float,
+    sor_pgs_rms_error_tol: float,
+    contact_surface_layer: float,
+    contact_max_correcting_vel: float,
+    cfm: float,
+    erp: float,
+    max_contacts: int,
+    *,
+    timeout: float = TIMEOUT,
+    gazebo_ns: str = GAZEBO,
+) -> bool:
+    """Set all of the solver's settings; the fields are those of gazebo_msgs/ODEPhysics.
+
+    Returns:
+        True if the simulator did it.
+    """
+    config = ODEPhysics(
+        auto_disable_bodies=auto_disable_bodies,
+        sor_pgs_precon_iters=sor_pgs_precon_iters,
+        sor_pgs_iters=sor_pgs_iters,
+        sor_pgs_w=sor_pgs_w,
+        sor_pgs_rms_error_tol=sor_pgs_rms_error_tol,
+        contact_surface_layer=contact_surface_layer,
+        contact_max_correcting_vel=contact_max_correcting_vel,
+        cfm=cfm,
+        erp=erp,
+        max_contacts=max_contacts,
+    )
+    return gazebo_set_physics_properties(ode_config=config, timeout=timeout, gazebo_ns=gazebo_ns)
+
+
+def gazebo_get_ODE_physics(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> ODEPhysics:
+    """The solver's settings; all zeros, with an error in the log, without an answer."""
+    now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
+    return ODEPhysics() if now is None else now.ode_config
+
+
+def gazebo_set_default_properties(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> bool:
+    """Set a step of 1 ms, real time, gravity of 9.81 m/s² and the solver's usual settings, at once.
+
+    Returns:
+        True if the simulator did it.
+    """
+    return gazebo_set_physics_properties(
+        TIME_STEP,
+        1.0 / TIME_STEP,
+        GRAVITY,
+        ODEPhysics(**ODE),
+        timeout=timeout,
+        gazebo_ns=gazebo_ns,
+    )
+
+
+def _check_step(time_step: float) -> None:
+    check_finite("time step", time_step)
+    if time_step <= 0.0:
+        raise BadNumber(f"the time step is {time_step}: above 0 is needed")

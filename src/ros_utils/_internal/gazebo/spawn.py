@@ -1,0 +1,114 @@
+"""Bring models into the world and take them out. Part of `ros_gazebo`."""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+import rosgraph
+from gazebo_msgs import srv
+
+from ros_utils._internal import log as _log
+from ros_utils._internal import master as _master
+from ros_utils._internal import params as _params
+from ros_utils._internal import services as _services
+from ros_utils._internal.gazebo.calls import (
+    GAZEBO,
+    TIMEOUT,
+    BadNumber,
+    call,
+    check_finite,
+    make_pose,
+    succeeded,
+)
+
+
+class Target(NamedTuple):
+    """What the spawn functions have in common: where the model goes, and how to call."""
+
+    name: str
+    namespace: str
+    frame: str
+    pose: tuple[float, float, float, float, float, float, float]  # x, y, z and a quaternion
+    timeout: float
+    gazebo_ns: str
+    verify: bool
+
+
+def spawn(kind: str, xml: str, target: Target) -> tuple[bool, str]:
+    """Spawn a model from XML text; `kind` is "urdf" or "sdf".
+
+    Returns:
+        Whether it was spawned (and, with `verify`, is in the world's list), and why not.
+    """
+    name = f"{target.gazebo_ns.rstrip('/')}/spawn_{kind}_model"
+    try:
+        check_finite(f"spawn {target.name}: its pose", *target.pose)
+        pose = make_pose(*target.pose)
+        request = (target.name, xml, target.namespace, pose, target.frame)
+        answer = _services.call(name, srv.SpawnModel, *request, timeout=target.timeout)
+    except (_services.ServiceError, BadNumber) as fault:
+        return _failed(str(fault))
+    if not answer.success:
+        return _failed(str(answer.status_message))
+    if target.verify and not _appears(target.name, True, target.timeout, target.gazebo_ns):
+        return _failed(
+            f"{target.name} isn't in the world {target.timeout:g} s after it was spawned"
+        )
+    return True, str(answer.status_message)
+
+
+def spawn_param(kind: str, param_name: str, target: Target) -> tuple[bool, str]:
+    """Spawn a model from the text in parameter ``<namespace>/<param_name>``. See `spawn`."""
+    name = rosgraph.names.ns_join(target.namespace or "/", param_name)
+    try:
+        xml = str(_params.get(name))
+    except _master.MasterDown as fault:
+        return _failed(f"parameter {name}: {fault}")
+    except KeyError:
+        return _failed(f"parameter {name} is not set: load the robot's description first")
+    return spawn(kind, xml, target)
+
+
+def gazebo_delete_model(
+    model_name: str,
+    *,
+    timeout: float = TIMEOUT,
+    gazebo_ns: str = GAZEBO,
+    verify: bool = False,
+) -> bool:
+    """Remove a model.
+
+    Args:
+        model_name: the model.
+        timeout, gazebo_ns: see `ros_gazebo`.
+        verify: return only once the model is no longer in the world's list.
+
+    Returns:
+        True if it was there and is gone.
+    """
+    answer = call("delete_model", srv.DeleteModel, model_name, timeout=timeout, gazebo_ns=gazebo_ns)
+    if not succeeded(answer):
+        return False
+    return not verify or _appears(model_name, False, timeout, gazebo_ns)
+
+
+def _appears(name: str, wanted: bool, timeout: float, gazebo_ns: str) -> bool:
+    """Wait until a model is in the world, or is not; False if that doesn't come in time."""
+    deadline = time.monotonic() + timeout
+    while time.monotonic() < deadline:
+        answer = call(
+            "get_world_properties", srv.GetWorldProperties, timeout=timeout, gazebo_ns=gazebo_ns
+        )
+        if answer is None:
+            return False
+        if (name in answer.model_names) is wanted:
+            return True
+        time.sleep(_master.POLL)
+    return False
+
+
+def _failed(text: str) -> tuple[bool, str]:
+    """What a spawn function answers when something is wrong; the text is logged."""
+    _log.error(text)
+    return False, text

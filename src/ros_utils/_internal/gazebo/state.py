@@ -1,0 +1,244 @@
+"""Where models, links and joints are, and putting them elsewhere. Part of `ros_gazebo`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from gazebo_msgs import srv
+from gazebo_msgs.msg import LinkState, ModelState
+from genpy import Duration
+from genpy import Time as RosTime
+from geometry_msgs.msg import Pose, Twist
+from std_msgs.msg import Header
+
+from ros_utils._internal import log as _log
+from ros_utils._internal.gazebo.calls import (
+    GAZEBO,
+    TIMEOUT,
+    BadNumber,
+    call,
+    check_finite,
+    make_pose,
+    make_twist,
+    pose_numbers,
+    succeeded,
+)
+
+
+def gazebo_get_model_state(
+    model_name: str,
+    relative_entity_name: str = "world",
+    *,
+    timeout: float = TIMEOUT,
+    gazebo_ns: str = GAZEBO,
+) -> tuple[Header, Pose, Twist, bool]:
+    """Ask for a model's pose [m, quaternion] and twist [m/s, rad/s] relative to a model, link or
+    "world".
+
+    Returns:
+        Header, pose, twist, and whether it succeeded; all zeros if not.
+    """
+    answer = call(
+        "get_model_state",
+        srv.GetModelState,
+        model_name,
+        relative_entity_name,
+        timeout=timeout,
+        gazebo_ns=gazebo_ns,
+    )
+    if answer is None:
+        return Header(), Pose(), Twist(), False
+    return answer.header, answer.pose, answer.twist, bool(answer.success)
+
+
+def gazebo_set_model_state(
+    model_name: str,
+    ref_frame: str = "world",
+    pos_x: float = 0.0,
+    pos_y: float = 0.0,
+    pos_z: float = 0.0,
+    ori_x: float = 0.0,
+    ori_y: float = 0.0,
+    ori_z: float = 0.0,
+    ori_w: float = 0.0,
+    lin_vel_x: float = 0.0,
+    lin_vel_y: float = 0.0,
+    lin_vel_z: float = 0.0,
+    ang_vel_x: float = 0.0,
+    ang_vel_y: float = 0.0,
+    ang_vel_z: float = 0.0,
+    sleep_time: float = 0.05,
+    *,
+    timeout: float = TIMEOUT,
+    gazebo_ns: str = GAZEBO,
+) -> bool:
+    """Move a model, joints unchanged. A zero twist also takes the velocity out of its joints.
+
+    Args:
+        model_name: the model.
+        ref_frame: model or link that pose and twist refer to.
+        pos_x, pos_y, pos_z: position [m].
+        ori_x, ori_y, ori_z, ori_w: orientation, a quaternion; all zeros is no rotation.
+        lin_vel_x, lin_vel_y, lin_vel_z: [m/s].
+        ang_vel_x, ang_vel_y, ang_vel_z: [rad/s].
+        sleep_time: wait afterwards [s of wall time].
+        timeout, gazebo_ns: see `ros_gazebo`.
+
+    Returns:
+        True if the simulator did it.
+    """
+    pose = make_pose(pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
+    linear, angular = (lin_vel_x, lin_vel_y, lin_vel_z), (ang_vel_x, ang_vel_y, ang_vel_z)
+    state = ModelState(model_name, pose, make_twist(linear, angular), ref_frame)
+    numbers = (*pose_numbers(pose), *linear, *angular)
+    done = _set("set_model_state", srv.SetModelState, state, numbers, timeout, gazebo_ns)
+    time.sleep(max(0.0, sleep_time))
+    return done
+
+
+def gazebo_get_link_state(
+    link_name: str,
+    reference_frame: str = "world",
+    *,
+    timeout: float = TIMEOUT,
+    gazebo_ns: str = GAZEBO,
+) -> tuple[Pose, Twist, bool]:
+    """Ask for a link's pose [m, quaternion] and twist [m/s, rad/s]; `link_name` is best scoped,
+    ``model::link``.
+
+    Returns:
+        Pose, twist, and whether it succeeded; all zeros if not.
+    """
+    request = (link_name, reference_frame)
+    answer = call(
+        "get_link_state", srv.GetLinkState, *request, timeout=timeout, gazebo_ns=gazebo_ns
+    )
+    if answer is None:
+        return Pose(), Twist(), False
+    return answer.link_state.pose, answer.link_state.twist, bool(answer.success)
+
+
+def gazebo_set_link_state(
+    link_name: str,
+    pose: Pose,
+    twist: Twist | None = None,
+    reference_frame: str = "world",
+    *,
+    timeout: float = TIMEOUT,
+    gazebo_ns: str = GAZEBO,
+) -> bool:
+    """Move a link; without `twist` it is at rest then. See `gazebo_get_link_state`."""
+    orientation = pose.orientation
+    turn = (orientation.x, orientation.y, orientation.z, orientation.w)
+    pose = make_pose(pose.position.x, pose.position.y, pose.position.z, *turn)
+    state = LinkState(link_name, pose, twist or Twist(), reference_frame)
+    numbers = pose_numbers(pose)
+    return _set("set_link_state", srv.SetLinkState, state, numbers, timeout, gazebo_ns)
+
+
+def gazebo_set_model_configuration(
+    model_name: str,
+    joint_names: Sequence[str],
+    joint_positions: Sequence[float],
+    urdf_param_name: str = "robot_description",
+    *,
+    timeout: float = TIMEOUT,
+    gazebo_ns: str = GAZEBO,
+) -> bool:
+    """Put joints of a model to positions [rad] or [m] at once.
+
+    Args:
+        model_name: the model.
+        joint_names: its joints to move.
+        joint_positions: where to, one for each.
+        urdf_param_name: parameter with its URDF; Gazebo doesn't use it.
+        timeout, gazebo_ns: see `ros_gazebo`.
+
+    Returns:
+        True if the simulator did it.
+    """
+    request = (model_name, urdf_param_name, list(joint_names), list(joint_positions))
+    service = "set_model_configuration"
+    kind = srv.SetModelConfiguration
+    return succeeded(call(service, kind, *request, timeout=timeout, gazebo_ns=gazebo_ns))
+
+
+def gazebo_get_joint_properties(
+    joint_name: str, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
+) -> tuple[float, float, bool]:
+    """Ask for a joint's position [rad, m] and velocity [rad/s, m/s].
+
+    Returns:
+        Position, velocity, and whether it succeeded; zeros if not.
+    """
+    kind = srv.GetJointProperties
+    answer = call("get_joint_properties", kind, joint_name, timeout=timeout, gazebo_ns=gazebo_ns)
+    if not succeeded(answer):
+        return 0.0, 0.0, False
+    return float(answer.position[0]), float(answer.rate[0]), True
+
+
+def gazebo_apply_joint_effort(
+    joint_name: str,
+    effort: float,
+    duration: float,
+    start_time: float = 0.0,
+    *,
+    timeout: float = TIMEOUT,
+    gazebo_ns: str = GAZEBO,
+) -> bool:
+    """Apply an effort [N m, N] to a joint for `duration` [s] of simulated time, from `start_time` [s]
+    or now on; a negative duration is for ever.
+
+    Returns:
+        True if the simulator does it.
+    """
+    try:
+        check_finite(f"effort on {joint_name}", effort, duration, start_time)
+    except BadNumber as fault:
+        _log.error(str(fault))
+        return False
+    begin, length = RosTime.from_sec(max(0.0, start_time)), Duration.from_sec(duration)
+    request = (joint_name, effort, begin, length)
+    kind = srv.ApplyJointEffort
+    return succeeded(
+        call("apply_joint_effort", kind, *request, timeout=timeout, gazebo_ns=gazebo_ns)
+    )
+
+
+def gazebo_get_world_properties(
+    *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
+) -> tuple[bool, float, list[str]]:
+    """Ask what is in the world.
+
+    Returns:
+        Whether it succeeded, the simulated time [s], and the models' names.
+    """
+    kind = srv.GetWorldProperties
+    answer = call("get_world_properties", kind, timeout=timeout, gazebo_ns=gazebo_ns)
+    if answer is None:
+        return False, 0.0, []
+    return bool(answer.success), float(answer.sim_time), list(answer.model_names)
+
+
+def gazebo_get_model_names(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> list[str]:
+    """The names of the models in the world; empty, with an error in the log, without an answer."""
+    return gazebo_get_world_properties(timeout=timeout, gazebo_ns=gazebo_ns)[2]
+
+
+def _set(
+    service: str,
+    kind: Any,
+    state: ModelState | LinkState,
+    numbers: Sequence[float],
+    timeout: float,
+    gazebo_ns: str,
+) -> bool:
+    try:
+        check_finite(service, *numbers)
+    except BadNumber as fault:
+        _log.error(str(fault))
+        return False
+    return succeeded(call(service, kind, state, timeout=timeout, gazebo_ns=gazebo_ns))

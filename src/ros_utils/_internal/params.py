@@ -1,0 +1,47 @@
+"""Parameters of the master that the calls go to, each question with a time limit.
+
+rospy's own functions know one master for the whole process.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import rosgraph
+import rospy
+
+from ros_utils._internal import master as _master
+
+
+def get(name: str) -> Any:
+    """The value of a parameter.
+
+    Raises:
+        KeyError: it isn't set.
+        MasterDown: no master.
+    """
+    _master.require()
+    resolved = rospy.resolve_name(name)
+    try:
+        return _master.call(_master.uri(), "getParam", resolved)
+    except _master.Refused as fault:
+        raise KeyError(resolved) from fault
+    except _master.NoAnswer as fault:
+        raise _master.MasterDown(f"parameter {resolved}: {fault}") from fault
+
+
+def put(name: str, value: Any) -> None:
+    """Set a parameter; a mapping sets each of its own.
+
+    Raises:
+        MasterDown: no master, or it refuses.
+    """
+    _master.require()
+    resolved = rospy.resolve_name(name)
+    values = value.items() if isinstance(value, dict) and value else [("", value)]
+    for key, each in values:
+        full = rosgraph.names.ns_join(resolved, str(key)) if key != "" else resolved
+        try:
+            _master.call(_master.uri(), "setParam", full, each)
+        except (_master.NoAnswer, _master.Refused, OverflowError) as fault:
+            raise _master.MasterDown(f"parameter {full}: {fault}") from fault

@@ -1,0 +1,1 @@
+"""Processes and nodes: started, found, ended."""

@@ -1,0 +1,193 @@
+#!/usr/bin/env python3
+"""Limits, control period, and controllers of users that have faults (ros_control.md section 5)."""
+
+import math
+
+import rosgraph
+import rospy
+import rostest
+from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+from control_msgs.msg import JointControllerState, PidState
+from sensor_msgs.msg import JointState
+from slides_client import SlidesTest, Topic, call
+from std_msgs.msg import Float64
+from std_srvs.srv import Empty
+
+DESCRIPTION, LIMITS = "/slides/robot_description", "/slides/joint_limits"
+SAFETY = '<safety_controller soft_lower_limit="-0.2" soft_upper_limit="0.2" k_position="20" k_velocity="50"/>'
+
+
+class HardwareTest(SlidesTest):
+    """Each test changes the robot, and spawns it then."""
+
+    def setUp(self):
+        self.plain = rospy.get_param(DESCRIPTION)
+
+    def tearDown(self):
+        super().tearDown()
+        rospy.set_param(DESCRIPTION, self.plain)
+        if rospy.has_param(LIMITS):
+            rospy.delete_param(LIMITS)
+
+    def begin(self, old="", new=""):
+        self.assertIn(old, self.plain)
+        rospy.set_param(DESCRIPTION, self.plain.replace(old, new) if old else self.plain)
+        super().setUp()
+
+    def test_limits_of_the_parameter_server_go_before_the_descriptions(self):
+        effort = {"has_effort_limits": True, "max_effort": 3.0}
+        slow = {"has_velocity_limits": True, "max_velocity": 0.2}
+        rospy.set_param(LIMITS, {"effort_a": effort, "position_a": slow, "velocity_a": slow})
+        self.begin()
+        self.run_controllers("effort_joint", "position_joint", "velocity_joint")
+        joints = self.step(100, effort_joint=9.0, position_joint=1.0, velocity_joint=1.0)
+        self.assertEqual(joints["effort_a"][2], 3.0)
+        self.assertAlmostEqual(joints["position_a"][0], 0.02, places=5)
+        self.assertAlmostEqual(joints["velocity_a"][1], 0.2, places=5)
+
+    def test_soft_limits_stop_every_interface_before_the_end(self):
+        self.begin('velocity="4"/>', f'velocity="4"/>{SAFETY}')
+        self.run_controllers("effort_joint", "position_joint", "velocity_joint")
+        joints = self.step(3000, effort_joint=5.0, position_joint=1.0, velocity_joint=1.0)
+        self.assertAlmostEqual(joints["position_a"][0], 0.2, places=3)
+        self.assertAlmostEqual(joints["velocity_a"][0], 0.2, places=3)
+        self.assertAlmostEqual(joints["effort_a"][1], 0.0, places=3)
+        self.assertLess(joints["effort_a"][0], 0.21)
+
+    def test_limits_of_zero_hold_what_they_limit(self):
+        zero = {"has_effort_limits": True, "max_effort": 0, "has_velocity_limits": True, "max_velocity": 0}
+        rospy.set_param(LIMITS, {"effort_a": zero, "position_a": zero, "velocity_a": zero})
+        self.begin()
+        self.run_controllers("effort_joint", "position_joint", "velocity_joint")
+        joints = self.step(100, effort_joint=9.0, position_joint=1.0, velocity_joint=1.0)
+        for name in ("effort_a", "position_a", "velocity_a"):
+            self.assertAlmostEqual(joints[name][0], 0.0, places=9)
+
+    def test_the_control_period_is_a_whole_number_of_steps(self):
+        self.begin("<eStopTopic>", "<controlPeriod>0.0025</controlPeriod><eStopTopic>")
+        self.run_controllers("effort_position")
+        topic = Topic("effort_position/state", JointControllerState)
+        self.step(1)
+        self.assertTrue(topic.wait_for(len))
+        self.step(30)
+        self.assertTrue(topic.wait_for(lambda got: len(got) == 2))
+        first, second = topic.messages
+        self.assertEqual((first.time_step, second.time_step), (0.003, 0.003))
+        self.assertEqual((second.header.stamp - first.header.stamp).to_nsec(), 30_000_000)
+        topic.close()
+
+    def test_a_reset_begins_a_control_period(self):
+        self.begin("<eStopTopic>", "<controlPeriod>0.1</controlPeriod><eStopTopic>")
+        rospy.set_param("/slides/effort_position/pid", {"p": 400.0, "d": 40.0, "publish_state": True})
+        self.run_controllers("effort_position")
+        self.step(150)
+        for reset in ("/gazebo/reset_world", "/gazebo/reset_simulation"):
+            topic = Topic("effort_position/pid/state", PidState)
+            call(reset, Empty)
+            self.step(1)
+            self.assertTrue(topic.wait_for(len))
+            self.assertEqual(topic.messages[0].timestep, rospy.Duration(0, 100_000_000))
+            topic.close()
+
+    def test_each_field_of_a_controllers_state(self):
+        self.begin()
+        pid = {"p": 20.0, "i": 2.0, "d": 0.25, "i_clamp_min": -2.0, "i_clamp_max": 3.0, "antiwindup": True}
+        for name, joint, due in (
+            ("effort_position", "effort_a", 21_000_000),
+            ("velocity_position", "velocity_a", 51_000_000),
+        ):
+            rospy.set_param(f"/slides/{name}/pid", pid)
+            self.run_controllers(name)
+            topic = Topic(f"{name}/state", JointControllerState)
+            before = self.step(20, **{name: 0.1})[joint]
+            self.step(1)
+            self.assertTrue(topic.wait_for(lambda got, due=due: got and got[-1].header.stamp.nsecs == due))
+            state = topic.messages[-1]
+            self.assertEqual((state.process_value, state.process_value_dot), before[:2])
+            self.assertEqual((state.set_point, state.error), (0.1, 0.1 - before[0]))
+            gains = (state.p, state.i, state.d, state.i_clamp, state.antiwindup)
+            self.assertEqual(gains, (20.0, 2.0, 0.25, 3.0, True))
+            wanted = 20.0 * state.error - 0.25 * before[1]
+            self.assertAlmostEqual(state.command, wanted, delta=0.1)  # and a little of the integral
+            topic.close()
+            self.step(9)
+
+    def test_a_robot_that_comes_late_has_its_joint_states_at_their_rate(self):
+        self.begin()
+        self.step(2000)
+        self.delete()
+        self.spawn()
+        topic = self.start_states()
+        for _ in range(35):
+            self.step(1)
+        self.assertTrue(topic.wait_for(lambda got: got and got[-1].header.stamp.to_nsec() >= 2_031_000_000))
+        stamps = [message.header.stamp.to_nsec() // 1_000_000 for message in topic.messages]
+        self.assertLessEqual(set(stamps), {2001, 2011, 2021, 2031})
+        topic.close()
+
+    def start_states(self):
+        self.assertTrue(self.load("states"))
+        topic = Topic("joint_states", JointState)
+        self.assertTrue(self.switch(["states"]))
+        return topic
+
+    # controllers of users
+
+    def load_rude(self, where):
+        rospy.set_param("/slides/rude", {"type": "my_controllers/Rude", "joint": "effort_b", "where": where})
+        return self.load("rude")
+
+    def test_a_controller_that_is_made_wrongly_is_refused_and_leaves_nothing(self):
+        self.begin()
+        for where in ("create", "nothing", "claimed", "topic"):
+            self.assertFalse(self.load_rude(where), where)
+            self.assertEqual(self.listed(), [])
+            topics = [name for name, _ in rosgraph.Master("/test").getPublishedTopics("/slides/rude")]
+            self.assertEqual(topics, [], where)
+
+    def test_a_controller_that_ends_its_thread_or_reports_nonsense_is_stopped(self):
+        self.begin()
+        self.run_controllers("effort_position")
+        for where in ("update", "report"):
+            self.assertTrue(self.load_rude(where))
+            topic = Topic("rude/report", rospy.AnyMsg)
+            self.assertTrue(self.switch(["rude"]))
+            joints = self.step(500, effort_position=0.1)
+            self.assertEqual((self.state("rude"), self.state("effort_position")), ("stopped", "running"))
+            self.assertAlmostEqual(joints["effort_a"][0], 0.1, delta=0.01)
+            self.assertTrue(self.unload("rude"))
+            topic.close()
+
+    def test_a_message_that_cannot_be_sent_silences_nobody(self):
+        self.begin()
+        self.assertTrue(self.load_rude("content"))
+        topic = Topic("rude/report", rospy.AnyMsg)
+        self.assertTrue(self.switch(["rude"]))
+        states = self.start_states()
+        self.step(200)
+        self.assertEqual(self.state("rude"), "running")
+        seen = len(states.messages)
+        self.step(200)
+        self.assertTrue(states.wait_for(lambda got: len(got) > seen))
+        states.close()
+        topic.close()
+
+    def test_a_reader_that_raises_loses_its_message_and_goes_on(self):
+        self.begin()
+        self.assertTrue(self.load_rude("command"))
+        self.assertTrue(self.switch(["rude"]))
+        command = self.publisher("rude/command", Float64)
+        self.publish_until(command, 1.0, lambda joints: joints["effort_b"][2] == 1.0)
+        command.publish(-1.0)
+        command.publish(math.nan)
+        request = StepWorldRequest(ticks=1, controllers=["rude"], commands=[-1.0])
+        answer = call("/gazebo/step_world", StepWorld, request)
+        self.assertFalse(answer.success)
+        self.assertIn("the reader of 'command' raised SystemExit", answer.status_message)
+        self.publish_until(command, 2.0, lambda joints: joints["effort_b"][2] == 2.0)
+        self.assertEqual(self.state("rude"), "running")
+
+
+if __name__ == "__main__":
+    rospy.init_node("control_hardware_test")
+    rostest.rosrun("cartpole", "control_hardware", HardwareTest)

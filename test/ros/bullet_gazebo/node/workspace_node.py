@@ -1,0 +1,40 @@
+#!/usr/bin/env python3
+"""Whether a node that roslaunch starts finds ROS, PyPI's packages and ours."""
+
+import importlib
+import os
+import unittest
+
+import rospy
+import rostest
+from std_msgs.msg import String
+
+
+class Workspace(unittest.TestCase):
+    def test_imports(self):
+        for name in (
+            "torch",
+            "pybullet",
+            "gazebo_msgs.srv",
+            "control_msgs.msg",
+            "controller_manager_msgs.srv",
+            "bullet_gazebo_msgs.srv",
+            "bullet_gazebo",
+            "ros_utils",
+        ):
+            with self.subTest(name):
+                importlib.import_module(name)
+
+    def test_loopback(self):
+        self.assertTrue(os.environ["ROS_IP"].startswith("127."))
+
+    def test_master(self):
+        publisher = rospy.Publisher("said", String, queue_size=1, latch=True)
+        publisher.publish("hello")
+        heard = rospy.wait_for_message("said", String, timeout=10)
+        self.assertEqual(heard.data, "hello")
+
+
+if __name__ == "__main__":
+    rospy.init_node("workspace")
+    rostest.rosrun("cartpole", "workspace", Workspace)

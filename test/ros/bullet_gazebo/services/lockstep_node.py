@@ -1,0 +1,182 @@
+#!/usr/bin/env python3
+"""The step service over real ROS: exact ticks, repeatable bits, and what it refuses."""
+
+import threading
+import unittest
+
+import rospy
+import rostest
+from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+from controller_manager_msgs.srv import LoadController, SwitchController
+from gazebo_msgs.srv import GetWorldProperties, SpawnModel, SpawnModelRequest
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Empty
+
+BOUND = 20.0  # [s of wall time]
+STATES, CART = "joint_state_controller", "stand_cart_position_controller"
+
+
+def proxy(name, kind):
+    rospy.wait_for_service(name, BOUND)
+    return rospy.ServiceProxy(name, kind, persistent=True)
+
+
+class LockstepTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        xml = rospy.get_param("/robot_description")
+        request = SpawnModelRequest(model_name="cartpole", model_xml=xml, robot_namespace="/")
+        assert proxy("/gazebo/spawn_urdf_model", SpawnModel)(request).success
+        for name in (STATES, CART):
+            assert proxy("/controller_manager/load_controller", LoadController)(name).ok
+        assert proxy("/controller_manager/switch_controller", SwitchController)(
+            [STATES, CART], [], 2, False, 0.0
+        ).ok
+        cls.call = staticmethod(proxy("/gazebo/step_world", StepWorld))
+        cls.reset = staticmethod(proxy("/gazebo/reset_simulation", Empty))
+        cls.world = staticmethod(proxy("/gazebo/get_world_properties", GetWorldProperties))
+
+    def setUp(self):
+        self.reset()
+
+    def step(self, ticks, controllers=(), commands=(), **more):
+        request = StepWorldRequest(ticks=ticks, controllers=controllers, commands=commands, **more)
+        return self.call(request)
+
+    def test_time_moves_by_exactly_the_ticks_asked_for(self):
+        for ticks, time in ((1, 0.001), (8, 0.009), (100, 0.109)):
+            answer = self.step(ticks, [], [])
+            self.assertTrue(answer.success, answer.status_message)
+            self.assertAlmostEqual(answer.sim_time, time, places=9)
+            self.assertAlmostEqual(answer.joint_states.header.stamp.to_sec(), time, places=9)
+        self.assertAlmostEqual(self.world().sim_time, 0.109, places=9)
+
+    def test_unpause_does_not_start_time(self):
+        proxy("/gazebo/unpause_physics", Empty)()
+        threading.Event().wait(0.1)
+        self.assertEqual(self.world().sim_time, 0.0)
+
+    def test_a_command_acts_from_the_first_tick_on(self):
+        answer = self.step(1, [CART], [0.02])
+        self.assertEqual(answer.joint_states.name, ["cart_pole", "stand_cart"])
+        self.assertEqual(answer.joint_states.effort, (0.0, 30.0))  # the kick of section 4, clipped
+
+    def test_the_same_commands_give_the_same_bits(self):
+        runs = []
+        for _ in range(2):
+            self.reset()
+            run = []
+            for index in range(200):
+                state = self.step(8, [CART], [0.02 * (index % 5)]).joint_states
+                run.append((state.position, state.velocity, state.effort))
+            runs.append(run)
+        self.assertEqual(runs[0], runs[1])
+
+    def test_what_is_refused_leaves_the_world_as_it_was(self):
+        for args, text in (
+            ((0, [], []), "ticks is 0"),
+            ((1, ["nobody"], [0.1]), "no controller named 'nobody'"),
+            ((1, [CART, "nobody"], [0.1, 0.1]), "no controller named 'nobody'"),
+            ((1, [CART], []), "1 controllers but 0 commands"),
+            ((1, [CART], [float("nan")]), "not finite"),
+            ((1, [CART], [float("inf")]), "not finite"),
+            ((1, [STATES], [0.1]), "takes no numbers"),
+            ((1, [CART], [1e300]), "can't be beyond"),
+            ((1, [CART], [0.1, 0.2]), "1 controllers but 2 commands"),
+            ((-1, [], []), "ticks is -1"),
+            ((2_000_000, [], []), "ticks is 2000000"),
+            ({"ticks": 1, "reset": 7}, "reset is 7"),
+            ({"ticks": 1, "seed": 7}, "seed is 7, which goes with a reset only"),
+            ({"ticks": 0, "joints": ["elbow"], "positions": [0.0]}, "no movable joint 'elbow'"),
+            ({"ticks": 0, "joints": ["cart_pole"], "positions": []}, "1 joints but 0 positions"),
+            ({"ticks": 0, "joints": ["cart_pole"] * 2, "positions": [0, 1]}, "names one twice"),
+            ({"ticks": 0, "joints": ["cart_pole"], "positions": [float("nan")]}, "not finite"),
+            ({"ticks": 1, "commanded_joints": ["stand_cart"], "joint_commands": [1.0]}, "belongs to"),
+            ({"ticks": 1, "commanded_joints": ["elbow"], "joint_commands": [1.0]}, "no robot has"),
+        ):
+            with self.subTest(text):
+                answer = self.step(**args) if isinstance(args, dict) else self.step(*args)
+                self.assertFalse(answer.success)
+                self.assertIn(text, answer.status_message)
+                self.assertEqual(answer.sim_time, 0.0)
+        self.assertEqual(self.step(1, [], []).joint_states.effort, (0.0, 0.0))
+
+    def test_an_episode_begins_in_one_call(self):
+        self.step(50, [CART], [0.3])
+        place = {"joints": ["stand_cart", "cart_pole"], "positions": [0.1, -0.2], "velocities": [0.5, 1.5]}
+        answer = self.step(0, reset=StepWorldRequest.SIMULATION, **place)
+        self.assertTrue(answer.success, answer.status_message)
+        self.assertEqual(answer.sim_time, 0.0)
+        self.assertEqual(answer.joint_states.position, (-0.2, 0.1))
+        self.assertEqual(answer.joint_states.velocity, (1.5, 0.5))
+        self.assertEqual(answer.joint_states.effort, (0.0, 0.0))
+        # The controller holds where it was put, and knows no past: its first error is 0.
+        self.assertEqual(self.step(1).joint_states.effort[1], 0.0)
+
+    def test_episodes_that_begin_alike_go_alike_whatever_was_before(self):
+        runs = []
+        for before in (0, 77):
+            self.step(1 + before, [CART], [0.2])
+            place = {"joints": ["cart_pole", "stand_cart"], "positions": [0.1, 0.05]}
+            run = [self.step(8, [CART], [0.07], reset=StepWorldRequest.WORLD, **place).joint_states]
+            run += [self.step(8, [CART], [0.01 * index]).joint_states for index in range(50)]
+            runs.append([(state.position, state.velocity, state.effort) for state in run])
+        self.assertEqual(runs[0], runs[1])
+
+    def test_a_joint_that_no_controller_has_takes_an_effort(self):
+        answer = self.step(10, commanded_joints=["cartpole::cart_pole"], joint_commands=[0.25])
+        self.assertEqual(answer.joint_states.effort[0], 0.25)
+        self.assertLess(answer.joint_states.velocity[0] * 0.25, 1.0)
+        self.assertNotEqual(answer.joint_states.velocity[0], 0.0)
+
+    def test_models_are_told_on_request(self):
+        self.assertEqual(self.step(1).model_names, [])
+        answer = self.step(1, model_states=True)
+        self.assertEqual(answer.model_names, ["ground_plane", "cartpole"])
+        self.assertEqual(len(answer.model_poses), 2)
+        self.assertEqual(len(answer.model_twists), 2)
+
+    def test_two_clients_at_once_each_get_their_ticks(self):
+        def work():
+            step = proxy("/gazebo/step_world", StepWorld)
+            for _ in range(50):
+                step(StepWorldRequest(ticks=2))
+
+        threads = [threading.Thread(target=work) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(BOUND)
+        self.assertAlmostEqual(self.world().sim_time, 0.2, places=9)
+
+    def test_a_long_step_lets_other_services_answer(self):
+        step = proxy("/gazebo/step_world", StepWorld)
+        worker = threading.Thread(target=step, args=(StepWorldRequest(ticks=100_000),))
+        worker.start()
+        seen = set()
+        while worker.is_alive():
+            seen.add(self.world().sim_time)
+        self.assertGreater(len(seen), 3)
+        self.assertAlmostEqual(self.world().sim_time, 100.0, places=6)
+
+    def test_the_last_clock_always_arrives(self):
+        seen, arrived = [], threading.Event()
+
+        def receive(message):
+            seen.append(message.clock.to_nsec())
+            if seen[-1] == 1_000_000_000:
+                arrived.set()
+
+        subscriber = rospy.Subscriber("/clock", Clock, receive)
+        for _ in range(int(BOUND / 0.01)):
+            if subscriber.get_num_connections():
+                break
+            threading.Event().wait(0.01)
+        self.step(1000, [], [])
+        self.assertTrue(arrived.wait(BOUND))
+        subscriber.unregister()
+
+
+if __name__ == "__main__":
+    rospy.init_node("lockstep_test")
+    rostest.rosrun("cartpole", "lockstep", LockstepTest)

@@ -1,0 +1,165 @@
+#!/usr/bin/env python3
+"""The conformance suite of the environments over ROS: in lock-step, or in real time."""
+
+import importlib.util
+import os
+import signal
+import sys
+import unittest
+import xmlrpc.client
+from pathlib import Path
+from unittest import mock
+
+import gymnasium
+import numpy as np
+import rosgraph
+import rospy
+import rosservice
+import rostest
+from gazebo_msgs.srv import GetLinkProperties
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+
+from environment_conformance import IDS, RICH, EnvironmentConformance, rollout
+from gymnasium.utils.env_checker import data_equivalence as same
+
+import cartpole  # noqa: F401 - registers the environments
+from cartpole.envs import ros_plants
+from cartpole.errors import CartpoleError, SimulatorError
+from ros_utils import ros_gazebo
+
+BACKEND = next((argument for argument in sys.argv if argument in ("ros", "ros-realtime")), "ros")
+REALTIME = BACKEND == "ros-realtime"
+
+
+class OverRos(EnvironmentConformance):
+    options = {"backend": BACKEND}
+    deterministic = has_velocities = not REALTIME
+
+    def test_stable_baselines3s_checker_has_nothing_to_say(self):
+        if importlib.util.find_spec("stable_baselines3") is None:
+            self.skipTest("stable-baselines3 isn't installed: ./ws extras")
+        self.stable_baselines3_agrees()
+
+
+class Balance(OverRos, unittest.TestCase):
+    identifier = "cartpole/Balance-v0"
+
+
+class Classic(OverRos, unittest.TestCase):
+    identifier = "cartpole/Classic-v0"
+
+
+class SwingUp(OverRos, unittest.TestCase):
+    identifier = "cartpole/SwingUp-v0"
+
+
+class Lockstep(unittest.TestCase):
+    """Against the environment in this process."""
+
+    def setUp(self):
+        if REALTIME:
+            self.skipTest("time runs by itself")
+
+    def compare(self, identifier, steps, **options):
+        runs = []
+        for backend in ("ros", "bullet"):
+            env = gymnasium.make(identifier, backend=backend, **options)
+            runs.append(rollout(env, steps, seed=8))
+            env.close()
+        self.assertTrue(all(same(a, b, exact=True) for a, b in zip(*runs, strict=True)))
+
+    def test_the_bits_are_those_of_the_environment_in_process(self):
+        for identifier in IDS:
+            with self.subTest(identifier):
+                self.compare(identifier, 2000, max_steps=300)
+
+    def test_also_with_all_options(self):
+        for identifier in IDS:
+            with self.subTest(identifier):
+                self.compare(identifier, 500, max_steps=100, control_period=0.005, **RICH)
+
+    def test_the_robot_is_given_back_as_it_was_found(self):
+        gymnasium.make("cartpole/Balance-v0", backend="ros").close()
+        ask = rospy.ServiceProxy("/gazebo/get_link_properties", GetLinkProperties)
+        before = ask("cartpole::pole")
+        env = gymnasium.make("cartpole/Balance-v0", backend="ros", **RICH)
+        env.reset(seed=0)
+        self.assertNotEqual(ask("cartpole::pole"), before)
+        env.close()
+        self.assertEqual(ask("cartpole::pole"), before)
+        self.compare("cartpole/Balance-v0", 100)
+
+    def test_a_simulator_that_is_killed_is_an_error_and_the_next_environment_starts_another(self):
+        env = gymnasium.make("cartpole/Classic-v0", backend="ros")
+        env.reset(seed=1)
+        node = rosgraph.Master("/environments").lookupNode("/gazebo")
+        os.kill(xmlrpc.client.ServerProxy(node).getPid("/environments")[2], signal.SIGKILL)
+        for call in (lambda: env.step(1), env.reset):
+            with self.assertRaisesRegex(SimulatorError, "its node has ended"):
+                call()
+        env.close()
+        self.compare("cartpole/Classic-v0", 50)
+
+    def test_the_control_period_counts_the_simulators_own_steps(self):
+        env = gymnasium.make("cartpole/Balance-v0", backend="ros")
+        ros_gazebo.gazebo_set_time_step(0.004)
+        try:
+            with self.assertRaisesRegex(ValueError, r"0.006 s is no multiple .* 0.004 s"):
+                gymnasium.make("cartpole/Balance-v0", backend="ros", control_period=0.006)
+        finally:
+            ros_gazebo.gazebo_set_time_step(0.001)
+            env.close()
+
+    def test_a_simulator_of_the_other_kind_is_refused(self):
+        gymnasium.make("cartpole/Balance-v0", backend="ros").close()
+        with self.assertRaisesRegex(CartpoleError, "moves in lock-step"):
+            gymnasium.make("cartpole/Balance-v0", backend="ros-realtime")
+
+
+class Realtime(unittest.TestCase):
+    """What real time asks of the simulator, and how much of it passes."""
+
+    def setUp(self):
+        if not REALTIME:
+            self.skipTest("time moves when asked to")
+
+    def test_it_needs_nothing_but_gazebos_own_services(self):
+        env = gymnasium.make("cartpole/Balance-v0", backend="ros-realtime")
+        env.reset(seed=0)
+        env.step(1)
+        self.assertNotIn("/gazebo/step_world", rosservice.get_service_list())
+        env.close()
+
+    def test_actions_get_their_control_period_at_least(self):
+        env = gymnasium.make("cartpole/Balance-v0", backend="ros-realtime", control_period=0.05)
+        env.reset(seed=0)
+        begin = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
+        for step in range(10):
+            env.step(step % 2)
+        end = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
+        self.assertGreaterEqual(end - begin, 0.49)
+        env.close()
+
+    def test_a_control_period_longer_than_the_patience_is_waited_for(self):
+        env = gymnasium.make("cartpole/Balance-v0", backend="ros-realtime", control_period=0.5)
+        env.reset(seed=0)
+        plant = env.unwrapped.plant
+        plant.act(0.0)
+        begin = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
+        with mock.patch.object(ros_plants, "STATE_TIMEOUT", 0.1):  # joint states come every 20 ms
+            plant.act(0.0)
+        end = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
+        self.assertGreaterEqual(end - begin, 0.45)
+        env.close()
+
+    def test_two_environments_of_one_process_share_the_robot(self):
+        envs = [gymnasium.make("cartpole/Balance-v0", backend="ros-realtime") for _ in range(2)]
+        for env in envs:
+            env.reset(seed=3)
+            self.assertTrue(np.isfinite(env.step(1)[0]).all())
+            env.close()
+
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "environments", "__main__")

@@ -1,0 +1,327 @@
+"""Position and velocity interfaces, limits, the emergency stop and control periods, in the physics."""
+
+import math
+
+import pytest
+
+from bullet_gazebo.control.description import read_description
+from bullet_gazebo.control.drives import PositionDrive
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
+from bullet_gazebo.control.limits import PositionLimiter, VelocityLimiter
+from bullet_gazebo.control.manager import STRICT, ControllerManager
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import World
+from bullet_gazebo.robot import Robot
+from bullet_gazebo.simulator import Simulator
+
+WEIGHT = 2.0 * 9.8  # [N] of the lift
+DT = 0.001  # [s]
+
+
+def lift_urdf(interface, limit='<limit lower="-1" upper="1" effort="100" velocity="2"/>', extra=""):
+    """A lift of 2 kg on a vertical rail, and an arm of 1 kg that hangs from it and swings freely."""
+    return f"""<robot name="lift"><link name="world"/>
+      <link name="lift"><inertial><mass value="2"/>
+        <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+      <joint name="rail" type="prismatic"><parent link="world"/><child link="lift"/>
+        <axis xyz="0 0 1"/>{limit}{extra}</joint>
+      <transmission name="t"><type>transmission_interface/SimpleTransmission</type>
+        <joint name="rail"><hardwareInterface>hardware_interface/{interface}JointInterface
+        </hardwareInterface></joint><actuator name="m"/></transmission></robot>"""
+
+
+class Lift:
+    """A lift in a lock-step world with one controller."""
+
+    def __init__(self, engine, interface, controller="", params=None, gains=None, period=0.0, **urdf):
+        text = lift_urdf(interface, **urdf)
+        self.sim = Simulator(World(engine), lockstep=True)
+        self.model = self.sim.world.spawn("lift", parse_urdf(text), Pose())
+        hardware = RobotHardware(read_description(text), gains)
+        self.manager = ControllerManager(hardware)
+        self.robot = Robot(self.model, hardware, self.manager, period)
+        self.sim.add_robot(self.robot)
+        self.joint = hardware.joints["rail"]
+        if controller:
+            self.manager.load("c", {"type": controller, "joint": "rail"} | (params or {}))
+            self.manager.switch(["c"], [], STRICT)
+
+    def advance(self, seconds):
+        with self.sim.lock:
+            self.sim.advance(round(seconds / DT))
+        return self.joint.position
+
+    def command(self, value):
+        self.manager.get("c").command(value)
+
+
+@pytest.fixture
+def make(new_engine):
+    lifts = []
+
+    def build(*args, **kwargs):
+        lifts.append(Lift(new_engine(), *args, **kwargs))
+        return lifts[-1]
+
+    yield build
+    for lift in lifts:
+        lift.sim.world.close()
+
+
+POSITION = "position_controllers/JointPositionController"
+VELOCITY = "velocity_controllers/JointVelocityController"
+GAINS = {"rail": {"p": 20000.0, "d": 500.0}}
+
+
+def test_a_position_command_is_where_the_joint_is_one_step_later(make):
+    lift = make("Position", POSITION)
+    for step in range(1, 400):
+        lift.command(0.001 * step)
+        lift.advance(DT)
+        assert lift.joint.position == pytest.approx(0.001 * step, abs=1e-6)
+        assert lift.joint.velocity == pytest.approx(1.0, abs=1e-3)
+    assert lift.joint.effort == 0.0
+
+
+def test_a_position_joint_without_a_controller_stays_where_it_is_put(make):
+    lift = make("Position")
+    assert lift.advance(0.2) == pytest.approx(0.0, abs=1e-6)
+    with lift.sim.lock:
+        lift.sim.set_joint_positions(lift.model, {"rail": 0.4})
+    assert lift.advance(0.2) == pytest.approx(0.4, abs=1e-6)
+
+
+def test_the_velocity_limit_sets_the_pace_of_a_position_command(make):
+    lift = make("Position", POSITION)
+    lift.command(5.0)
+    assert lift.advance(0.25) == pytest.approx(0.5, abs=1e-6)
+    assert lift.advance(0.5) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_position_joint_with_gains_is_an_effort_pid_within_the_effort_limit(make):
+    lift = make("Position", POSITION, gains=GAINS)
+    lift.command(0.2)
+    lift.advance(1.5)
+    # Where it rests the spring carries the weight, and no more effort than that is reported.
+    assert lift.joint.position == pytest.approx(0.2 - WEIGHT / 20000.0, abs=1e-5)
+    assert lift.joint.effort == pytest.approx(WEIGHT, rel=1e-3)
+
+
+def test_a_weak_position_servo_is_cut_at_the_effort_limit(make):
+    limit = '<limit lower="-1" upper="1" effort="10" velocity="2"/>'
+    lift = make("Position", POSITION, gains=GAINS, limit=limit)
+    lift.advance(0.1)
+    assert lift.joint.effort == pytest.approx(10.0)
+    speed = lift.joint.velocity
+    lift.advance(0.1)
+    assert lift.joint.velocity - speed == pytest.approx((10.0 - WEIGHT) / 2.0 * 0.1, rel=1e-6)
+
+
+@pytest.mark.parametrize("gains", [None, {"rail": {"p": 2000.0}}])
+def test_a_velocity_controller_reaches_its_set_point_against_gravity(make, gains):
+    lift = make("Velocity", VELOCITY, gains=gains)
+    lift.command(0.5)
+    before = lift.advance(0.5)
+    assert lift.joint.velocity == pytest.approx(0.5, abs=WEIGHT / 2000.0 + 1e-4)
+    assert lift.advance(0.5) - before == pytest.approx(0.25, rel=0.03)
+
+
+def test_a_velocity_motor_has_no_more_than_its_effort(make):
+    limit = '<limit lower="-9" upper="9" effort="10" velocity="5"/>'
+    lift = make("Velocity", VELOCITY, limit=limit)
+    lift.advance(0.1)
+    assert lift.joint.position == pytest.approx(0.5 * (10.0 - WEIGHT) / 2.0 * 0.1**2, rel=0.03)
+
+
+def test_velocities_are_cut_at_the_limit(make):
+    lift = make("Velocity", VELOCITY)
+    lift.command(50.0)
+    lift.advance(0.2)
+    assert lift.joint.velocity == pytest.approx(2.0, abs=1e-6)
+
+
+def test_velocity_joint_position_controller_goes_to_its_set_point(make):
+    lift = make("Velocity", "velocity_controllers/JointPositionController", {"pid": {"p": 10.0}})
+    lift.command(0.3)
+    assert lift.advance(2.0) == pytest.approx(0.3, abs=1e-4)
+
+
+def test_effort_joint_velocity_controller_goes_at_its_set_point(make):
+    params = {"pid": {"p": 500.0, "i": 5000.0, "i_clamp": 100.0}}
+    lift = make("Effort", "effort_controllers/JointVelocityController", params)
+    lift.command(0.4)
+    lift.advance(0.8)
+    assert lift.joint.velocity == pytest.approx(0.4, abs=1e-3)
+
+
+def test_a_last_effort_stays_when_its_controller_stops(make):
+    lift = make("Effort", "effort_controllers/JointEffortController")
+    lift.command(WEIGHT)
+    lift.advance(0.1)
+    lift.manager.switch([], ["c"], STRICT)
+    assert lift.advance(0.5) == pytest.approx(0.0, abs=2e-4)  # one step without effort at the start
+    assert lift.joint.effort == WEIGHT
+
+
+@pytest.mark.parametrize(
+    ("interface", "controller"),
+    [
+        ("Effort", "effort_controllers/JointEffortController"),
+        ("Position", POSITION),
+        ("Velocity", VELOCITY),
+    ],
+)
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_what_is_no_number_never_reaches_the_world(make, interface, controller, bad):
+    lift = make(interface, controller)
+    lift.command(bad)
+    lift.advance(0.05)
+    assert math.isfinite(lift.joint.position)
+    lift.command(0.0)
+    lift.advance(0.05)
+    assert math.isfinite(lift.joint.command)
+
+
+def test_an_emergency_stop_lets_go_of_efforts_and_its_end_restarts_controllers(make):
+    lift = make("Effort", "effort_controllers/JointEffortController")
+    lift.command(2 * WEIGHT)
+    lift.robot.emergency_stop(True)
+    assert lift.advance(0.1) == pytest.approx(-0.5 * 9.8 * 0.1**2, rel=0.02)
+    assert lift.joint.effort == 0.0
+    lift.robot.emergency_stop(False)
+    lift.advance(0.01)
+    assert lift.joint.command == 0.0  # starting() made it so
+    assert lift.manager.listed()[0].state == "running"
+
+
+def test_an_emergency_stop_holds_positions_and_velocities(make):
+    lift = make("Position", POSITION)
+    lift.command(0.5)
+    lift.advance(0.1)
+    held = lift.joint.position
+    lift.robot.emergency_stop(True)
+    lift.robot.emergency_stop(True)
+    assert lift.advance(0.2) == pytest.approx(held, abs=1e-6)
+    lift.robot.emergency_stop(False)
+    assert lift.advance(0.2) == pytest.approx(held, abs=1e-6)  # the restart latched it
+    lift = make("Velocity", VELOCITY)
+    lift.command(1.0)
+    lift.advance(0.1)
+    lift.robot.emergency_stop(True)
+    before = lift.advance(0.1)  # it brakes with no more than its effort
+    assert lift.advance(0.2) == pytest.approx(before, abs=1e-5)
+
+
+class Probe:
+    """Notes what the manager was told."""
+
+    def __init__(self, lift):
+        self.calls = []
+        lift.manager.update = lambda now, dt: self.calls.append((now // 1_000_000, dt))
+
+
+@pytest.mark.parametrize(("period", "ticks"), [(0.0, 1), (0.001, 1), (0.004, 4), (0.0025, 3), (1e-4, 1)])
+def test_controllers_run_on_every_control_period_with_the_nominal_dt(make, period, ticks):
+    lift = make("Effort", period=period)
+    probe = Probe(lift)
+    lift.advance(0.012)
+    assert probe.calls == [(now, ticks * DT) for now in range(1, 13, ticks)]
+
+
+def test_after_a_reset_the_next_step_is_a_control_tick_with_the_nominal_dt(make):
+    lift = make("Effort", period=0.004)
+    lift.advance(0.006)
+    probe = Probe(lift)
+    lift.sim.reset_world()
+    lift.advance(0.005)
+    lift.sim.reset_simulation()
+    lift.advance(0.002)
+    assert probe.calls == [(7, 0.004), (11, 0.004), (1, 0.004)]
+
+
+def test_limits_act_on_each_step_also_between_control_periods(make):
+    limit = '<limit lower="-1" upper="0.05" effort="100" velocity="20"/>'
+    lift = make("Effort", "effort_controllers/JointEffortController", period=0.1, limit=limit)
+    lift.command(100.0)
+    lift.advance(0.04)
+    assert lift.joint.effort == 100.0
+    lift.advance(0.02)  # beyond the limit: clipped in place, so it stays so until the next control tick
+    assert lift.joint.effort == 0.0
+    lift.advance(0.041)
+    assert lift.joint.position < 0.05
+    assert lift.joint.effort == 100.0
+
+
+def limited(kind="prismatic", **limits):
+    return JointHandle("j", kind, JointLimits(**limits))
+
+
+def test_position_limits_never_open_with_time():
+    joint = limited(lower=-1.0, upper=1.0, velocity=2.0)
+    limiter = PositionLimiter(joint.limits)
+    joint.command = 9.0
+    limiter.limit(joint, 0.1)
+    assert joint.command == pytest.approx(0.2)
+    joint.command = 9.0
+    limiter.limit(joint, 0.1)
+    assert joint.command == pytest.approx(0.4)
+    limiter.forget()
+    joint.position, joint.command = -0.9, -9.0
+    limiter.limit(joint, 0.1)
+    assert joint.command == -1.0
+
+
+def test_a_joint_beyond_its_range_is_brought_back():
+    joint = limited(lower=-1.0, upper=1.0, velocity=2.0)
+    joint.position = joint.command = 3.0
+    PositionLimiter(joint.limits).limit(joint, 0.1)
+    assert joint.command == 1.0
+
+
+def test_soft_limits_slow_a_position_command_near_its_end():
+    soft = SoftLimits(-0.9, 0.9, 10.0, 20.0)
+    joint = limited(lower=-1.0, upper=1.0, velocity=2.0, soft=soft)
+    joint.position, joint.command = 0.85, 9.0
+    PositionLimiter(joint.limits).limit(joint, 0.1)
+    assert joint.command == pytest.approx(0.85 + 10.0 * 0.05 * 0.1)
+
+
+def test_velocity_limits_with_acceleration_and_soft_limits():
+    joint = limited(velocity=2.0, acceleration=5.0)
+    limiter = VelocityLimiter(joint.limits)
+    seen = []
+    for _ in range(6):
+        joint.command = 9.0
+        limiter.limit(joint, 0.1)
+        seen.append(joint.command)
+    assert seen == pytest.approx([0.5, 1.0, 1.5, 2.0, 2.0, 2.0])
+    joint = limited(lower=-1.0, upper=1.0, velocity=2.0, soft=SoftLimits(-0.9, 0.9, 10.0, 20.0))
+    joint.position, joint.command = 0.85, 9.0
+    VelocityLimiter(joint.limits).limit(joint, 0.1)
+    assert joint.command == pytest.approx(0.5)
+
+
+def test_gains_of_drives_come_from_the_tree_and_bad_ones_are_refused():
+    description = read_description(lift_urdf("Position"))
+    assert RobotHardware(description).pids == {}
+    hardware = RobotHardware(description, {"rail": {"p": 3}, "other": 7})
+    assert [pid.gains.p for pid in hardware.pids.values()] == [3.0]
+    assert list(hardware.pids) == ["gazebo_ros_control/pid_gains/rail"]
+    assert isinstance(hardware.drives[0], PositionDrive)
+    with pytest.raises(ControlError, match="pid_gains/rail/i"):
+        RobotHardware(description, {"rail": {"p": 3, "i": math.nan}})
+
+
+def test_parameters_of_limits_that_are_no_numbers_are_a_warning():
+    tree = {"rail": {"has_velocity_limits": True, "max_velocity": "fast",
+                     "has_acceleration_limits": True, "max_acceleration": 4}}  # fmt: skip
+    description = read_description(lift_urdf("Velocity")).limited_by(tree)
+    limits = description.joints["rail"].limits
+    assert (limits.velocity, limits.acceleration) == (2.0, 4.0)
+    assert any("max_velocity" in text for text in description.warnings)
+    assert read_description(lift_urdf("Velocity")).limited_by(
+        {"rail": {"angle_wraparound": True}}
+    ).joints["rail"].limits.lower is None

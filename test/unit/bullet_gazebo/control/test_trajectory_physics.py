@@ -1,0 +1,157 @@
+"""Trajectories in the physics world: an arm under gravity follows a quintic within its tolerances."""
+
+import numpy as np
+import pytest
+
+from bullet_gazebo.control.description import read_description
+from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.manager import STRICT, ControllerManager
+from bullet_gazebo.control.trajectory.goal import GoalRequest, Outcome
+from bullet_gazebo.control.trajectory.plan import Plan, PlanPoint
+from bullet_gazebo.control.trajectory.tolerances import Tolerance
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import World
+from bullet_gazebo.robot import Robot
+from bullet_gazebo.simulator import Simulator
+
+S = 1_000_000_000  # [ns]
+JOINTS = ("shoulder", "elbow")
+GAINS = {"p": 400.0, "i": 400.0, "d": 20.0, "i_clamp": 20.0}
+KINDS = {
+    "Effort": {"gains": dict.fromkeys(JOINTS, GAINS)},
+    "Position": {},
+    "Velocity": {
+        "gains": dict.fromkeys(JOINTS, {"p": 50.0}),
+        "velocity_ff": dict.fromkeys(JOINTS, 1.0),
+    },
+}
+
+
+def arm(interface):
+    """Two links of 0.5 m and 1 kg that swing in a vertical plane."""
+
+    def link(name):
+        return (
+            f'<link name="{name}"><inertial><origin xyz="0 0 -0.25"/><mass value="1"/>'
+            '<inertia ixx="0.021" ixy="0" ixz="0" iyy="0.021" iyz="0" izz="0.001"/></inertial></link>'
+        )
+
+    def joint(name, parent, child, z):
+        return (
+            f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
+            f'<origin xyz="0 0 {z}"/><axis xyz="0 1 0"/>'
+            '<limit lower="-3" upper="3" effort="100" velocity="10"/></joint>'
+            f'<transmission name="t_{name}"><type>transmission_interface/SimpleTransmission</type>'
+            f'<joint name="{name}"><hardwareInterface>hardware_interface/{interface}JointInterface'
+            f'</hardwareInterface></joint><actuator name="m_{name}"/></transmission>'
+        )
+
+    return (
+        f'<robot name="arm"><link name="world"/>{link("upper")}{link("lower")}'
+        f"{joint('shoulder', 'world', 'upper', 2)}{joint('elbow', 'upper', 'lower', -0.5)}</robot>"
+    )
+
+
+class Listener:
+    def __init__(self):
+        self.samples, self.outcomes = [], []
+
+    def feedback(self, sample):
+        self.samples.append(sample)
+
+    def finished(self, outcome):
+        self.outcomes.append(outcome)
+
+
+@pytest.fixture
+def sim(new_engine):
+    simulator = Simulator(World(new_engine()), lockstep=True)
+    yield simulator
+    simulator.world.close()
+
+
+def start(sim, interface):
+    text = arm(interface)
+    model = sim.world.spawn("arm", parse_urdf(text), Pose())
+    hardware = RobotHardware(read_description(text))
+    robot = Robot(model, hardware, ControllerManager(hardware))
+    sim.add_robot(robot)
+    kind = f"{interface.lower()}_controllers/JointTrajectoryController"
+    params = {"type": kind, "joints": list(JOINTS), "constraints": {"goal_time": 0.5}}
+    robot.manager.load("arm", params | KINDS[interface])
+    robot.manager.switch(["arm"], [], STRICT)
+    return robot, robot.manager.get("arm")
+
+
+def pursue(controller, points, path):
+    told = Listener()
+    tolerance = dict.fromkeys(JOINTS, Tolerance(path))
+    plan = Plan(JOINTS, points)
+    controller.pursue("goal", GoalRequest(plan, tolerance, tolerance), told)
+    return told
+
+
+@pytest.mark.parametrize(
+    ("interface", "path"), [("Effort", 0.02), ("Position", 0.01), ("Velocity", 0.01)]
+)
+def test_a_quintic_is_followed_within_its_tolerances(sim, interface, path):
+    robot, controller = start(sim, interface)
+    points = [
+        PlanPoint(S, (0.5, 0.4), (0.4, -0.2), (0.0, 0.3)),
+        PlanPoint(2 * S, (0.8, -0.6), (0.0, 0.0), (0.0, 0.0)),
+    ]
+    with sim.lock:
+        sim.advance(1)
+        told = pursue(controller, points, path)
+        sim.advance(2500)
+    assert told.outcomes == [Outcome("succeeded")]
+    assert len(told.samples) == pytest.approx(40, abs=2)
+    found = [robot.hardware.joints[name].position for name in JOINTS]
+    assert found == pytest.approx([0.8, -0.6], abs=path)
+    # What was wanted on the way is the quintic through the two points, solved for once more.
+    times = np.array([min(2.0, (sample.stamp - S // 500) / S) for sample in told.samples])
+    wanted = np.array([sample.desired[0] for sample in told.samples])
+    for joint in range(2):
+        assert wanted[:, joint] == pytest.approx(_quintics(times, points, joint), abs=1e-6)
+
+
+def _quintics(times, points, joint):
+    """Positions at `times` [s] of the splines from rest at 0 through `points`, by linear equations."""
+    ends = [(0.0, 0.0, 0.0, 0.0)] + [
+        (p.time / S, p.positions[joint], p.velocities[joint], p.accelerations[joint])
+        for p in points
+    ]
+    found = np.full(len(times), np.nan)
+    for (t0, *first), (t1, *last) in zip(ends, ends[1:], strict=False):
+        rows = [np.polynomial.polynomial.polyder(np.eye(6), m, axis=0) for m in range(3)]
+        matrix = [np.polynomial.polynomial.polyval(t - t0, row) for t in (t0, t1) for row in rows]
+        spline = np.linalg.solve(matrix, [*first, *last])
+        inside = (times >= t0) & (times <= t1)
+        found[inside] = np.polynomial.polynomial.polyval(times[inside] - t0, spline)
+    return found
+
+
+def test_a_way_too_fast_for_the_motors_aborts_the_goal(sim):
+    _, controller = start(sim, "Effort")
+    with sim.lock:
+        sim.advance(1)
+        told = pursue(controller, [PlanPoint(S // 10, (1.5, 1.5), (0.0, 0.0), (0.0, 0.0))], 0.05)
+        sim.advance(200)
+    assert told.outcomes[0].kind == "aborted"
+    assert "path error" in told.outcomes[0].text
+
+
+@pytest.mark.parametrize("interface", ["Effort", "Position", "Velocity"])
+def test_after_a_reset_the_arm_hangs_where_it_was_put(sim, interface):
+    robot, controller = start(sim, interface)
+    with sim.lock:
+        told = pursue(controller, [PlanPoint(S, (1.0, -1.0))], 0.0)
+        sim.advance(500)
+        sim.set_joint_positions(robot.model, {"shoulder": 0.0, "elbow": 0.0})
+    assert [outcome.kind for outcome in told.outcomes] == ["canceled"]
+    with sim.lock:
+        sim.advance(500)
+    assert [joint.position for joint in robot.hardware.joints.values()] == pytest.approx(
+        [0.0, 0.0], abs=1e-6
+    )

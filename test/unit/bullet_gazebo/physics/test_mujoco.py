@@ -1,0 +1,302 @@
+"""What the second engine does in its own way: a world compiled anew, motors, contacts and meshes."""
+
+import math
+import struct
+
+import numpy as np
+import pytest
+from robots import cartpole_urdf
+
+from bullet_gazebo.physics.description import DescriptionError, Inertia, Shape
+from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.files.sdf.models import parse_sdf
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.meshes.points import mesh_points
+from bullet_gazebo.physics.pose import Pose, from_rpy
+from bullet_gazebo.physics.world import World, ground_plane
+
+pytestmark = pytest.mark.extras("mujoco")
+
+CORNERS = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
+COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">
+<asset><unit meter="0.5"/><up_axis>Y_UP</up_axis></asset><library_geometries><geometry id="g"><mesh>
+<source id="s"><float_array count="12">0 0 0 2 0 0 0 4 0 0 0 6</float_array></source>
+<vertices id="v"><input semantic="POSITION" source="#s"/></vertices></mesh></geometry>
+</library_geometries><library_visual_scenes><visual_scene id="w"><node>{}<instance_geometry url="#g"/>
+</node></visual_scene></library_visual_scenes></COLLADA>"""
+
+
+@pytest.fixture
+def world():
+    world = World(make_engine("mujoco"))
+    yield world
+    world.close()
+
+
+def run(world, seconds):
+    for _ in range(round(seconds / world.time_step)):
+        world.step()
+
+
+def block(mass="1", mu="1", geometry="<box><size>0.2 0.2 0.2</size></box>", more=""):
+    return parse_sdf(
+        f'<sdf version="1.6"><model name="b">{more}<link name="l"><inertial><mass>{mass}</mass>'
+        "<inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"
+        f'<collision name="c"><geometry>{geometry}</geometry><surface><friction><ode><mu>{mu}</mu>'
+        "</ode></friction></surface></collision></link></model></sdf>"
+    )
+
+
+def slider(mass=2.0, more="", limit='<limit lower="-9" upper="9" effort="9" velocity="9"/>'):
+    return parse_urdf(
+        f'<robot name="r"><link name="world"/><link name="s"><inertial><mass value="{mass}"/>'
+        '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
+        '<joint name="j" type="prismatic"><parent link="world"/><child link="s"/>'
+        f'<axis xyz="1 0 0"/>{limit}{more}</joint></robot>'
+    )
+
+
+def test_models_that_come_and_go_leave_the_others_as_they_are(world):
+    pole = world.spawn("a", parse_urdf(cartpole_urdf()), Pose())
+    ball = world.spawn("b", block(), Pose((3.0, 0.0, 2.0), from_rpy(0.3, 0.2, 0.1)))
+    pole.body.reset_joint(1, 0.3, 1.0)
+    ball.place(ball.state()[0], ((1.0, 2.0, 3.0), (0.4, 0.5, 0.6)))
+    run(world, 0.1)
+    before = [pole.joint_states(), pole.link_state("pole"), *ball.state()]
+    world.spawn("c", slider(), Pose((0.0, 5.0, 0.0)))
+    assert [pole.joint_states(), pole.link_state("pole"), *ball.state()] == before
+    world.delete("c")
+    assert [pole.joint_states(), pole.link_state("pole"), *ball.state()] == before
+
+
+def test_a_world_with_company_gives_the_same_bits(world):
+    tracks = []
+    for _ in range(2):
+        model = world.spawn("a", parse_urdf(cartpole_urdf()), Pose())
+        model.body.reset_joint(1, 0.3, 1.0)
+        model.body.apply_efforts((3.0, 0.0))
+        if tracks:  # comes while an effort waits for the next step, which must not be lost
+            world.spawn("b", slider(), Pose((0.0, 5.0, 0.0)))
+        run(world, 0.5)
+        tracks.append(model.joint_states())
+        world.delete("a")
+    assert tracks[0] == tracks[1]
+
+
+def test_what_was_set_survives_the_arrival_of_another_model(world):
+    model = world.spawn("a", slider(), Pose())
+    model.set_stops("j", -0.1, 0.1)
+    model.set_motor("j", 1.0, 50.0)
+    model.body.set_link_gravity("s", False)
+    world.spawn("b", slider(), Pose((0.0, 5.0, 0.0)))
+    assert not model.body.link_gravity("s")
+    run(world, 0.05)
+    assert model.joint_state("j")[1] == pytest.approx(1.0, abs=1e-3)
+    run(world, 0.5)
+    assert model.joint_state("j")[0] == pytest.approx(0.1, abs=0.001)
+
+
+def test_a_model_that_is_refused_leaves_the_world_as_it_was(world, tmp_path):
+    pole = world.spawn("a", parse_urdf(cartpole_urdf()), Pose())
+    run(world, 0.01)
+    before = pole.joint_states()
+    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\n")
+    flat = block(geometry=f"<mesh><uri>{tmp_path}/flat.obj</uri></mesh>")
+    with pytest.raises(DescriptionError, match=r"can't load the model: .*flat\.obj") as raised:
+        world.spawn("b", flat, Pose())
+    assert "\n" not in str(raised.value)
+    assert pole.joint_states() == before
+    run(world, 0.01)
+    assert list(world.models) == ["a"]
+
+
+@pytest.mark.parametrize("speed", [0.5, -2.0])
+def test_a_motor_drives_with_no_more_than_its_effort(world, speed):
+    model = world.spawn("a", slider(), Pose())
+    model.set_motor("j", speed, 4.0)
+    run(world, 0.1)
+    assert model.joint_state("j")[1] == pytest.approx(math.copysign(0.2, speed), rel=1e-3)
+    run(world, 1.5)
+    assert model.joint_state("j")[1] == pytest.approx(speed, rel=1e-3)
+
+
+def test_dry_friction_holds_up_to_its_effort_and_brakes_with_it(world):
+    model = world.spawn("a", slider(more='<dynamics friction="3"/>'), Pose())
+    for force, speed in ((2.9, 0.0), (5.0, (5.0 - 3.0) / 2.0)):
+        for _ in range(1000):
+            model.body.apply_efforts((force,))
+            world.step()
+        assert model.joint_state("j")[1] == pytest.approx(speed, abs=1e-3)
+    run(world, 0.5)
+    assert model.joint_state("j")[1] == pytest.approx(1.0 - 0.5 * 3.0 / 2.0, abs=2e-3)
+    run(world, 0.5)
+    assert model.joint_state("j")[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_damping_slows_as_its_equation_says(world):
+    model = world.spawn("a", slider(more='<dynamics damping="4"/>'), Pose())
+    model.body.reset_joint(0, 0.0, 1.0)
+    run(world, 0.5)
+    assert model.joint_state("j")[1] == pytest.approx(math.exp(-0.5 * 4.0 / 2.0), rel=2e-3)
+
+
+def test_an_effort_acts_in_one_step_only(world):
+    model = world.spawn("a", slider(), Pose())
+    model.body.apply_efforts((3.0,))
+    model.body.add_effort(0, 1.0)
+    model.body.add_wrench("s", (2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    for _ in range(2):
+        world.step()
+        assert model.joint_state("j")[1] == pytest.approx(6.0 / 2.0 * 0.001, rel=1e-9)
+
+
+def test_stops_that_leave_no_room_hold_the_joint(world):
+    limit = '<limit lower="0" upper="0" effort="9" velocity="9"/>'
+    model = world.spawn("a", slider(limit=limit), Pose())
+    for _ in range(200):
+        model.body.apply_efforts((5.0,))
+        world.step()
+    assert model.joint_state("j")[0] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_another_inertia_acts_at_once_and_the_motion_goes_on(world):
+    model = world.spawn("a", slider(), Pose())
+    model.body.reset_joint(0, 0.1, 0.5)
+    world.set_inertia(model, "s", Inertia(4.0, Pose((0.0, 0.0, 0.3)), ixx=1.0, iyy=1.0, izz=1.0))
+    assert model.joint_states() == [(0.1, 0.5)]
+    model.body.apply_efforts((4.0,))
+    world.step()
+    assert model.joint_state("j")[1] == pytest.approx(0.501, abs=1e-9)
+
+
+def test_moments_that_no_body_has_are_taken_as_they_are(world):
+    wheel = parse_urdf(
+        '<robot name="r"><link name="world"/><link name="w"><inertial><mass value="1"/>'
+        '<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.5"/></inertial></link>'
+        '<joint name="j" type="continuous"><parent link="world"/><child link="w"/>'
+        '<axis xyz="0 0 1"/></joint></robot>'
+    )
+    model = world.spawn("a", wheel, Pose())
+    model.body.apply_efforts((1.0,))
+    world.step()
+    assert model.joint_state("j")[1] == pytest.approx(0.001 / 0.5, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("mu", "ground", "slides"), [("0.2", 1.0, True), ("5", 0.2, True), ("0.3", 9.0, False)]
+)
+def test_the_smaller_coefficient_of_friction_counts(mu, ground, slides):
+    slope = 0.25
+    world = World(
+        make_engine("mujoco"), gravity=(9.8 * math.sin(slope), 0.0, -9.8 * math.cos(slope))
+    )
+    floor = ground_plane()
+    floor.links["link"].collisions = [Shape("plane", mu=ground)]
+    world.spawn("floor", floor, Pose())
+    model = world.spawn("b", block(mu=mu), Pose((0.0, 0.0, 0.1)))
+    run(world, 1.0)
+    way = (
+        0.5 * 9.8 * (math.sin(slope) - min(float(mu), ground) * math.cos(slope)) if slides else 0.0
+    )
+    assert model.state()[0].position[0] == pytest.approx(way, abs=0.01)
+    world.close()
+
+
+@pytest.mark.parametrize(
+    ("geometry", "height"),
+    [
+        ("<box><size>0.2 0.2 0.2</size></box>", 0.1),
+        ("<sphere><radius>0.15</radius></sphere>", 0.15),
+        ("<cylinder><radius>0.3</radius><length>0.4</length></cylinder>", 0.2),
+        ("<mesh><uri>{}/cube.obj</uri><scale>0.1 0.1 0.05</scale></mesh>", 0.05),
+    ],
+)
+def test_every_shape_rests_on_the_ground(world, tmp_path, geometry, height):
+    (tmp_path / "cube.obj").write_text(
+        "\n".join(["v {} {} {}".format(*c) for c in CORNERS] + ["f 1 2 3"])
+    )
+    world.spawn("ground_plane", ground_plane(), Pose())
+    model = world.spawn(
+        "b", block(geometry=geometry.format(tmp_path)), Pose((0.0, 0.0, height + 0.1))
+    )
+    run(world, 1.0)
+    (pose, (linear, _)) = model.state()
+    assert pose.position == pytest.approx((0.0, 0.0, height), abs=1e-4)
+    assert linear == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+
+
+def test_a_fixed_base_stands_where_it_was_put_also_for_what_falls_on_it(world):
+    table = block(more="<static>true</static>")
+    model = world.spawn("table", table, Pose())
+    model.place(Pose((5.0, 0.0, 1.0)))
+    ball = world.spawn("ball", block(), Pose((5.0, 0.0, 1.25)))
+    run(world, 0.5)
+    assert model.state()[0].position == (5.0, 0.0, 1.0)
+    assert ball.state()[0].position[2] == pytest.approx(1.2, abs=1e-3)
+
+
+def stl(corners):
+    facets = b"".join(
+        struct.pack("<12fH", 0, 0, 0, *sum(corners[i : i + 3], ()), 0) for i in range(6)
+    )
+    return bytes(80) + struct.pack("<I", 6) + facets
+
+
+def test_points_of_every_kind_of_mesh_file(tmp_path):
+    text = "solid s\n" + "".join("vertex {} {} {}\n".format(*corner) for corner in CORNERS)
+    for name, data in (("a.stl", stl(CORNERS)), ("b.stl", text.encode()),
+                       ("c.obj", text.replace("vertex", "v").encode())):  # fmt: skip
+        (tmp_path / name).write_bytes(data)
+        assert mesh_points(tmp_path / name) == pytest.approx(np.array(sorted(CORNERS)))
+
+
+def test_points_of_collada_follow_its_nodes_unit_and_axes(tmp_path):
+    move = "<translate>1 0 0</translate><rotate>0 0 1 90</rotate><scale>1 1 2</scale>"
+    (tmp_path / "a.dae").write_text(COLLADA.format(move))
+    # (2 0 0) turns to (0 2 0), (0 4 0) to (-4 0 0); then y is up, and a unit is half a metre.
+    wanted = [(0.5, 0, 0), (0.5, 0, 1), (-1.5, 0, 0), (0.5, -6, 0)]
+    assert mesh_points(tmp_path / "a.dae") == pytest.approx(np.array(sorted(wanted)), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "fault"),
+    [
+        ("a.obj", "v 1 x 2\nf 1 2 3", "can't be read"),
+        ("b.stl", "solid s\nvertex 1 2 3\n", "nothing to touch"),
+        ("c.dae", "<COLLADA", "not well-formed"),
+        ("d.dae", "<COLLADA/>", "nothing to touch"),
+        ("e.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3", "nothing to touch"),
+    ],
+)
+def test_a_mesh_without_points_is_named(tmp_path, name, text, fault):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(DescriptionError, match=f"{name}.*{fault}"):
+        mesh_points(tmp_path / name)
+
+
+@pytest.mark.parametrize("speed", [math.nan, 1e200, -math.inf])
+def test_what_grows_beyond_all_bounds_stops_alone_with_one_warning(
+    world, tmp_path, monkeypatch, caplog, speed
+):
+    monkeypatch.chdir(tmp_path)
+    wild = world.spawn("a", slider(), Pose())
+    ball = world.spawn("b", block(), Pose((3.0, 0.0, 2.0)))
+    run(world, 0.05)
+    wild.body.reset_joint(0, 0.2, speed)
+    run(world, 0.1)
+    assert wild.joint_states() == [(0.2, 0.0)]
+    assert ball.state()[0].position[2] == pytest.approx(2.0 - 4.9 * 0.15**2, abs=1e-3)
+    assert caplog.text.count("huge value in QVEL") == 1
+    assert list(tmp_path.iterdir()) == []  # MuJoCo's own log
+
+
+def test_a_step_as_long_and_gravity_as_strong_as_can_be_leave_numbers(world):
+    model = world.spawn("a", parse_urdf(cartpole_urdf()), Pose())
+    ball = world.spawn("b", block(), Pose((3.0, 0.0, 2.0)))
+    model.body.reset_joint(1, 0.3, 1.0)
+    world.set_time_step(10.0)
+    world.set_gravity((1e12, 1e12, -1e12))
+    for _ in range(100):
+        world.step()
+    numbers = [*sum(model.joint_states(), ()), *sum(ball.state()[0], ()), *sum(ball.state()[1], ())]
+    assert all(map(math.isfinite, numbers))

@@ -1,0 +1,148 @@
+"""Reading world files: what they hold, what is left out, and faults with file and place."""
+
+from pathlib import Path
+
+import pytest
+
+from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.files.world_file import empty_world, load_world, parse_world
+from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.ros.node.world_loader import read_world
+from bullet_gazebo.ros.services.resource_paths import find_world
+
+EMPTY = Path(__file__).resolve().parents[4] / "companions/gazebo_ros/worlds/empty.world"
+BOX = (
+    '<model name="{name}"><pose>{pose}</pose>{more}<link name="link"><collision name="c"><geometry>'
+    "<box><size>1 1 1</size></box></geometry></collision></link></model>"
+)
+
+
+def box(name="box", pose="0 0 0.5 0 0 0", more=""):
+    return BOX.format(name=name, pose=pose, more=more)
+
+
+def world(*parts):
+    return parse_world(
+        f'<sdf version="1.6"><world name="w">{"".join(parts)}</world></sdf>', Resources()
+    )
+
+
+def test_the_empty_world_has_gazebos_defaults():
+    empty = load_world(EMPTY, Resources())
+    assert list(empty.models) == ["ground_plane"]
+    assert list(empty.lights) == ["sun"]
+    assert (empty.gravity, empty.time_step, empty.update_rate) == ((0.0, 0.0, -9.8), 0.001, 1000.0)
+    assert empty.models.keys() == empty_world().models.keys()
+    assert empty.lights == empty_world().lights
+    assert empty.warnings == empty.left_out == []
+
+
+def test_models_includes_and_their_poses():
+    found = world(
+        box("a", "1 2 3 0 0 0"), box("b", more="<static>true</static>"),
+        "<include><uri>model://ground_plane</uri><name>floor</name><pose>0 0 -1 0 0 0</pose></include>",
+    )  # fmt: skip
+    assert list(found.models) == ["a", "b", "floor"]
+    assert found.models["a"].initial_pose.position == (1.0, 2.0, 3.0)
+    assert (found.models["a"].static, found.models["b"].static) == (False, True)
+    assert found.models["floor"].initial_pose.position == (0.0, 0.0, -1.0)
+
+
+def test_an_include_overrides_name_pose_and_static(tmp_path):
+    folder = tmp_path / "crate"
+    folder.mkdir()
+    (folder / "model.sdf").write_text(f'<sdf version="1.5">{box("crate")}</sdf>')
+    text = (
+        '<sdf version="1.6"><world name="w"><include><uri>model://crate</uri></include><include>'
+        "<uri>model://crate</uri><name>c2</name><pose>1 0 0 0 0 0</pose><static>1</static></include>"
+        "</world></sdf>"
+    )
+    found = parse_world(text, Resources(models=(tmp_path,)))
+    assert list(found.models) == ["crate", "c2"]
+    assert found.models["crate"].initial_pose.position == (0.0, 0.0, 0.5)
+    assert found.models["c2"].initial_pose.position == (1.0, 0.0, 0.0)
+    assert (found.models["crate"].static, found.models["c2"].static) == (False, True)
+
+
+def test_physics_and_gravity():
+    found = world(
+        "<gravity>0 0 -1.6</gravity><physics type='ode'><max_step_size>0.002</max_step_size>"
+        "<real_time_update_rate>500</real_time_update_rate><ode><solver><iters>20</iters></solver></ode>"
+        "</physics>"
+    )
+    assert found.gravity == (0.0, 0.0, -1.6)
+    assert (found.time_step, found.update_rate, found.iterations) == (0.002, 500.0, 20)
+
+
+def test_lights_keep_what_the_file_says():
+    found = world(
+        '<light name="lamp" type="spot"><pose>1 2 3 0 0 0</pose><diffuse>1 0 0</diffuse>'
+        "<attenuation><constant>0.5</constant><linear>0.1</linear><quadratic>0.2</quadratic>"
+        "</attenuation><direction>1 0 0</direction><cast_shadows>1</cast_shadows></light>"
+    )
+    lamp = found.lights["lamp"]
+    assert (lamp.kind, lamp.diffuse, lamp.direction) == ("spot", (1, 0, 0, 1), (1, 0, 0))
+    assert (lamp.attenuation_constant, lamp.attenuation_linear) == (0.5, 0.1)
+    assert (lamp.attenuation_quadratic, lamp.cast_shadows) == (0.2, True)
+    assert lamp.pose.position == (1.0, 2.0, 3.0)
+
+
+def test_a_faulty_model_is_left_out_alone_and_named():
+    found = world(
+        box("good"), '<model name="bad"><link name="l"><inertial><mass>x</mass></inertial></link></model>',
+        box("good"), "<include><uri>model://nowhere</uri></include>",
+        '<actor name="walker"/><plugin name="p" filename="x.so"/>',
+    )  # fmt: skip
+    assert list(found.models) == ["good"]
+    assert len(found.warnings) == 3
+    assert "model 'bad': link 'l', inertial: <mass>: 'x' is not a number" in found.warnings[0]
+    assert "'good' is there twice" in found.warnings[1]
+    assert "'model://nowhere' is not found" in found.warnings[2]
+    assert found.left_out == ["actor 'walker'", "plugin 'p'"]
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("<sdf version='1.6'>", "not well-formed XML"),
+        ("<sdf version='1.6'/>", "there is no <world>"),
+        ("<robot/>", "the root element is <robot>"),
+        ("<sdf version='1.6'><world name='w'><gravity>down</gravity></world></sdf>",
+         "<gravity> must hold 3 numbers, not 'down'"),
+        ("<sdf version='1.6'><world name='w'><physics><max_step_size>0</max_step_size></physics></world>"
+         "</sdf>", "<max_step_size>: 0.0 is not between 0 and 1 s"),
+    ],
+)  # fmt: skip
+def test_a_fault_of_the_whole_file_is_one_line_with_its_place(tmp_path, text, fault):
+    path = tmp_path / "my.world"
+    path.write_text(text)
+    with pytest.raises(DescriptionError) as raised:
+        load_world(path, Resources())
+    assert str(raised.value).startswith(f"{path}: ")
+    assert fault in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_world_is_looked_up_as_given_on_the_resource_path_and_in_gazebo_ros(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setenv("GAZEBO_RESOURCE_PATH", str(tmp_path))
+    (tmp_path / "worlds").mkdir()
+    mine = tmp_path / "worlds" / "mine.world"
+    mine.write_text("<sdf version='1.6'><world name='w'/></sdf>")
+    assert find_world(str(mine)) == find_world("worlds/mine.world") == mine
+    assert find_world("worlds/empty.world").samefile(EMPTY)
+    assert find_world("empty.world").samefile(EMPTY)
+    assert find_world("worlds/none.world") is None
+    assert find_world("x" * 10_000) is None
+
+
+@pytest.mark.parametrize("text", [None, "<sdf version='1.6'><world>", "\0", "<sdf version='1.6'/>"])
+def test_without_a_usable_file_the_world_is_empty_and_the_log_says_why(tmp_path, caplog, text):
+    path = tmp_path / "my.world"
+    if text is not None:
+        path.write_text(text)
+    assert list(read_world(str(path)).models) == ["ground_plane"]
+    (line,) = caplog.messages
+    assert str(path) in line
+    assert "empty but for a ground plane" in line

@@ -1,0 +1,332 @@
+"""`ws`, the one entry: called as a user calls it, from a copy where it would do harm."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+PROBE = "import os, sys; print(os.environ.get(sys.argv[1], '-'))"
+
+
+@pytest.fixture
+def ws(root):
+    """Returns a function that runs ws with a user's environment, not with the tests' own."""
+
+    def run(*arguments, cwd=None, script=root / "ws", **environment):
+        plain = {"PATH": "/usr/local/bin:/usr/bin:/bin", "HOME": os.environ["HOME"]} | environment
+        return subprocess.run(
+            [script, *arguments],
+            check=False,
+            cwd=cwd,
+            env={name: value for name, value in plain.items() if value is not None},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+
+    return run
+
+
+def variable(ws, name, **environment):
+    return ws("python3", "-c", PROBE, name, **environment).stdout.strip()
+
+
+# --- the command line --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("option", ["--help", "-h", "help"])
+def test_help(ws, option):
+    result = ws(option)
+    assert result.returncode == 0
+    for word in ("test", "check", "shell", "clean", "ROS_MASTER_URI", "http://127.0.0.1:2"):
+        assert word in result.stdout
+
+
+def test_without_command_is_a_usage_error(ws):
+    result = ws()
+    assert result.returncode != 0
+    assert "usage: ws CMD" in result.stdout
+
+
+def test_unknown_option(ws):
+    result = ws("--nonsense")
+    assert result.returncode == 2
+    assert "--nonsense" in result.stderr
+
+
+def test_unknown_command(ws):
+    result = ws("no-such-command")
+    assert result.returncode == 127
+    assert "no-such-command" in result.stderr
+
+
+@pytest.mark.parametrize("code", [0, 3, 255])
+def test_exit_code(ws, code):
+    assert ws("python3", "-c", f"raise SystemExit({code})").returncode == code
+
+
+def test_signal_reaches_the_command(ws, root):
+    process = subprocess.Popen(
+        [root / "ws", "python3", "-c", "import signal; print('up', flush=True); signal.pause()"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout.readline() == "up\n"
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == -signal.SIGTERM
+    process.stdout.close()
+
+
+def test_arguments_stay_whole(ws):
+    arguments = ["two words", "", "*", "$HOME", "a'b\"c", "--help", "back\\slash"]
+    result = ws("python3", "-c", "import sys; print(sys.argv[1:])", *arguments)
+    assert result.stdout.strip() == repr(arguments)
+
+
+def test_stays_in_the_callers_folder(ws, tmp_path):
+    assert ws("pwd", cwd=tmp_path).stdout.strip() == str(tmp_path)
+
+
+def test_through_a_link(ws, root, tmp_path):
+    link = tmp_path / "a link"
+    link.symlink_to(root / "ws")
+    result = ws("python3", "-c", "import bullet_gazebo_msgs.srv", script=link, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+
+
+def test_ready_workspace_is_quiet(ws):
+    ws("true")
+    result = ws("true")
+    assert (result.stdout, result.stderr) == ("", "")
+
+
+# --- the environment of a command --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["python", "python3"])
+def test_interpreter_is_the_workspaces(ws, root, name):
+    result = ws(name, "-c", "import sys; print(sys.prefix)")
+    assert Path(result.stdout.strip()).resolve() == root / ".ws/venv"
+
+
+def test_imports(ws):
+    code = "import rospy, pybullet, torch, gazebo_msgs.srv, bullet_gazebo_msgs.srv, ros_utils, bullet_gazebo"
+    result = ws("python3", "-c", code)
+    assert result.returncode == 0, result.stderr
+
+
+def test_generated_and_written_modules_of_cartpole(ws):
+    code = "import bullet_gazebo_msgs.srv, cartpole; print(cartpole.__doc__ is not None)"
+    assert ws("python3", "-c", code).stdout.strip() == "True"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("rospack", "find", "cartpole"),
+        ("roslaunch", "--files", "gazebo_ros", "empty_world.launch"),
+        ("rosservice", "list", "--help"),
+        ("rostest", "--help"),
+        ("rosmsg", "show", "gazebo_msgs/ModelStates"),
+        ("rossrv", "show", "bullet_gazebo_msgs/StepWorld"),
+        ("catkin_find", "cartpole", "--share"),
+    ],
+    ids=" ".join,
+)
+def test_ros_commands(ws, command):
+    result = ws(*command)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.strip()
+
+
+def test_rosrun_finds_one_executable(ws, root):
+    result = ws("rosrun", "xacro", "xacro", root / "urdf/cartpole.urdf.xacro")
+    assert result.returncode == 0, result.stderr
+    assert "stand_cart" in result.stdout
+
+
+def test_xacro_knows_packages(ws, root):
+    robot = root / "companions/cartpole_gazebo/robots/cartpole_v1.urdf"
+    result = ws("xacro", robot)
+    assert result.returncode == 0, result.stderr
+    assert "stand_cart" in result.stdout
+
+
+def test_callers_workspaces_are_left_out(ws, tmp_path):
+    (tmp_path / "rospy.py").write_text("raise ImportError('a stranger')")
+    fake = tmp_path / "bin/python3"
+    fake.parent.mkdir()
+    fake.write_text("#!/bin/sh\nexit 9\n")
+    fake.chmod(0o755)
+    stranger = str(tmp_path)
+    result = ws(
+        "python3",
+        "-c",
+        "import os, rospy; print(*os.environ.values())",
+        PATH=f"{fake.parent}:/usr/bin:/bin",
+        PYTHONPATH=stranger,
+        PYTHONHOME=stranger,
+        CMAKE_PREFIX_PATH=stranger,
+        ROS_NAMESPACE=stranger,
+        LD_LIBRARY_PATH=f"{stranger}/lib",
+        VIRTUAL_ENV=stranger,
+        CONDA_PREFIX=stranger,
+    )
+    assert result.returncode == 0, result.stderr
+    assert stranger not in result.stdout.replace(str(fake.parent), "")
+
+
+def test_callers_packages_are_found_behind_ours(ws, tmp_path):
+    for name in ("their_robot", "gazebo_ros"):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "package.xml").write_text(
+            f'<package format="2"><name>{name}</name><version>0.0.1</version><description/>'
+            '<maintainer email="a@example.com">a</maintainer><license>BSD</license></package>'
+        )
+    code = "import rospkg; p = rospkg.RosPack(); print(p.get_path('their_robot'), p.get_path('gazebo_ros'))"
+    result = ws("python3", "-c", code, ROS_PACKAGE_PATH=str(tmp_path))
+    assert result.returncode == 0, result.stderr
+    theirs, ours = result.stdout.split()[-2:]
+    assert theirs == str(tmp_path / "their_robot")
+    assert not ours.startswith(str(tmp_path))
+
+
+def test_a_folder_in_the_root_is_no_reason_to_build(ws, root, tmp_path):
+    """Trainings leave runs/ there; a build under a running one would take its files away."""
+    folder = root / f"zz-{tmp_path.name}"
+    folder.mkdir()
+    try:
+        result = ws("true")
+    finally:
+        folder.rmdir()
+    assert result.returncode == 0
+    assert "building" not in result.stderr
+
+
+def test_without_home(ws):
+    assert ws("python3", "-c", "import matplotlib, rospy", HOME=None).returncode == 0
+
+
+def test_everything_lies_in_one_folder(ws, root):
+    for name in ("ROS_HOME", "ROS_LOG_DIR", "MPLCONFIGDIR"):
+        assert Path(variable(ws, name)).resolve().is_relative_to(root / ".ws")
+
+
+# --- the network -------------------------------------------------------------------------------
+
+
+def test_loopback_is_the_default(ws):
+    assert variable(ws, "ROS_IP") == "127.0.0.1"
+    host, _, port = variable(ws, "ROS_MASTER_URI").rpartition(":")
+    assert host == "http://127.0.0.1"
+    assert 20000 <= int(port) < 30000
+
+
+def test_a_local_master_keeps_loopback(ws):
+    assert variable(ws, "ROS_IP", ROS_MASTER_URI="http://localhost:11311") == "127.0.0.1"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("ROS_MASTER_URI", "http://robot.example:11311"),
+        ("ROS_IP", "192.0.2.7"),
+        ("ROS_HOSTNAME", "desk.example"),
+    ],
+)
+def test_users_network_stays(ws, name, value):
+    assert variable(ws, name, **{name: value}) == value
+
+
+def test_a_remote_master_gets_no_loopback_address(ws):
+    assert variable(ws, "ROS_IP", ROS_MASTER_URI="http://robot.example:11311") == "-"
+
+
+# --- checkouts of its own ----------------------------------------------------------------------
+
+
+@pytest.fixture
+def checkout(root, tmp_path, ws):
+    """A second checkout, with a blank in its path, that holds just what the first steps need."""
+    copy = tmp_path / "second checkout"
+    for name in ("tools", "requirements"):
+        shutil.copytree(root / name, copy / name)
+    shutil.copy(root / "ws", copy)
+    yield copy
+    ws("clean", script=copy / "ws")  # also removes the link that stands in for such a path
+
+
+def test_two_checkouts_have_two_masters(ws, checkout, root):
+    def line(result):
+        return next(text for text in result.stdout.splitlines() if "http://" in text)
+
+    assert line(ws("--help")) != line(ws("--help", script=checkout / "ws"))
+
+
+def test_failed_step_says_what_and_the_next_call_resumes(ws, checkout):
+    pinned = checkout / "requirements/base.txt"
+    pinned.write_text("./no-such-folder\n")
+    first = ws("true", script=checkout / "ws")
+    assert first.returncode == 1
+    assert "Python packages" in first.stderr  # which step
+    assert "no-such-folder" in first.stderr  # why
+    assert "what to do" in first.stderr
+    (log,) = re.findall(r"lines of (\S+):", first.stderr)
+    assert Path(log).resolve() == checkout / ".ws/log/venv.log"
+
+    pinned.write_text("")
+    second = ws("true", script=checkout / "ws")
+    assert "Debian" not in second.stderr, "what was ready is not made again"
+    assert second.returncode == 1, "there is no package to build in this checkout"
+    assert "catkin workspace" in second.stderr
+
+    third = ws("true", script=checkout / "ws")
+    assert "Python packages" not in third.stderr
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become a user without rights")
+def test_missing_package_without_root_or_sudo(root):
+    with tempfile.TemporaryDirectory() as folder:  # pytest's own are closed to other users
+        copy = Path(folder) / "checkout"
+        shutil.copytree(root / "tools", copy / "tools")
+        shutil.copy(root / "ws", copy)
+        (copy / "requirements").mkdir()
+        (copy / "requirements/debian.txt").write_text("no-such-package  # a comment\n")
+        for path in (Path(folder), copy):
+            path.chmod(0o777)
+        result = subprocess.run(
+            [copy / "ws", "true"],
+            check=False,
+            user=65534,
+            extra_groups=[],
+            env={"PATH": "/usr/bin:/bin"},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            start_new_session=True,  # no terminal that sudo could ask on
+        )
+    assert result.returncode == 1
+    assert "administrator" in result.stderr
+    assert "apt-get install --no-install-recommends no-such-package" in result.stderr
+
+
+def test_clean_removes_what_ws_made(ws, checkout):
+    (checkout / ".ws/log").mkdir(parents=True)
+    assert ws("clean", script=checkout / "ws").returncode == 0
+    assert not (checkout / ".ws").exists()
+    assert (checkout / "requirements/base.txt").exists()
+
+
+def test_the_tests_run_in_the_workspace(root):
+    assert Path(sys.prefix).resolve() == root / ".ws/venv"

@@ -1,0 +1,170 @@
+"""The agent: its targets against the document's formulas, and that it learns."""
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from rl_workbench.agents.dqn.agent import DQNAgent
+from rl_workbench.agents.dqn.settings import DQNSettings
+from rl_workbench.errors import WorkbenchError
+
+RNG = np.random.default_rng(0)
+
+
+def agent(**options: Any) -> DQNAgent:
+    defaults: dict[str, Any] = {"hidden_sizes": (8, 8), "batch_size": 8, "learning_starts": 0}
+    return DQNAgent(DQNSettings(**{**defaults, **options}), 4, 2, seed=1)
+
+
+def fill(learner: DQNAgent, steps: int = 8, terminated: bool = False) -> list[tuple]:
+    seen = []
+    for _ in range(steps):
+        observation, following = RNG.normal(size=(2, 4)).astype(np.float32)
+        action, reward = int(RNG.integers(2)), float(RNG.normal())
+        learner.observe((observation, action, reward), following, terminated, not terminated)
+        seen.append((observation, action, reward, following))
+    return seen
+
+
+def the_documents_loss(learner: DQNAgent, seen: list[tuple], done: float, double: bool) -> float:
+    """One loss, written as the document's train_step and train_step_double_dqn write it."""
+    s, a, r, s_ = (torch.tensor(np.array(column)) for column in zip(*seen, strict=True))
+    q_pred = learner.q_net(s).gather(1, a.unsqueeze(1)).squeeze()
+    if double:
+        best_actions = learner.q_net(s_).argmax(1).unsqueeze(1)
+        q_next = learner.target_net(s_).gather(1, best_actions).squeeze()
+    else:
+        q_next = learner.target_net(s_).max(1)[0]
+    target = r.float() + 0.99 * q_next * (1 - done)
+    return nn.functional.mse_loss(q_pred, target).item()
+
+
+@pytest.mark.parametrize("double", [True, False])
+@pytest.mark.parametrize("dueling", [True, False])
+@pytest.mark.parametrize("terminated", [True, False])
+def test_the_loss_is_the_documents(double: bool, dueling: bool, terminated: bool) -> None:
+    learner = agent(loss="mse", double=double, dueling=dueling)
+    with torch.no_grad():
+        for parameter in learner.target_net.parameters():
+            parameter.mul_(1.5)  # another network than the one that chooses
+    seen = fill(learner, terminated=terminated)
+    wanted = the_documents_loss(learner, seen, float(terminated), double)
+    assert learner.learn().td_loss == pytest.approx(wanted, rel=1e-5)
+
+
+def test_a_truncated_episode_may_count_as_ended() -> None:
+    learner = agent(bootstrap_truncated=False)
+    fill(learner)
+    assert not learner.buffer.state_dict()["discounts"].any()
+
+
+def test_huber_and_reward_scale() -> None:
+    plain, scaled = agent(), agent(reward_scale=0.5)
+    for learner in (plain, scaled):
+        learner.observe((np.ones(4, np.float32), 0, 3.0), np.ones(4, np.float32), True, False)
+    assert scaled.buffer.state_dict()["rewards"].tolist() == [1.5]
+    value = plain.q_net(torch.ones(1, 4))[0, 0].item()
+    assert plain.learn().td_loss == pytest.approx(abs(3 - value) - 0.5)
+
+
+def test_gradients_are_clipped() -> None:
+    learner = agent(max_grad_norm=1e-3, loss="mse")
+    fill(learner)
+    learner.learn()
+    norm = torch.cat([each.grad.reshape(-1) for each in learner.q_net.parameters()]).norm()
+    assert norm.item() == pytest.approx(1e-3, rel=1e-4)
+
+
+def test_the_target_follows_every_so_many_gradient_steps() -> None:
+    learner = agent(target_network_frequency=3)
+    fill(learner)
+    equal = []
+    for _ in range(6):
+        learner.learn()
+        equal.append(torch.equal(learner.q_net.net[0].weight, learner.target_net.net[0].weight))
+    assert equal == [False, False, True, False, False, True]
+
+
+def test_when_a_round_is_due() -> None:
+    learner = agent(learning_starts=10, train_frequency=4, batch_size=4)
+    due = [bool(fill(learner, 1)) and learner.is_due for _ in range(17)]
+    assert [index + 1 for index, each in enumerate(due) if each] == [12, 16]
+
+
+def test_a_buffer_of_one_learns_from_the_first_step() -> None:
+    learner = agent(buffer_size=1, batch_size=64)
+    fill(learner, 1)
+    assert learner.is_due and np.isfinite(learner.learn().td_loss)
+
+
+def test_exploration_is_epsilon() -> None:
+    learner = agent(start_e=0.3, end_e=0.3, epsilon_schedule="step")
+    observation = np.ones(4, np.float32)
+    best = learner.act_greedily(observation)
+    others = sum(learner.act(observation) != best for _ in range(4000))
+    assert others / 4000 == pytest.approx(0.15, abs=0.02)
+
+
+def test_an_infinite_loss_leaves_the_weights() -> None:
+    learner = agent(loss="mse")
+    learner.observe((np.ones(4, np.float32), 0, np.inf), np.ones(4, np.float32), True, False)
+    before = learner.q_net.net[0].weight.clone()
+    with pytest.raises(WorkbenchError, match="the loss is inf"):
+        learner.learn()
+    assert torch.equal(learner.q_net.net[0].weight, before)
+
+
+def test_the_documents_own_way_of_loading(tmp_path) -> None:
+    """The document's class has these layers, and its code loads these keys."""
+    theirs = nn.Module()
+    theirs.net = nn.Sequential(nn.Linear(4, 128), nn.ReLU(), nn.Linear(128, 128), nn.ReLU(),
+                               nn.Linear(128, 2))  # fmt: skip
+    learner = agent(hidden_sizes=(128, 128))
+    torch.save(learner.state_dict(), tmp_path / "cartpole_dqn.pth")
+    saved = torch.load(tmp_path / "cartpole_dqn.pth", weights_only=True)
+    theirs.load_state_dict(saved["q_net"])
+    x = torch.randn(3, 4)
+    assert torch.equal(theirs.net(x), learner.q_net(x))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"normalize_observations": True, "n_step": 3}, {"dueling": True, "tau": 0.1},
+     {"epsilon_schedule": "step", "lr_schedule": "linear", "loss": "mse"}],
+)  # fmt: skip
+def test_a_restored_agent_goes_on_to_the_same_bits(options: dict) -> None:
+    global_state = torch.get_rng_state()
+    one, other = agent(**options), agent(**options)
+    assert torch.equal(torch.get_rng_state(), global_state), "other people's generator is kept"
+    fill(one, 20)
+    for _ in range(3):
+        one.learn()
+    other.load_state_dict(copy.deepcopy(one.state_dict()))
+    steps = [(RNG.normal(size=4).astype(np.float32), float(RNG.normal())) for _ in range(30)]
+    actions: list[list[int]] = [[], []]
+    for learner, taken in zip((one, other), actions, strict=True):
+        for observation, reward in steps:
+            taken.append(learner.act(observation))
+            learner.observe((observation, taken[-1], reward), observation, False, False)
+            learner.learn()
+    assert actions[0] == actions[1]
+    for mine, theirs in zip(one.q_net.parameters(), other.q_net.parameters(), strict=True):
+        assert torch.equal(mine, theirs)
+
+
+def test_it_learns_which_action_pays() -> None:
+    learner = agent(hidden_sizes=(16,), learning_rate=0.01, double=True)
+    for _ in range(300):
+        observation = RNG.normal(size=4).astype(np.float32)
+        action = int(RNG.integers(2))
+        reward = 1.0 if action == (observation[0] > 0) else 0.0
+        learner.observe((observation, action, reward), observation, True, False)
+        if learner.is_due:
+            learner.learn()
+    tests = RNG.normal(size=(200, 4)).astype(np.float32)
+    right = [learner.act_greedily(each) == (each[0] > 0) for each in tests]
+    assert np.mean(right) > 0.9

@@ -1,0 +1,184 @@
+"""The learner against the document's own, slow and obvious, way."""
+
+import random
+
+import numpy as np
+import pytest
+import torch
+from learning_fakes import FakePlant
+from torch import nn
+
+from cartpole.envs.cartpole_env import CartPoleEnv
+from rl_workbench.agents.pg.document import (
+    Episode,
+    PolicyGradientAgent,
+    PolicyNetwork,
+    ValueNetwork,
+    discounted_returns,
+)
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.pg.loop import run_episode, train
+from rl_workbench.training.run.history import History
+
+
+def document_future_reward(rewards: list[float], index: int) -> float:
+    """The quadratic loop: every return summed up anew."""
+    future, discount = 0.0, 1.0
+    for following in range(len(rewards) - index):
+        future += rewards[index + following] * discount
+        discount *= 0.99
+    return future
+
+
+def document_update(agent: PolicyGradientAgent, episode: Episode) -> tuple[float, float]:
+    """One update in the document's words, on the agent's networks and optimisers."""
+    advantages, targets = [], []
+    for index, observation in enumerate(episode.observations):
+        future = document_future_reward(episode.rewards, index)
+        current = agent.value(torch.FloatTensor(observation).unsqueeze(0)).item()
+        advantages.append(future - current)
+        targets.append(future)
+    states = torch.FloatTensor(np.array(episode.observations))
+    one_hot = torch.FloatTensor(np.eye(2)[episode.actions])
+    advantages_tensor = torch.FloatTensor(np.array(advantages)).unsqueeze(1)
+    targets_tensor = torch.FloatTensor(np.array(targets)).unsqueeze(1)
+
+    agent.value_optimizer.zero_grad()
+    value_loss = nn.MSELoss()(agent.value(states), targets_tensor)
+    value_loss.backward()
+    agent.value_optimizer.step()
+
+    agent.policy_optimizer.zero_grad()
+    good = torch.sum(agent.policy(states) * one_hot, dim=1, keepdim=True)
+    policy_loss = -torch.sum(torch.log(good) * advantages_tensor)
+    policy_loss.backward()
+    agent.policy_optimizer.step()
+    return policy_loss.item(), value_loss.item()
+
+
+def random_episode(length: int, seed: int) -> Episode:
+    rng = np.random.default_rng(seed)
+    episode = Episode()
+    for _ in range(length):
+        observation = rng.normal(size=4).astype(np.float32)
+        episode.add(observation, int(rng.integers(2)), float(rng.normal()))
+    return episode
+
+
+def weights(agent: PolicyGradientAgent) -> list[torch.Tensor]:
+    return [p.detach().clone() for net in (agent.policy, agent.value) for p in net.parameters()]
+
+
+@pytest.mark.parametrize("length", [0, 1, 2, 37, 500])
+def test_returns_equal_the_documents_loop(length: int) -> None:
+    rewards = [random.Random(length).uniform(-10, 1) for _ in range(length)]
+    slow = [document_future_reward(rewards, index) for index in range(length)]
+    assert discounted_returns(rewards) == pytest.approx(slow, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("random_weights", [False, True])
+@pytest.mark.parametrize("length", [1, 5, 300])
+def test_updates_equal_the_documents(length: int, random_weights: bool) -> None:
+    ours, theirs = (PolicyGradientAgent(1, random_weights) for _ in range(2))
+    for seed in range(5):
+        episode = random_episode(length, seed)
+        assert tuple(ours.learn(episode)) == pytest.approx(
+            document_update(theirs, episode), rel=1e-4, abs=1e-4
+        )
+    for mine, other in zip(weights(ours), weights(theirs), strict=True):
+        torch.testing.assert_close(mine, other, rtol=1e-4, atol=1e-5)
+
+
+def test_acting_uses_the_policys_probabilities() -> None:
+    agent = PolicyGradientAgent(2)
+    agent.learn(random_episode(50, 0))
+    observations = np.random.default_rng(0).normal(scale=3, size=(500, 4)).astype(np.float32)
+    with torch.no_grad():
+        expected = agent.policy(torch.from_numpy(observations))[:, 0].numpy()
+    fast = [agent.probability_of_zero(observation) for observation in observations]
+    assert fast == pytest.approx(expected, abs=1e-6)
+
+
+def test_probability_survives_huge_observations() -> None:
+    agent = PolicyGradientAgent(0)
+    for scale in (1e30, -1e30):
+        assert 0.0 <= agent.probability_of_zero(np.full(4, scale, np.float32)) <= 1.0
+
+
+def test_actions_follow_the_probability() -> None:
+    agent = PolicyGradientAgent(5, random_weights=True)
+    observation = np.array([0.3, -1.0, 0.2, 0.5], np.float32)
+    share = np.mean([agent.act(observation) == 0 for _ in range(20000)])
+    assert share == pytest.approx(agent.probability_of_zero(observation), abs=0.015)
+    greedy = agent.act_greedily(observation)
+    assert greedy == (0 if agent.probability_of_zero(observation) >= 0.5 else 1)
+
+
+def test_the_documents_classes_load_the_weights(tmp_path) -> None:
+    class PolicyNetwork(nn.Module):
+        def __init__(self) -> None:
+            super().__init__()
+            self.fc = nn.Linear(4, 2)
+
+    class ValueNetwork(nn.Module):
+        def __init__(self) -> None:
+            super().__init__()
+            self.fc1 = nn.Linear(4, 10)
+            self.relu = nn.ReLU()
+            self.fc2 = nn.Linear(10, 1)
+
+    agent = PolicyGradientAgent(0)
+    PolicyNetwork().load_state_dict(agent.policy.state_dict())
+    ValueNetwork().load_state_dict(agent.value.state_dict())
+
+
+def test_same_seed_gives_the_same_weights_whatever_else_is_random() -> None:
+    def trained(seed: int) -> list[torch.Tensor]:
+        torch.rand(random.randrange(1, 9))  # somebody else's use of the global generator
+        agent = PolicyGradientAgent(seed)
+        train(CartPoleEnv(FakePlant()), agent, 10, History(), [])
+        return weights(agent)
+
+    first, second, other = trained(3), trained(3), trained(4)
+    assert all(torch.equal(mine, its) for mine, its in zip(first, second, strict=True))
+    assert not all(torch.equal(mine, its) for mine, its in zip(first, other, strict=True))
+
+
+def test_it_starts_from_a_uniform_policy_and_no_value() -> None:
+    observation = np.random.default_rng(0).normal(size=4).astype(np.float32)
+    agent = PolicyGradientAgent(6)
+    assert agent.probability_of_zero(observation) == 0.5
+    assert agent.value(torch.from_numpy(observation).unsqueeze(0)).item() == 0.0
+
+
+def test_a_random_weights_is_torchs_own() -> None:
+    torch.manual_seed(6)
+    policy, value = PolicyNetwork(), ValueNetwork()
+    expected = [p for net in (policy, value) for p in net.parameters()]
+    drawn = weights(PolicyGradientAgent(6, random_weights=True))
+    assert all(torch.equal(mine, its) for mine, its in zip(drawn, expected, strict=True))
+
+
+def test_seeding_leaves_torchs_global_generator_alone() -> None:
+    state = torch.get_rng_state()
+    PolicyGradientAgent(9)
+    assert torch.equal(state, torch.get_rng_state())
+
+
+def test_it_learns() -> None:
+    history = History()
+    train(CartPoleEnv(FakePlant()), PolicyGradientAgent(2), 200, history, [])
+    assert np.mean(history.lengths[-20:]) > 2 * np.mean(history.lengths[:20])
+
+
+def test_a_loss_that_is_no_number_leaves_the_weights_alone() -> None:
+    agent, episode = PolicyGradientAgent(0), random_episode(5, 0)
+    before = weights(agent)
+    episode.rewards[2] = float("nan")
+    with pytest.raises(WorkbenchError, match="loss is nan"):
+        agent.learn(episode)
+    assert all(torch.equal(old, new) for old, new in zip(before, weights(agent), strict=True))
+
+
+def test_an_episode_broken_off_is_dropped() -> None:
+    assert run_episode(CartPoleEnv(FakePlant()), PolicyGradientAgent(0), lambda: True) is None

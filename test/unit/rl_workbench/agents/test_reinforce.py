@@ -1,0 +1,273 @@
+"""REINFORCE with generalised advantages: its formulas, its repeatability, and that it learns."""
+
+import copy
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from learning_fakes import FakePlant
+
+from cartpole.envs.cartpole_env import CartPoleEnv
+from cartpole.task import BalanceTask
+from rl_workbench.agents.pg.document import Episode
+from rl_workbench.agents.pg.reinforce import ReinforceAgent, generalised_advantages
+from rl_workbench.agents.pg.settings import ReinforceSettings
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.pg.loop import is_complete, run_episode, train
+from rl_workbench.training.run.history import History
+
+numbers = st.floats(-10.0, 10.0)
+
+
+def an_episode(length=12, seed=0, terminated=True, size=4, actions=2):
+    rng = np.random.default_rng(seed)
+    episode = Episode()
+    for _ in range(length):
+        observation = rng.normal(size=size).astype(np.float32)
+        episode.add(observation, int(rng.integers(actions)), float(rng.normal()))
+    episode.final_observation = rng.normal(size=size).astype(np.float32)
+    episode.terminated = terminated
+    return episode
+
+
+@given(st.lists(st.tuples(numbers, numbers), min_size=1, max_size=30), numbers, st.floats(0, 1))
+def test_advantages_are_the_sums_of_the_paper(pairs, last, gae_lambda):
+    gamma = 0.9
+    rewards, values = [p[0] for p in pairs], np.array([p[1] for p in pairs] + [last])
+    deltas = [r + gamma * values[t + 1] - values[t] for t, r in enumerate(rewards)]
+    expected = [
+        sum((gamma * gae_lambda) ** k * delta for k, delta in enumerate(deltas[t:]))
+        for t in range(len(deltas))
+    ]
+    found = generalised_advantages(rewards, values, gamma, gae_lambda)
+    assert found == pytest.approx(expected, abs=1e-9)
+
+
+def test_with_lambda_1_they_are_returns_less_the_baseline():
+    values = np.array([1.0, 2.0, 3.0, 0.0])
+    found = generalised_advantages([1.0, 1.0, 1.0], values, 0.5, 1.0)
+    assert found == pytest.approx([1.75 - 1.0, 1.5 - 2.0, 1.0 - 3.0])
+
+
+def test_a_terminated_episode_does_not_bootstrap_and_a_truncated_one_does():
+    agent = ReinforceAgent(0)
+    assert agent._values(an_episode(terminated=True))[-1] == 0.0
+    assert agent._values(an_episode(terminated=False))[-1] != 0.0
+
+
+def test_the_policy_starts_uniform_and_acting_agrees_with_the_network():
+    agent = ReinforceAgent(3, scale=(0.4, 1.0, 0.2, 2.0))
+    observation = np.array([0.1, -0.3, 0.05, 0.7], np.float32)
+    assert agent.probabilities(observation).tolist() == [0.5, 0.5]
+    agent.learn(an_episode())
+    scaled = torch.from_numpy(observation / np.array([0.4, 1.0, 0.2, 2.0], np.float32))
+    expected = agent.policy(scaled.unsqueeze(0))[0].tolist()
+    assert agent.probabilities(observation) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("hidden", [0, 7])
+@pytest.mark.parametrize("normalize", [False, True])
+@pytest.mark.parametrize(("size", "actions"), [(4, 2), (6, 3), (1, 5)])
+def test_any_observations_and_actions(hidden, normalize, size, actions):
+    settings = ReinforceSettings(
+        policy_hidden=hidden, normalize_observations=normalize, value_epochs=2
+    )
+    agent = ReinforceAgent(1, (0.5,) * size, settings, actions)
+    assert agent.probabilities(np.ones(size, np.float32)) == pytest.approx([1 / actions] * actions)
+    for seed in range(3):
+        agent.learn(an_episode(30, seed, size=size, actions=actions))
+    observation = np.random.default_rng(0).normal(size=size).astype(np.float32)
+    expected = agent.policy(agent._seen([observation]))[0].tolist()
+    found = agent.probabilities(observation)
+    assert found == pytest.approx(expected, abs=1e-6)
+    assert agent.act_greedily(observation) == int(np.argmax(found))
+    drawn = np.bincount([agent.act(observation) for _ in range(4000)], minlength=actions)
+    assert drawn / 4000 == pytest.approx(found, abs=0.04)
+
+
+def test_observations_are_normalised_by_what_was_seen_before():
+    agent = ReinforceAgent(0, settings=ReinforceSettings(normalize_observations=True))
+    episode = an_episode(200)
+    first = agent._seen(episode.observations)
+    assert torch.equal(first, torch.from_numpy(np.stack(episode.observations)))
+    episode.observations = [5.0 + 3.0 * each for each in episode.observations]
+    agent.learn(episode)
+    seen = agent._seen(episode.observations).numpy()
+    assert seen.mean(0) == pytest.approx([0.0] * 4, abs=1e-4)
+    assert seen.std(0) == pytest.approx([1.0] * 4, abs=1e-4)
+
+
+def test_entropy_draws_towards_a_uniform_policy():
+    chances = []
+    for weight in (0.0, 5.0):
+        agent = ReinforceAgent(0, settings=ReinforceSettings(entropy_coefficient=weight))
+        for _ in range(30):
+            agent.learn(an_episode())
+        chances.append(agent.probabilities(an_episode().observations[0]).max())
+    assert chances[1] < chances[0]
+
+
+@pytest.mark.parametrize("episodes", [1, 3])
+def test_it_goes_on_from_its_state_to_the_same_bits(episodes):
+    settings = ReinforceSettings(batch_episodes=2, policy_hidden=3, normalize_observations=True)
+    agents = [ReinforceAgent(seed, settings=settings) for seed in (1, 2)]
+    for seed in range(episodes):
+        agents[0].learn(an_episode(seed=seed))
+    agents[1].load_state_dict(copy.deepcopy(agents[0].state_dict()))
+    observation = an_episode().observations[0]
+    for agent in agents:
+        for seed in range(3):
+            agent.learn(an_episode(seed=10 + seed))
+    assert [agents[0].act(observation) for _ in range(50)] == [
+        agents[1].act(observation) for _ in range(50)
+    ]
+    for ours, theirs in zip(agents[0].value.parameters(), agents[1].value.parameters(), strict=True):
+        assert torch.equal(ours, theirs)
+
+
+def test_a_batch_updates_with_its_last_episode():
+    agent = ReinforceAgent(0, settings=ReinforceSettings(batch_episodes=3))
+    before = agent.policy.fc.weight.detach().clone()
+    for seed in range(2):
+        assert agent.learn(an_episode(seed=seed)) is None
+    assert torch.equal(agent.policy.fc.weight, before)
+    assert agent.learn(an_episode(seed=2)) is not None
+    assert not torch.equal(agent.policy.fc.weight, before)
+
+
+def test_the_same_seed_learns_the_same_bits():
+    agents = [ReinforceAgent(5) for _ in range(2)]
+    for agent in agents:
+        for seed in range(4):
+            agent.learn(an_episode(seed=seed))
+    for ours, theirs in zip(agents[0].value.parameters(), agents[1].value.parameters(), strict=True):
+        assert torch.equal(ours, theirs)
+
+
+@pytest.mark.parametrize("normalize", [False, True])
+def test_a_batch_is_one_step_down_the_gradient_of_the_paper(normalize):
+    """By NumPy alone: advantages, their normalisation, the policy's gradient, both losses."""
+    scale, gamma, gae_lambda = np.array([0.5, 1.0, 2.0, 4.0]), 0.9, 0.8
+    settings = ReinforceSettings(gamma=gamma, gae_lambda=gae_lambda, batch_episodes=3,
+                                 value_epochs=0, normalize_observations=normalize)  # fmt: skip
+    agent = ReinforceAgent(2, scale.tolist(), settings, actions=3)
+    for seed in range(3):  # so that weights and statistics aren't those of the beginning
+        agent.learn(an_episode(15, seed, actions=3))
+    seen = np.array([o for seed in range(3) for o in an_episode(15, seed, actions=3).observations])
+    mean, deviation = (seen / scale).mean(0), (seen / scale).std(0)
+    weight, bias = (each.detach().double().numpy() for each in (agent.policy.fc.weight, agent.policy.fc.bias))
+    batch = [an_episode(9 + seed, seed, terminated=seed != 4, actions=3) for seed in (3, 4, 5)]
+    inputs, actions, advantages, targets, estimates = [], [], [], [], []
+    for episode in batch:
+        states = np.array(episode.states()) / scale
+        states = (states - mean) / deviation if normalize else states
+        with torch.no_grad():
+            values = agent.value(torch.tensor(states, dtype=torch.float32))[:, 0].double().numpy()
+        values[-1] *= not episode.terminated
+        for t in range(episode.length):
+            advantage = sum(
+                (gamma * gae_lambda) ** (k - t)
+                * (episode.rewards[k] + gamma * values[k + 1] - values[k])
+                for k in range(t, episode.length)
+            )
+            advantages.append(advantage)
+            targets.append(advantage + values[t])
+        inputs.extend(states[:-1])
+        actions.extend(episode.actions)
+        estimates.extend(values[:-1])
+    inputs, advantages = np.array(inputs), np.array(advantages)
+    advantages = (advantages - advantages.mean()) / advantages.std()
+    chances = np.exp(inputs @ weight.T + bias)
+    chances /= chances.sum(1, keepdims=True)
+    chosen = np.eye(3)[actions]
+    slope = -((chosen - chances) * advantages[:, None]).T @ inputs / len(inputs)  # (3, 4)
+    for episode in batch:
+        losses = agent.learn(episode)
+    assert agent.policy.fc.weight.grad.numpy() == pytest.approx(slope, abs=1e-5)
+    assert losses.policy == pytest.approx(-np.mean(np.log((chances * chosen).sum(1)) * advantages), abs=1e-5)
+    assert losses.value == pytest.approx(np.mean((np.array(estimates) - targets) ** 2), rel=1e-4)
+
+
+def decided(entropy_coefficient, weight):
+    """An agent that is so sure of itself that the other action's chance is 0, or nearly."""
+    agent = ReinforceAgent(0, settings=ReinforceSettings(entropy_coefficient=entropy_coefficient))
+    with torch.no_grad():
+        agent.policy.fc.weight[:] = torch.tensor([[weight] * 4, [-weight] * 4])
+    agent.sync()
+    return agent
+
+
+def test_entropy_of_a_policy_that_is_sure_has_a_gradient():
+    agent, episode = decided(0.1, 60.0), an_episode(50)
+    episode.actions = [agent.act_greedily(each) for each in episode.observations]
+    agent.learn(episode)
+    assert all(weight.isfinite().all() for weight in agent.policy.parameters())
+
+
+def test_a_gradient_that_is_no_number_changes_nothing():
+    agent, episode = decided(0.0, 11.5), an_episode(3)
+    episode.observations = [np.ones(4, np.float32) for _ in episode.observations]
+    episode.actions = [0, 0, 1]  # of a chance whose inverse is beyond float32
+    before = copy.deepcopy(agent.state_dict())
+    with pytest.raises(WorkbenchError, match="gradient isn't finite"):
+        agent.learn(episode)
+    after = agent.state_dict()
+    for name in ("policy", "value"):
+        assert all(torch.equal(after[name][key], before[name][key]) for key in before[name])
+    assert after["batch"] == before["batch"] == []
+
+
+def test_a_loss_that_is_no_number_changes_nothing():
+    agent, episode = ReinforceAgent(0), an_episode()
+    before = [p.detach().clone() for p in (*agent.policy.parameters(), *agent.value.parameters())]
+    episode.rewards[3] = math.nan
+    with pytest.raises(WorkbenchError, match="loss is nan"):
+        agent.learn(episode)
+    after = [*agent.policy.parameters(), *agent.value.parameters()]
+    assert all(torch.equal(a, b) for a, b in zip(after, before, strict=True))
+
+
+def test_an_episode_that_is_not_over_is_refused():
+    episode = an_episode()
+    episode.final_observation = None
+    with pytest.raises(ValueError, match="isn't over"):
+        ReinforceAgent(0).learn(episode)
+
+
+def test_it_learns_on_a_fake_plant_and_stops_when_it_is_done():
+    history = History()
+    torch.set_num_threads(1)
+    train(CartPoleEnv(FakePlant()), ReinforceAgent(1), 60, history, [], stop_at=2000.0)
+    first, last = np.mean(history.lengths[:20]), np.mean(history.lengths[-20:])
+    assert last > 1.2 * first
+
+
+def test_it_is_done_when_twenty_episodes_in_a_row_lasted_long_enough():
+    assert not is_complete(History(lengths=[300] * 19), 600, 10.0)
+    assert is_complete(History(lengths=[1] * 9 + [10] * 20), 600, 10.0)
+    assert not is_complete(History(lengths=[300] * 20 + [9] * 20), 600, 10.0)
+    assert is_complete(History(lengths=[1] * 600), 600, 10.0)
+
+
+def test_the_loop_tells_how_an_episode_ended():
+    episode = run_episode(CartPoleEnv(FakePlant()), ReinforceAgent(0), lambda: False)
+    assert episode.terminated
+    assert episode.final_observation.shape == (4,)
+    short = CartPoleEnv(FakePlant(), BalanceTask(max_steps=3))
+    assert not run_episode(short, ReinforceAgent(0), lambda: False).terminated
+
+
+def test_the_loop_keeps_observations_that_an_environment_writes_over():
+    class Writing(gymnasium.ObservationWrapper):
+        def observation(self, observation):
+            self.array = getattr(self, "array", observation.copy())
+            self.array[:] = observation
+            return self.array
+
+    env = CartPoleEnv(FakePlant())
+    plain, written = (run_episode(each, ReinforceAgent(0), lambda: False) for each in (env, Writing(env)))
+    assert np.array_equal(plain.states(), written.states())

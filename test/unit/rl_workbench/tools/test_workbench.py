@@ -1,0 +1,323 @@
+"""The commands of workbench.py on small trainings: what they print, write and refuse."""
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import workbench_runs
+from PIL import Image
+
+from rl_workbench import cli
+
+pytestmark = pytest.mark.usefixtures("signals")
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs")
+    workbench_runs.dqn(folder / "dqn_0")
+    workbench_runs.dqn(folder / "dqn_1", seed=1)
+    workbench_runs.dqn(folder / "robot", env_id="cartpole/Classic-v0", total_timesteps=200)
+    workbench_runs.policy_gradient(folder / "pg")
+    workbench_runs.policy_gradient(folder / "gae", algorithm="gae")
+    return folder
+
+
+@pytest.fixture
+def own(runs: Path, tmp_path: Path) -> Path:
+    """A copy of a run that a test may damage."""
+    return Path(shutil.copytree(runs / "dqn_0", tmp_path / "own"))
+
+
+def work(*arguments: object) -> int:
+    return cli.main([str(each) for each in arguments])
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """The one line that a command says when it fails."""
+    assert work(*arguments) == 1
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert "Traceback" not in lines[-1] and lines[-1].startswith("workbench.py: ")
+    return lines[-1]
+
+
+ALL = ["dqn_0", "robot", "pg", "gae"]
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_eval_tells_every_episode_and_writes_json(
+    runs: Path, tmp_path: Path, name: str, capsys
+) -> None:
+    out = tmp_path / "eval.json"
+    assert work("eval", runs / name, "--episodes", 3, "--json", out) == 0
+    found = json.loads(out.read_text())
+    told = capsys.readouterr().out
+    assert told.count("| return") == 3 and f"mean {found['mean']:.2f} ±" in told
+    assert found["mean"] == pytest.approx(np.mean(found["returns"]))
+    assert found["std"] == pytest.approx(np.std(found["returns"]))
+    assert len(found["lengths"]) == 3 and Path(found["checkpoint"]).exists()
+
+
+def test_eval_repeats_itself_and_its_seed_counts(runs: Path, capsys) -> None:
+    figures = []
+    for seed in (0, 0, 1):
+        work("eval", runs / "dqn_0", "--episodes", 4, "--seed", seed, "--json", "-")
+        figures.append(json.loads(capsys.readouterr().out)["returns"])
+    assert figures[0] == figures[1] != figures[2]
+
+
+def test_eval_says_whether_it_is_solved(runs: Path, capsys) -> None:
+    work("eval", runs / "dqn_0", "--episodes", 2)
+    assert "not solved: the line is 475" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("given", [["max_steps=3"], ["max_steps=3,noise=0.01"],
+                                   ["max_steps=3", "noise=0.01"]])  # fmt: skip
+def test_options_of_the_environment_reach_it(runs: Path, given: list[str], capsys) -> None:
+    work("eval", runs / "robot", "--episodes", 1, "--json", "-", "--env-kwargs", *given)
+    assert json.loads(capsys.readouterr().out)["lengths"] == [3]
+
+
+@pytest.mark.parametrize("name", ["dqn_0", "robot", "pg"])
+def test_record_writes_a_gif_without_a_display(runs: Path, tmp_path: Path, name: str) -> None:
+    out = tmp_path / "film.gif"
+    assert work("record", runs / name, "--out", out, "--max-steps", 40, "--scale", 0.5) == 0
+    with Image.open(out) as film:
+        assert film.format == "GIF" and film.n_frames > 1
+        seen = []
+        for index in range(film.n_frames):
+            film.seek(index)
+            seen.append(np.array(film.convert("RGB")))
+            assert film.info["duration"] >= 20
+    assert any((seen[0] != each).any() for each in seen), "something moves"
+    assert len(np.unique(seen[0].reshape(-1, 3), axis=0)) > 2, "there is something to see"
+
+
+@pytest.mark.extras("imageio_ffmpeg")
+@pytest.mark.parametrize("name", ["dqn_0", "robot"])
+def test_record_writes_an_mp4_that_can_be_read(runs: Path, tmp_path: Path, name: str) -> None:
+    import imageio_ffmpeg
+
+    out = tmp_path / "film.mp4"
+    assert work("record", runs / name, "--out", out, "--max-steps", 20) == 0
+    frames = imageio_ffmpeg.read_frames(str(out))
+    about = next(frames)
+    assert about["size"][0] > 100 and about["codec"] == "h264"
+    assert len(list(frames)) >= 3
+
+
+def test_enjoy_without_a_display_says_so(runs: Path, monkeypatch, capsys) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    line = refused(capsys, "enjoy", runs / "dqn_0")
+    assert "DISPLAY isn't set" in line and "record" in line
+
+
+@pytest.mark.parametrize("over", ["episodes", "steps"])
+def test_plot_draws_runs_of_every_kind(runs: Path, tmp_path: Path, over: str) -> None:
+    out = tmp_path / "plot.png"
+    chosen = [runs / name for name in ALL]
+    assert work("plot", *chosen, "--over", over, "--out", out) == 0
+    with Image.open(out) as picture:
+        assert picture.format == "PNG" and picture.size == (1100, 550)
+
+
+def test_runs_in_a_picture_can_be_told_apart(tmp_path: Path) -> None:
+    from rl_workbench.tools.pictures.training_curves import training_curves
+    from rl_workbench.tools.runs.runs import open_run
+
+    kinds = [{}, {"seed": 1}, {"env_id": "cartpole/Classic-v0"}, {"env_id": "cartpole/Classic-v0"}]
+    folders = [
+        workbench_runs.record(tmp_path / f"run_{index}", [1.0, 2.0], **kind)
+        for index, kind in enumerate(kinds)
+    ]
+    runs = [open_run(folder) for folder in folders]
+    for chosen in (runs[:2], runs[:3], runs):
+        axes = training_curves(chosen, "episodes").axes[0]
+        names = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert len(set(names)) == len(chosen) + 1, "and the line from which it is solved"
+        (line,) = [each for each in axes.lines if each.get_linestyle() == "--"]
+        bold = [each.get_color() for each in axes.lines if each.get_linewidth() == 2.0]
+        assert len(set(bold)) == len(chosen) and line.get_color() not in bold
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_policy_draws_the_plane(runs: Path, tmp_path: Path, name: str) -> None:
+    out = tmp_path / "policy.png"
+    assert work("policy", runs / name, "--out", out) == 0
+    with Image.open(out) as picture:
+        assert picture.format == "PNG"
+
+
+def test_policy_refuses_other_environments(tmp_path: Path, capsys) -> None:
+    run = workbench_runs.record(tmp_path / "run", [1.0], env_id="Acrobot-v1")
+    line = refused(capsys, "policy", run, "--out", tmp_path / "a.png")
+    assert "Acrobot-v1" in line and "CartPole-v1" in line
+
+
+def test_compare_has_every_run_in_its_table(runs: Path, tmp_path: Path, capsys) -> None:
+    out, figures = tmp_path / "curves.png", tmp_path / "compare.json"
+    assert work("compare", runs, "--episodes", 2, "--out", out, "--json", figures) == 0
+    told = capsys.readouterr().out
+    groups = json.loads(figures.read_text())["groups"]
+    assert {row["run"] for group in groups.values() for row in group["runs"]} == {
+        path.name for path in runs.iterdir()
+    }
+    both = groups["dqn in CartPole-v1"]
+    assert [row["seed"] for row in both["runs"]] == [0, 1] and both["statistics"]["n"] == 2
+    assert "needs two seeds" in told, "one seed alone has no interval"
+    assert Image.open(out).format == "PNG"
+
+
+def test_a_failed_run_stays_in_the_table(runs: Path, tmp_path: Path, capsys) -> None:
+    workbench_runs.record(tmp_path / "lost", [5.0, 7.0], seed=3)
+    patterns = [runs / "dqn_*", tmp_path / "lost"]
+    assert work("compare", *patterns, "--episodes", 1) == 0
+    told = capsys.readouterr().out
+    row = next(line for line in told.splitlines() if "| 3 |" in line)
+    assert "it has no checkpoint yet" in row
+    assert "2 of 3 (see remarks)" in told
+
+
+def test_compare_by_training_needs_no_checkpoint(tmp_path: Path, capsys) -> None:
+    for seed, value in enumerate((10.0, 20.0, 30.0, 400.0)):
+        workbench_runs.record(tmp_path / f"run_{seed}", [value] * 5, seed=seed)
+    assert work("compare", tmp_path, "--episodes", 0) == 0
+    assert "| 115.0 ± 190.2 | 25.0 | 25.0 |" in capsys.readouterr().out
+
+
+# Bad input: one line each, and an exit code.
+
+
+def test_no_run_folder(tmp_path: Path, capsys) -> None:
+    assert "there is no such folder" in refused(capsys, "eval", tmp_path / "nowhere")
+    assert "it has no config.json" in refused(capsys, "eval", tmp_path)
+    assert "no run folder at" in refused(capsys, "plot", tmp_path, "--out", tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"algorithm": "dqn", "run": 3}'])
+def test_a_foreign_record(tmp_path: Path, text: str, capsys) -> None:
+    (tmp_path / "config.json").write_text(text)
+    refused(capsys, "eval", tmp_path)
+
+
+def test_a_damaged_run_costs_no_other(tmp_path: Path, capsys) -> None:
+    workbench_runs.record(tmp_path / "good", [1.0, 2.0])
+    (tmp_path / "damaged").mkdir()
+    (tmp_path / "damaged" / "config.json").write_text("{")
+    assert work("compare", tmp_path, "--episodes", 0) == 0
+    assert work("plot", str(tmp_path / "*"), "--out", tmp_path / "a.png") == 0
+    out, err = capsys.readouterr()
+    assert "| good |" in out and err.count("config.json isn't JSON") == 2
+    assert "isn't JSON" in refused(capsys, "compare", tmp_path / "damaged")
+
+
+def test_a_damaged_checkpoint_gives_way_to_an_earlier_one(own: Path, capsys) -> None:
+    (own / "best.pt").write_bytes(b"PK half a file")
+    assert work("eval", own, "--episodes", 1, "--json", "-") == 0
+    out, err = capsys.readouterr()
+    assert "best.pt is damaged, or no checkpoint; taking an earlier one" in err
+    assert json.loads(out)["checkpoint"].endswith("last.pt")
+
+
+def test_without_any_good_checkpoint(own: Path, capsys) -> None:
+    for path in own.rglob("*.pt"):
+        path.write_bytes(b"")
+    assert "none of its checkpoints can be read" in refused(capsys, "eval", own)
+    for path in own.rglob("*.pt"):
+        path.unlink()
+    assert "no checkpoint yet" in refused(capsys, "eval", own)
+
+
+def test_options_of_the_environment_that_cannot_be_read(runs: Path, capsys) -> None:
+    line = refused(capsys, "eval", runs / "robot", "--env-kwargs", "max_steps")
+    assert "KEY=VALUE" in line
+
+
+def test_no_episodes_yet(tmp_path: Path, capsys) -> None:
+    run = workbench_runs.record(tmp_path / "run", [])
+    assert "no episode has ended yet" in refused(capsys, "plot", run, "--out", tmp_path / "a.png")
+    out = tmp_path / "b.png"
+    assert "no episode has ended" in refused(capsys, "compare", run, "--out", out)
+    assert not out.exists()
+
+
+def test_a_line_that_is_only_half_written_is_left_out(tmp_path: Path) -> None:
+    run = workbench_runs.record(tmp_path / "run", [1.0, 2.0])
+    with (run / "scalars.csv").open("a") as file:
+        file.write("30,charts/episodic_return,3")
+    assert work("plot", run, "--out", tmp_path / "a.png") == 0
+
+
+def test_a_foreign_table(tmp_path: Path, capsys) -> None:
+    run = workbench_runs.record(tmp_path / "run", [1.0])
+    (run / "scalars.csv").write_text("a,b\n1,2\n")
+    line = refused(capsys, "plot", run, "--out", tmp_path / "a.png")
+    assert "isn't the table of a training" in line
+
+
+@pytest.mark.parametrize("name", ["evla", "reccord", "nonsense"])
+def test_an_unknown_command(name: str, capsys) -> None:
+    with pytest.raises(SystemExit) as ended:
+        work(name)
+    assert ended.value.code == 2
+    assert "unknown command" in capsys.readouterr().err
+
+
+def test_the_nearest_command_is_named(capsys) -> None:
+    with pytest.raises(SystemExit):
+        work("evla")
+    assert "did you mean eval?" in capsys.readouterr().err
+
+
+def test_roslaunchs_arguments_are_left_out(runs: Path) -> None:
+    extra = ["__name:=workbench", "__log:=/tmp/log"]
+    assert work("eval", runs / "dqn_0", "--episodes", 1, *extra) == 0
+
+
+@pytest.mark.parametrize("name", ["film.avi", "film"])
+def test_a_film_of_another_format(runs: Path, tmp_path: Path, name: str, capsys) -> None:
+    line = refused(capsys, "record", runs / "dqn_0", "--out", tmp_path / name)
+    assert ".gif or .mp4" in line
+
+
+def test_a_picture_of_another_format(runs: Path, tmp_path: Path, capsys) -> None:
+    assert "PNG" in refused(capsys, "plot", runs / "dqn_0", "--out", tmp_path / "a.jpg")
+
+
+def test_an_older_file_is_replaced_as_a_whole(runs: Path, tmp_path: Path, monkeypatch) -> None:
+    out = tmp_path / "a.gif"
+    out.write_bytes(b"older")
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", full)
+        assert work("record", runs / "dqn_0", "--out", out, "--max-steps", 5) == 1
+    assert out.read_bytes() == b"older" and list(tmp_path.iterdir()) == [out]
+    assert work("record", runs / "dqn_0", "--out", out, "--max-steps", 5) == 0
+    assert out.read_bytes().startswith(b"GIF89a") and list(tmp_path.iterdir()) == [out]
+
+
+def test_a_place_where_nothing_can_be_written(runs: Path, tmp_path: Path, capsys) -> None:
+    (tmp_path / "file").write_text("")
+    for arguments in (
+        ["record", runs / "dqn_0", "--out", tmp_path / "file" / "a.gif"],
+        ["policy", runs / "dqn_0", "--out", tmp_path / "file" / "a.png"],
+        ["compare", runs, "--json", tmp_path / "file" / "a.json"],
+        ["eval", runs / "dqn_0", "--json", tmp_path],
+    ):
+        assert "can't write" in refused(capsys, *arguments)
+
+
+def test_an_extra_that_is_missing(runs: Path, tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    for arguments in (
+        ["record", runs / "dqn_0", "--out", tmp_path / "a.mp4"],
+        ["sweep", "--out", tmp_path / "sweep"],
+        ["train", "--algo", "ppo"],
+    ):
+        assert "./ws extras" in refused(capsys, *arguments)

@@ -1,0 +1,327 @@
+"""`workbench.py benchmark`: suites, trainings as processes, tables that leave no failure out."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import pytest
+import workbench_runs
+
+from rl_workbench import cli
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools.benchmark import benchmark, trainings
+from rl_workbench.tools.benchmark.benchmark import Row, examine, summary_table
+from rl_workbench.tools.benchmark.suites import (
+    CONFIG,
+    arguments,
+    check_stable_baselines3,
+    default_file,
+    make_variant,
+    read_suite,
+)
+from rl_workbench.tools.benchmark.trainings import Job, Trainings
+from rl_workbench.training.run import folder as run_folder
+from rl_workbench.training.run.interrupt import Interrupt
+
+pytestmark = pytest.mark.usefixtures("signals")
+
+QUICK = {"total_timesteps": 300, "learning_starts": 50, "batch_size": 8, "hidden_sizes": [8],
+         "eval_frequency": 150, "eval_episodes": 1, "confirm_episodes": 1}  # fmt: skip
+SUITE = """
+two:
+  about: Two ways.
+  seeds: 1
+  common: {total_timesteps: 300, learning_starts: 50, batch_size: 8, hidden_sizes: [8, 4],
+           eval_frequency: 150, eval_episodes: 1, confirm_episodes: 1}
+  variants:
+    plain: {double: false, env_kwargs: {sutton_barto_reward: true}}
+    broken: {env_id: NoSuch-v0}
+"""
+
+
+@pytest.fixture
+def suites(tmp_path: Path) -> Path:
+    path = tmp_path / "suites.yaml"
+    path.write_text(SUITE)
+    return path
+
+
+def job(folder: Path, seed: int = 0, **options: object) -> Job:
+    return Job(make_variant("test", "quick", {**QUICK, **options}), seed, folder / f"seed_{seed}")
+
+
+def test_every_suite_of_the_package_has_options_that_exist() -> None:
+    import yaml
+
+    for name in yaml.safe_load(default_file(CONFIG).read_text()):
+        suite = read_suite(name)
+        assert suite.variants and suite.about
+
+
+def test_a_suite_gives_tables_with_every_seed_and_every_failure(
+    suites: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    command = ["benchmark", "two", f"--suites={suites}", f"--out={out}", "--episodes=2", "--jobs=2"]
+    assert cli.main(command) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"broken, seed 0: ended with exit code 1, .*unknown environment 'NoSuch-v0'", said)
+    rows = {row["variant"]: row for row in json.loads((out / "results.json").read_text())["runs"]}
+    assert rows["plain"]["steps"] == 300 and rows["plain"]["best"] is not None
+    assert rows["plain"]["cpu_seconds"] > 0
+    config = json.loads((out / "plain/seed_0/config.json").read_text())
+    assert config["dqn"]["hidden_sizes"] == [8, 4] and not config["dqn"]["double"]
+    assert config["run"]["env_kwargs"] == {"sutton_barto_reward": True}
+    assert config["run"]["exp_name"] == "plain"
+    assert rows["broken"]["best"] is None and "no run folder" in rows["broken"]["fault"]
+    text = (out / "results.md").read_text()
+    assert "| plain | 0 of 1 |" in text and "| broken | 0 of 1, 1 failed |" in text
+    for name in ("curves.png", "evaluations.png"):
+        assert (out / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_an_interrupted_benchmark_goes_on_where_it_was(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    params = [f"{key}={value}" for key, value in QUICK.items() if key != "hidden_sizes"]
+    params += ["hidden_sizes=8", "total_timesteps=20000000"]
+    command = [sys.executable, "-m", "rl_workbench", "benchmark", f"--out={out}",
+               "--seeds=1", "--params", *params]  # fmt: skip
+    run = out / "dqn__CartPole-v1/seed_0"
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=dict(os.environ))
+    try:
+        while not (run / "last.pt").exists():
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.send_signal(signal.SIGTERM)  # to the benchmark alone: it has to end its training
+        said, _ = process.communicate()
+    finally:
+        process.kill()
+    assert process.returncode == 143 and "interrupted; the same command goes on" in said
+    first = json.loads((run / "summary.json").read_text())
+    assert first["interrupted"] and not first["complete"]
+    same = Job(make_variant("t", "t", {}), 0, run)
+    assert not same.is_done() and trainings.command(same)[-1] == f"--resume={run}"
+
+
+def test_a_folder_of_other_options_is_refused(
+    suites: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "suite.json").write_text("[]")
+    assert cli.main(["benchmark", "two", f"--suites={suites}", f"--out={out}"]) == 1
+    assert "runs with other options" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["ablatoin_tuned"], "did you mean ablation_tuned"),
+        (["--params", "gama=0.9"], "did you mean gamma"),
+        (["cartpole", "--env-id", "CartPole-v1"], "a suite says itself"),
+        (["cartpole", "--algo", "dqn"], "a suite says itself"),
+        (["--suites", "mine.yaml"], "which suite of mine.yaml"),
+        (["--algo", "pg", "--params", "gama=0.9"], "did you mean gamma"),
+        (["--algo", "pg", "--params", "preset=tutorial"], "unknown option 'preset'"),
+        (["--params", "seed=3"], "seed is given by the benchmark"),
+    ],
+)
+def test_wrong_input_is_a_line(
+    arguments: list[str], line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["benchmark", *arguments, f"--out={tmp_path / 'out'}"]) == 1
+    assert line in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("variants: {}", "a suite has variants"),
+        ("variant: {a: {}}", "a suite has variants"),
+        ("variants: {a: {algo: dqm}}", "algo is one of"),
+        ("variants: {a: 3}", "s: a has options"),
+        ("variants: {a: {gamma: .nan}}", "s: a has options with plain values"),
+        ("variants: {a: {env_kwargs: {since: 2020-01-01}}}", "s: a has options with plain values"),
+        ("{variants: {a: {}}, common: [gamma]}", "common has options"),
+        ("{variants: {a: {}}, seeds: many}", "seeds is a number from 1"),
+        ("{variants: {a: {}}, seeds: 0}", "seeds is a number from 1"),
+        ("variants: {../../a: {}}", "a variant's name is"),
+        ("variants: {..: {}}", "a variant's name is"),
+        ("variants: {a: {algo: pg, value_epoch: 3}}", "s: a: .*did you mean value_epochs"),
+        ("variants: {a: {gamma: high}}", "s: a: gamma must be a number"),
+    ],
+)
+def test_a_suite_that_makes_no_sense_is_refused(content: str, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "suites.yaml"
+    path.write_text(f"s: {content if content[0] == '{' else '{' + content + '}'}")
+    with pytest.raises(WorkbenchError, match=words):
+        read_suite("s", path)
+
+
+@pytest.mark.extras("stable_baselines3")
+def test_options_that_stable_baselines3_does_not_know_are_refused_before_anything_is_trained(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["benchmark", "--algo=ppo", f"--out={tmp_path / 'out'}", "--params", "n_stepz=64"]
+    assert cli.main(command) == 1
+    assert "did you mean n_steps" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    check_stable_baselines3(make_variant("t", "a", {"algo": "ppo", "target_kl": None, "n_steps": 64}))
+
+
+def test_a_failed_training_stays_in_the_table(tmp_path: Path) -> None:
+    one = job(tmp_path)
+    workbench_runs.record(one.folder, [20.0] * 30)
+    (one.folder / "summary.json").write_text(
+        json.dumps({"complete": False, "failure": "the loss is nan", "returns": [20.0] * 30})
+    )
+    row = examine(one, 2, lambda text: None)
+    assert row.best is None and row.fault.startswith("the loss is nan")
+    assert row.avg20 == pytest.approx(20.0)
+
+
+def test_figures_that_cannot_be_read_are_faults(tmp_path: Path) -> None:
+    one = job(tmp_path)
+    workbench_runs.record(one.folder, [20.0] * 30)
+    (one.folder / "scalars.csv").write_text("a,b\n1,2\n")
+    row = examine(one, 2, lambda text: None)
+    assert row.fault.count("isn't the table of a training") == 1 and "no policy" in row.fault
+
+
+def test_pauses_are_no_part_of_the_seconds_to_solve(tmp_path: Path) -> None:
+    one = job(tmp_path)
+    workbench_runs.record(one.folder, [20.0] * 30)
+    config = json.loads((one.folder / "config.json").read_text())
+    (one.folder / "config.json").write_text(json.dumps({**config, "began": 1000.0}))
+    with (one.folder / "scalars.csv").open("a") as file:
+        file.write("300,eval/mean_reward,475.0,1200.0\n")
+    assert examine(one, 1, lambda text: None).solved_seconds == 200.0
+    spans = [[1000.0, 1050.0], [1150.0, 1300.0], [2000.0, 2100.0]]
+    one.cost_file.write_text(json.dumps({"spans": spans}))
+    row = examine(one, 1, lambda text: None)
+    assert (row.solved_step, row.solved_seconds) == (300, 100.0)
+    with (one.folder / "scalars.csv").open("a") as file:
+        file.write("400,eval/confirmed_reward,480.0,1250.0\n")
+    assert examine(one, 1, lambda text: None).solved_step == 400
+
+
+def row(seed: int, best: float | None, step: int | None, fault: str = "") -> Row:
+    return Row("a", seed, best, best, best, best, step, None, 100, 5, 1.0, 1.0, fault)
+
+
+def test_seeds_that_never_solve_count_as_never() -> None:
+    rows = [row(0, 475.0, 100), row(1, 500.0, 300), row(2, 20.0, None)]
+    line = summary_table(rows, {"a": 475.0}).splitlines()[2]
+    assert "| a | 2 of 3 |" in line and "| 300 | never |" in line
+
+
+def test_a_statistic_tells_how_many_seeds_it_lacks() -> None:
+    rows = [row(0, 480.0, 100), row(1, 500.0, 300), row(2, None, None, "the loss is nan")]
+    cells = summary_table(rows, {"a": 475.0}).splitlines()[2].split(" | ")
+    assert cells[1] == "2 of 3, 1 failed" and cells[2] == "490.0 ± 14.1 (2 of 3)"
+    assert all(cell.endswith(" (2 of 3)") for cell in cells[3:6])
+
+
+def test_where_there_is_no_line_nobody_has_missed_it() -> None:
+    line = summary_table([row(0, 5.0, None), row(1, 6.0, None)], {"a": None}).splitlines()[2]
+    assert "never" not in line and line.startswith("| a | - |")
+
+
+def test_a_variant_without_any_run_has_a_line_of_its_own() -> None:
+    nothing = replace(row(0, None, None, "no run folder"), seconds=None)
+    line = summary_table([nothing], {}).splitlines()[2]
+    assert line == "| a | 0 of 1, 1 failed | - | - | - | - | - | - | - | - |"
+
+
+def complete(out: Path) -> list[str]:
+    """A benchmark whose only training is done; the command that goes on with it."""
+    run = out / "dqn__CartPole-v1/seed_0"
+    workbench_runs.record(run, [20.0] * 30, exp_name="dqn__CartPole-v1")
+    (run / "summary.json").write_text(json.dumps({"complete": True, "steps": 300}))
+    variant = make_variant("t", "dqn__CartPole-v1", {"env_id": "CartPole-v1"})
+    (out / "suite.json").write_text(json.dumps([asdict(variant)]))
+    return ["benchmark", f"--out={out}", "--seeds=1", "--episodes=1"]
+
+
+def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(trainings, "command", lambda job: pytest.fail("it is done"))
+    assert cli.main(complete(tmp_path)) == 0
+    assert (tmp_path / "results.md").exists()
+
+
+def test_ctrl_c_while_policies_are_played(tmp_path: Path, monkeypatch) -> None:
+    command = complete(tmp_path)
+    assert cli.main(command) == 0
+    (tmp_path / "results.md").unlink()
+    monkeypatch.setattr(benchmark, "examine", lambda *_: os.kill(os.getpid(), signal.SIGINT))
+    assert cli.main(command) == 130
+    assert not (tmp_path / "results.md").exists()
+
+
+def test_two_benchmarks_do_not_share_a_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = complete(tmp_path)
+    with run_folder.held(tmp_path):
+        assert cli.main(command) == 1
+    assert f"a training is running in {tmp_path}" in capsys.readouterr().err
+
+
+def test_a_training_that_outlived_its_benchmark_is_left_alone(tmp_path: Path) -> None:
+    one = job(tmp_path)
+    one.folder.mkdir()
+    with run_folder.held(one.folder), pytest.raises(WorkbenchError, match="a training is running"):
+        Trainings(print).run([one], 1, Interrupt())
+    assert one.folder.exists()
+
+
+def test_a_damaged_record_costs_no_other_run_its_row(tmp_path: Path) -> None:
+    command = complete(tmp_path)
+    workbench_runs.record(tmp_path / "dqn__CartPole-v1/seed_1", [20.0] * 30)
+    (tmp_path / "dqn__CartPole-v1/seed_1/summary.json").write_text('{"complete": true}')
+    (tmp_path / "dqn__CartPole-v1/seed_1/config.json").write_text("{")
+    assert cli.main([*command, "--seeds=2"]) == 0
+    text = (tmp_path / "results.md").read_text()
+    assert "isn't JSON" in text and "0 of 2, 2 failed" in text
+
+
+def test_every_training_has_a_master_of_its_own(tmp_path: Path, monkeypatch) -> None:
+    program = "import os; print(os.environ['ROS_MASTER_URI'])"
+    monkeypatch.setattr(trainings, "command", lambda job: [sys.executable, "-c", program])
+    jobs = [job(tmp_path, seed) for seed in range(2)]
+    Trainings(lambda text: None).run(jobs, 2, Interrupt())
+    masters = {one.log.read_text().strip() for one in jobs}
+    assert len(masters) == 2 and all(each.startswith("http://127.0.0.1:") for each in masters)
+
+
+def test_ctrl_c_as_a_training_ends_by_itself(tmp_path: Path, monkeypatch) -> None:
+    """Its process number may belong to somebody else as soon as it was asked how it ended."""
+    running, interrupt, genuine = Trainings(lambda text: None), Interrupt(), os.waitid
+
+    def waited(*arguments: int) -> object:
+        result = genuine(*arguments)
+        interrupt.signal = signal.SIGINT
+        running._stop(interrupt)
+        return result
+
+    monkeypatch.setattr(trainings, "command", lambda job: ["true"])
+    monkeypatch.setattr(os, "waitid", waited)
+    one, other = (job(tmp_path, seed) for seed in range(2))
+    running.run([one, other], 1, interrupt)
+    assert interrupt.requested() and one.cost()["cpu_seconds"] >= 0.0
+    assert not other.log.read_text() and not other.cost(), "no further one begins"
+
+
+def test_the_training_is_told_all_of_its_options(tmp_path: Path) -> None:
+    variant = make_variant("t", "wide", {"preset": "tutorial", "hidden_sizes": [64, 32]})
+    told = arguments(variant, 1, tmp_path)
+    assert told[:2] == ["--algo", "dqn"]
+    assert {"--preset=tutorial", "--seed=1", "--exp-name=wide"} <= set(told)
+    assert told[told.index("--params") + 1 :] == ["hidden_sizes=[64,32]"]

@@ -1,0 +1,221 @@
+"""What ros_utils makes of its arguments: bad files, and a master that is not there."""
+
+import math
+import re
+import shlex
+import socket
+import threading
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ros_utils import (
+    ros_controllers,
+    ros_gazebo,
+    ros_launch,
+    ros_node,
+    ros_params,
+    ros_spawn,
+    ros_urdf,
+)
+from ros_utils._internal.gazebo import calls as _gazebo_calls
+
+
+@pytest.fixture
+def no_master(monkeypatch, tmp_path):
+    """A master address where nobody listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{probe.getsockname()[1]}")
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+
+
+@pytest.fixture
+def mute_master(monkeypatch, tmp_path):
+    """A master address where somebody listens and never answers."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{listener.getsockname()[1]}")
+        monkeypatch.setenv("ROS_HOME", str(tmp_path))
+        yield
+
+
+@pytest.fixture
+def parameters(tmp_path):
+    path = tmp_path / "parameters.yaml"
+    path.write_text("a: 1\n")
+    return str(path)
+
+
+CALLS = [
+    ros_params.ros_load_yaml_from_path,
+    lambda path: ros_gazebo.gazebo_pause_physics(),
+    lambda path: ros_gazebo.gazebo_get_model_state("cartpole")[3],
+    lambda path: ros_gazebo.gazebo_get_world_properties()[0],
+    lambda path: ros_gazebo.gazebo_set_model_configuration("cartpole", ["cart_pole"], [0.0]),
+    lambda path: ros_gazebo.gazebo_spawn_urdf_string("<robot name='r'/>")[0],
+    lambda path: ros_gazebo.gazebo_spawn_urdf_param("robot_description")[0],
+    lambda path: ros_controllers.spawn_controllers_srv(["joint_state_controller"], ns="/"),
+    lambda path: ros_node.ros_node_from_pkg("robot_state_publisher", "robot_state_publisher"),
+    lambda path: ros_spawn.init_robot_state_pub(max_pub_freq=10.0),
+]
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_no_master(no_master, parameters, capsys, call):
+    begin = time.monotonic()
+    assert call(parameters) is False
+    assert time.monotonic() - begin < 2.0
+    assert re.search(
+        r"no ROS master at http://127.0.0.1:\d+ \(Connection refused\)", capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize("call", [*CALLS[:2], lambda path: ros_gazebo.launch_Gazebo(gui=False)])
+def test_a_master_that_does_not_answer(mute_master, parameters, capsys, call):
+    begin = time.monotonic()
+    assert call(parameters) is False
+    assert time.monotonic() - begin < 8.0
+    assert capsys.readouterr().err.startswith("[ERROR]")
+
+
+def test_a_port_in_use_is_named(monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{server.getsockname()[1]}")
+
+        def refuse():
+            while True:
+                try:
+                    server.accept()[0].close()
+                except OSError:
+                    return
+
+        threading.Thread(target=refuse, daemon=True).start()
+        assert not ros_gazebo.launch_Gazebo()
+        server.shutdown(socket.SHUT_RDWR)
+    assert "the port is in use" in capsys.readouterr().err
+
+
+def test_a_master_uri_that_is_none(monkeypatch, capsys):
+    monkeypatch.setenv("ROS_MASTER_URI", "localhost")
+    assert not ros_gazebo.gazebo_pause_physics()
+    assert "ROS_MASTER_URI is 'localhost'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("a: [1\nb: 2\n", r"line 2, column 2: .*expected"),
+        ("- 1\n- 2\n", "expected .*found list"),
+        ("hello\n", "expected .*found str"),
+        ("", "no parameters"),
+        ("a: 1\n---\n- 2\n", "expected .*found list"),
+        ("a: !!python/object:os.system 1\n", "line 1"),
+    ],
+)
+def test_a_broken_yaml_file(tmp_path, capsys, text, error):
+    path = tmp_path / "broken.yaml"
+    path.write_text(text)
+    assert ros_params.ros_load_yaml_from_path(str(path)) is False
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    assert re.search(re.escape(str(path)) + ": " + error, printed)
+
+
+XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">{}</robot>'
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("<robot>", "line 1"),
+        (XACRO.format("${1/0}"), "division by zero"),
+        (XACRO.format("${nix}"), "nix"),
+        (XACRO.format("$(find nix_pkg)"), "package 'nix_pkg' not found"),
+        (XACRO.format('<xacro:include filename="nix.xacro"/>'), "nix.xacro"),
+        (XACRO.format("$(arg nix)"), "nix"),
+    ],
+)
+def test_a_broken_xacro_file(tmp_path, capsys, text, error):
+    path = tmp_path / "broken.xacro"
+    path.write_text(text)
+    assert ros_urdf.urdf_parse_from_path(str(path)) is None
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    assert str(path) in printed
+    assert error in printed
+
+
+def test_xacro_arguments(tmp_path, capsys):
+    path = tmp_path / "arm.xacro"
+    path.write_text(XACRO.format('<xacro:arg name="size" default="1"/><link name="l$(arg size)"/>'))
+    assert 'name="l1"' in ros_urdf.urdf_parse_from_path(str(path))
+    assert 'name="l7"' in ros_urdf.urdf_parse_from_path(str(path), ["size:=7"])
+    assert ros_urdf.urdf_parse_from_path(str(path), ["size=7"]) is None
+    assert "expected 'name:=value'" in capsys.readouterr().err
+
+
+def test_packages_and_files_that_do_not_exist(capsys):
+    assert ros_urdf.urdf_parse_from_pkg("nix_pkg", "r.urdf") is None
+    assert ros_params.ros_load_yaml_from_pkg("nix_pkg", "c.yaml") is False
+    assert ros_launch.ros_launch_from_pkg("rospy", "nix.launch") is False
+    assert ros_launch.ros_launch_from_path("/nix.launch") is False
+    assert ros_node.ros_node_from_pkg("nix_pkg", "nix") is False
+    assert ros_node.ros_node_from_pkg("rospy", "nix") is False
+    assert ros_gazebo.gazebo_spawn_urdf_path("/nix.urdf") == (
+        False,
+        "/nix.urdf: can't be read or expanded",
+    )
+    assert capsys.readouterr().err.count("[ERROR]") == 7
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"custom_world_pkg": "nix_pkg", "custom_world_name": "w.world"},
+        {"custom_world_pkg": "gazebo_ros", "custom_world_name": "nix.world"},
+        {"custom_world_pkg": "gazebo_ros"},
+        {"custom_world_path": "/nix.world"},
+    ],
+)
+def test_worlds_that_do_not_exist(no_master, capsys, arguments):
+    assert not ros_gazebo.launch_Gazebo(**arguments)
+    assert capsys.readouterr().err.startswith("[ERROR] launch_Gazebo: ")
+
+
+def test_bad_node_arguments(capsys):
+    executable = ("robot_state_publisher", "robot_state_publisher")
+    assert not ros_node.ros_node_from_pkg(*executable, args="it's")
+    assert "No closing quotation" in capsys.readouterr().err
+    assert not ros_node.ros_node_from_pkg(*executable, name="a/b")
+    assert "'a/b'" in capsys.readouterr().err
+
+
+@given(st.lists(st.text()))
+def test_node_arguments_as_string_and_list_are_the_same(arguments):
+    assert ros_node._arguments(shlex.join(arguments)) == ros_node._arguments(arguments) == arguments
+
+
+@given(st.lists(st.sampled_from(["/", "a", "b_1"])).map("".join))
+def test_a_namespace_is_made_global(ns):
+    made = ros_node._global(ns)
+    assert re.fullmatch(r"/|(/\w+)+", made)
+    assert made.replace("/", "") == ns.replace("/", "")
+
+
+@given(st.tuples(*[st.floats(-1, 1)] * 4))
+def test_a_quaternion_of_zeros_means_no_rotation(turn):
+    got = _gazebo_calls.make_pose(1.0, 2.0, 3.0, *turn).orientation
+    assert (got.x, got.y, got.z, got.w) == (turn if any(turn) else (0.0, 0.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_a_pose_that_is_not_finite_is_refused(number):
+    spawned, text = ros_gazebo.gazebo_spawn_urdf_string("<robot name='r'/>", pos_x=number)
+    assert not spawned
+    assert "not finite" in text

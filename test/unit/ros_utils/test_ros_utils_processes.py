@@ -1,0 +1,263 @@
+"""Programs that ros_utils starts: remembered by all processes, ended completely, nobody else's."""
+
+import dataclasses
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from ros_utils import ros_launch, ros_node
+from ros_utils._internal import waiting as _waiting
+from ros_utils._internal.processes import endings as _endings
+from ros_utils._internal.processes import processes as _processes
+from ros_utils._internal.processes import procfs as _procfs
+from ros_utils._internal.processes import registry as _registry
+
+SLEEP = ["sleep", "1000"]
+BOUND = 10.0  # [s] for anything that a test waits for
+
+
+@pytest.fixture(autouse=True)
+def place(tmp_path, monkeypatch):
+    """A master address where nobody listens, and folders of this test's own."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr(_endings, "LEFTOVERS", 0.3)  # a shell has its background jobs ignore SIGINT
+    yield tmp_path
+    _processes.end(_processes.started())
+
+
+def runs(pid):
+    return _procfs.stat(pid) is not None
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + BOUND
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.02)
+
+
+def read_number(path: Path) -> int:
+    wait_until(lambda: path.exists() and path.read_text().endswith("\n"))
+    return int(path.read_text())
+
+
+def python(code, *arguments):
+    """A Python process with the test's environment."""
+    return subprocess.Popen([sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE)
+
+
+STARTER = """
+import signal, sys, time
+from ros_utils import _processes
+print(_processes.start(["sleep", "1000"], "node", "sleeper").process.pid, flush=True)
+signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
+if "stay" in sys.argv:
+    signal.pause()
+"""
+
+
+def test_what_is_started_is_remembered_and_forgotten_once_ended():
+    handle = _processes.start(SLEEP, "node", "sleeper")
+    assert [entry.pid for entry in _processes.started()] == [handle.process.pid]
+    assert _processes.end(_processes.started())
+    assert not runs(handle.process.pid)
+    assert _processes.started() == []
+    assert not os.path.exists(_registry.path())
+
+
+LINGERING = """
+import ctypes, threading, time
+threading.Thread(target=time.sleep, args=(1.0,)).start()
+ctypes.CDLL(None).pthread_exit(None)
+"""
+
+
+def test_a_program_whose_threads_outlive_its_main_thread_has_ended_when_it_is_said_so():
+    handle = _processes.start([sys.executable, "-c", LINGERING], "node", "lingering")
+    wait_until(lambda: not runs(handle.process.pid))  # for /proc it is a zombie already
+    assert handle.exit_code() is None
+    assert _processes.end(_processes.started())
+    assert handle.exit_code() is not None
+
+
+def test_it_has_a_session_of_its_own():
+    handle = _processes.start(SLEEP, "node", "sleeper")
+    assert os.getsid(handle.process.pid) == handle.process.pid
+
+
+def test_children_in_other_sessions_are_ended_too(place):
+    code = "setsid sleep 1000 & echo $! > $0; wait"
+    handle = _processes.start(["sh", "-c", code, str(place / "pid")], "launch", "parent")
+    child = read_number(place / "pid")
+    assert _processes.end([handle.entry])
+    assert not runs(child)
+
+
+def test_orphans_of_a_killed_parent_are_ended_too(place):
+    code = "setsid sleep 1000 & echo $! > $0; wait"
+    handle = _processes.start(["sh", "-c", code, str(place / "pid")], "launch", "parent")
+    orphan = read_number(place / "pid")
+    handle.process.kill()
+    handle.process.wait()
+    assert runs(orphan)
+    assert ros_node.ros_kill_all_processes()
+    assert not runs(orphan)
+
+
+def test_a_recycled_process_id_is_not_touched():
+    stranger = subprocess.Popen(SLEEP)
+    try:
+        handle = _processes.start(SLEEP, "node", "sleeper")
+        _processes.end([handle.entry])
+        _registry.add(dataclasses.replace(handle.entry, pid=stranger.pid, start=1))
+        assert ros_node.ros_kill_all_processes()
+        assert stranger.poll() is None
+    finally:
+        stranger.kill()
+        stranger.wait()
+
+
+def test_another_masters_processes_are_not_touched(monkeypatch):
+    handle = _processes.start(SLEEP, "node", "sleeper")
+    mine = os.environ["ROS_MASTER_URI"]
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    assert ros_node.ros_kill_all_processes()
+    assert runs(handle.process.pid)
+    monkeypatch.setenv("ROS_MASTER_URI", mine)
+
+
+def test_names_of_this_machine_mean_the_same_master(monkeypatch):
+    path = _registry.path()
+    monkeypatch.setenv(
+        "ROS_MASTER_URI", os.environ["ROS_MASTER_URI"].replace("127.0.0.1", "localhost")
+    )
+    assert _registry.path() == path
+
+
+@pytest.mark.parametrize(
+    ("trap", "number"), [("INT", signal.SIGTERM), ("INT TERM", signal.SIGKILL)]
+)
+def test_a_stubborn_program_is_ended(place, monkeypatch, trap, number):
+    monkeypatch.setitem(_endings.PATIENCE, "node", 0.3)
+    monkeypatch.setattr(_endings, "AFTER_TERM", 0.3)
+    code = "import signal; [signal.signal(getattr(signal, 'SIG' + n), signal.SIG_IGN)"
+    code += f" for n in '{trap}'.split()]; open({str(place / 'pid')!r}, 'w').write('1\\n'); "
+    handle = _processes.start([sys.executable, "-c", code + "signal.pause()"], "node", "stubborn")
+    read_number(place / "pid")
+    assert _processes.end([handle.entry])
+    assert handle.process.returncode == -number
+
+
+def test_another_process_ends_it():
+    handle = _processes.start(SLEEP, "node", "sleeper")
+    code = "from ros_utils import ros_node; assert ros_node.ros_kill_all_processes()"
+    assert python(code).wait(BOUND) == 0
+    assert handle.process.wait(BOUND) == -signal.SIGINT
+
+
+@pytest.mark.parametrize("number", [None, signal.SIGINT, signal.SIGKILL])
+def test_nothing_is_left_when_the_starter_ends(number):
+    """By itself, by sys.exit in a handler of Ctrl-C, or killed outright."""
+    starter = python(STARTER, *(["stay"] if number else []))
+    pid = int(starter.stdout.readline())
+    wait_until(lambda: Path(f"/proc/{pid}/comm").read_text() == "sleep\n")
+    if number:
+        starter.send_signal(number)
+    starter.wait(BOUND)
+    wait_until(lambda: not runs(pid))
+    starter.stdout.close()
+
+
+def test_a_program_of_ours_does_not_end_itself(place):
+    code = (
+        "from ros_utils import ros_node; assert ros_node.ros_kill_all_processes();"
+        f"open({str(place / 'done')!r}, 'w').write('1\\n')"
+    )
+    handle = _processes.start([sys.executable, "-c", code], "node", "tidy")
+    read_number(place / "done")
+    assert handle.process.wait(BOUND) == 0
+
+
+def test_killing_without_a_master_takes_no_time():
+    begin = time.monotonic()
+    assert ros_node.ros_kill_all_processes()
+    assert ros_node.ros_kill_master()
+    assert ros_launch.ros_kill_launch_process()
+    assert time.monotonic() - begin < 1.0
+
+
+def test_a_broken_registry_is_an_empty_one():
+    handle = _processes.start(SLEEP, "node", "sleeper")
+    Path(_registry.path()).write_text("{ not JSON")
+    assert _processes.started() == []
+    _registry.add(handle.entry)
+    assert json.loads(Path(_registry.path()).read_text())[0]["pid"] == handle.process.pid
+
+
+def test_an_earlier_boots_entries_are_dropped():
+    handle = _processes.start(SLEEP, "node", "sleeper")
+    _registry.add(dataclasses.replace(handle.entry, boot="earlier"))
+    assert _processes.started() == [handle.entry]
+
+
+def test_starts_at_the_same_time_are_all_remembered():
+    starters = [python(STARTER, "stay") for _ in range(4)]
+    pids = {int(starter.stdout.readline()) for starter in starters}
+    assert {entry.pid for entry in _processes.started()} == pids
+    assert ros_node.ros_kill_all_processes()
+    for starter in starters:
+        starter.send_signal(signal.SIGINT)
+        starter.wait(BOUND)
+        starter.stdout.close()
+
+
+def test_output_goes_to_a_log_and_its_error_is_the_reason():
+    code = "echo one; echo 'ValueError: two'; echo three; exit 3"
+    handle = _processes.start(["sh", "-c", code], "node", "talker")
+    assert _waiting.until(lambda: False, handle, BOUND) is _waiting.Outcome.ENDED
+    assert handle.exit_code() == 3
+    assert handle.reason() == "ValueError: two"
+    assert handle.lines("t") == ["ValueError: two", "three"]
+
+
+def test_a_wait_has_a_bound():
+    handle = _processes.start(SLEEP, "node", "sleeper")
+    assert _waiting.until(lambda: False, handle, 0.1) is _waiting.Outcome.LATE
+    assert _waiting.until(lambda: True, handle, 0.1) is _waiting.Outcome.READY
+
+
+def test_a_missing_program_is_refused():
+    with pytest.raises(_processes.CannotStart, match="nix"):
+        _processes.start(["/nix"], "node", "nix")
+
+
+@pytest.mark.parametrize("code", [0, 7])
+def test_in_a_window_the_programs_exit_code_is_known(place, monkeypatch, code):
+    xterm = place / "xterm"  # in the place of the real one: runs what follows -e
+    xterm.write_text('#!/bin/sh\nwhile [ "$1" != -e ]; do shift; done; shift; "$@"\n')
+    xterm.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{place}:{os.environ['PATH']}")
+    monkeypatch.setenv("DISPLAY", ":0")
+    handle = _processes.start(["sh", "-c", f"exit {code}"], "node", "a 'quoted' name", window=True)
+    assert _waiting.until(lambda: False, handle, BOUND) is _waiting.Outcome.ENDED
+    assert handle.exit_code() == code
+
+
+def test_without_a_display_a_window_falls_back_to_a_log(capsys):
+    handle = _processes.start(["echo", "hello"], "node", "greeter", window=True)
+    handle.process.wait(BOUND)
+    assert handle.lines() == ["hello"]
+    assert handle.entry.log in capsys.readouterr().out
