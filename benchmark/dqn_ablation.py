@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What each of DQN's options is worth on CartPole-v1: added to the tutorial's, taken from the tuned ones.
 
-    ./ws python3 benchmark/dqn_ablation.py [flags of workbench.py benchmark]
+./ws python3 benchmark/dqn_ablation.py [flags of workbench.py benchmark]
 """
 
 import sys

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """DQN in Acrobot-v1, MountainCar-v0 and LunarLander-v3, with the options of config/dqn.yaml.
 
-    ./ws extras python3 benchmark/dqn_environments.py [flags of workbench.py benchmark]
+./ws extras python3 benchmark/dqn_environments.py [flags of workbench.py benchmark]
 """
 
 import sys

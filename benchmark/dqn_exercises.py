@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The tutorial's exercises: discount factors 0.5 and 0.999, a replay of size 1, Acrobot-v1.
 
-    ./ws python3 benchmark/dqn_exercises.py [flags of workbench.py benchmark]
+./ws python3 benchmark/dqn_exercises.py [flags of workbench.py benchmark]
 """
 
 import sys

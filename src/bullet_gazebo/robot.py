@@ -33,7 +33,9 @@ class Robot:
         self.manager = manager
         self.namespace = namespace
         self._control_period = round(control_period * NANOSECONDS)
-        self._waited: int | None = None  # [ns] since the last control tick; None: the next step is one
+        self._waited: int | None = (
+            None  # [ns] since the last control tick; None: the next step is one
+        )
         indices = {name: index for index, name in enumerate(model.joint_names)}
         missing = sorted(set(hardware.joints) - set(indices))
         if missing:

@@ -149,7 +149,9 @@ class Simulator:
 
     def add_robot(self, robot: Robot) -> None:
         """Puts a robot under control; the caller holds the lock."""
-        robot.joints_moved(self.now, relatch=False)  # its controllers may start before time moves on
+        robot.joints_moved(
+            self.now, relatch=False
+        )  # its controllers may start before time moves on
         self.robots.append(robot)
 
     def remove_robot(self, robot: Robot) -> None:

@@ -1,6 +1,5 @@
 """Errors whose text is meant for the user: shown as one line, never as a traceback."""
 
-
 from rl_workbench.errors import WorkbenchError
 
 

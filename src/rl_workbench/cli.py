@@ -34,7 +34,9 @@ COMMANDS = {
     "compare": _Command("comparing", "groups of runs: table per seed, IQM, intervals, curves"),
     "train": _Command("training", "train by DQN, policy gradient or Stable-Baselines3"),
     "sweep": _Command("searching", "search options with Optuna"),
-    "benchmark": _Command("benchmarking", "train several seeds, or a suite; table per seed, curves"),
+    "benchmark": _Command(
+        "benchmarking", "train several seeds, or a suite; table per seed, curves"
+    ),
 }
 PACKAGE = "rl_workbench.tools.commands"
 

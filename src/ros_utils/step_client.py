@@ -1,9 +1,9 @@
 """Moving a world in lock-step from Python: a client for `/gazebo/step_world` (bullet_gazebo_msgs/StepWorld).
 
-    client = StepClient()
-    client.reset({"cart_pole": 0.1}, {"cart_pole": -0.5})
-    state = client.step(8, {"stand_cart_position_controller": 0.02})
-    state.joint_states.position, state.sim_time
+client = StepClient()
+client.reset({"cart_pole": 0.1}, {"cart_pole": -0.5})
+state = client.step(8, {"stand_cart_position_controller": 0.02})
+state.joint_states.position, state.sim_time
 """
 
 from __future__ import annotations

@@ -49,7 +49,13 @@ class OnlyOne(gymnasium.Env):
         return self._observation(), {}
 
     def step(self, action):
-        return self._observation(), self.np_random.random(), self.np_random.random() < 0.1, False, {}
+        return (
+            self._observation(),
+            self.np_random.random(),
+            self.np_random.random() < 0.1,
+            False,
+            {},
+        )
 
     def _observation(self):
         return self.np_random.random(2, np.float32)

@@ -187,6 +187,4 @@ def _is_limit(value: Any, signed: bool) -> bool:
 
 def is_number(value: object) -> bool:
     """Returns whether a parameter is a finite number; a bool is none."""
-    return (
-        isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    )
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,6 +1,5 @@
 """Errors of the control room."""
 
-
 # What a user's code is caught at: a script's sys.exit() must not end the simulator either.
 FAULTS = (Exception, SystemExit)
 

@@ -206,7 +206,9 @@ def _check_claims(controller: object, hardware: RobotHardware) -> None:
     if not isinstance(controller, Controller):
         raise ControlError(f"create() returned {controller!r}, which is no controller")
     claimed = controller.claimed
-    if not isinstance(claimed, (tuple, list)) or not all(name in hardware.joints for name in claimed):
+    if not isinstance(claimed, (tuple, list)) or not all(
+        name in hardware.joints for name in claimed
+    ):
         raise ControlError(
             f"it claims {claimed!r}, which is no tuple of names of controlled joints "
             f"({', '.join(hardware.joints) or 'there are none'})"

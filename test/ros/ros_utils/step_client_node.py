@@ -56,10 +56,14 @@ class StepClientTest(unittest.TestCase):
                 first = client.reset({"cart_pole": 0.1, "stand_cart": 0.05}, {"cart_pole": -0.5})
                 self.assertEqual(first.joint_states.position, (0.1, 0.05))
                 self.assertEqual(first.joint_states.velocity, (-0.5, 0.0))
-                runs.append([client.step(8, {CART: 0.02 * n}).joint_states.position for n in range(20)])
+                runs.append(
+                    [client.step(8, {CART: 0.02 * n}).joint_states.position for n in range(20)]
+                )
             self.assertEqual(runs[0], runs[1])
             self.assertEqual(client.reset(everything=True).sim_time, 0.0)
-            self.assertEqual(client.step(8, model_states=True).model_names, ["ground_plane", "cartpole"])
+            self.assertEqual(
+                client.step(8, model_states=True).model_names, ["ground_plane", "cartpole"]
+            )
 
     def test_what_is_refused(self):
         with self.simulate().active():
@@ -91,7 +95,9 @@ class StepClientTest(unittest.TestCase):
                 client.step(8, {CART: 0.1})
             found = positions(client.step(200, {f"/left/{CART}": 0.1, f"/right/{CART}": -0.1}))
             self.assertEqual(len(found), 4)
-            self.assertAlmostEqual(found["left::stand_cart"], -found["right::stand_cart"], places=12)
+            self.assertAlmostEqual(
+                found["left::stand_cart"], -found["right::stand_cart"], places=12
+            )
             self.assertGreater(found["left::stand_cart"], 0.05)
 
     def test_a_restarted_simulator_is_found_again(self):

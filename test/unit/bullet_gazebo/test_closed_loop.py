@@ -49,7 +49,11 @@ def integrated(tick):
         force = limited(P * error + D * (error - last) / tick, state)
         last = error
         state = solve_ivp(
-            lambda _, y, force=force: plant.derivative(y, force), (0.0, tick), state, rtol=1e-9, atol=1e-12
+            lambda _, y, force=force: plant.derivative(y, force),
+            (0.0, tick),
+            state,
+            rtol=1e-9,
+            atol=1e-12,
         ).y[:, -1]
         track.append(state[0])
     return np.array(track)

@@ -128,7 +128,9 @@ def test_every_command_of_the_tutorial_works_as_a_process(tmp_path: Path, monkey
 
 def readme_commands() -> list[str]:
     """Those of README's section on the workbench, without their remarks; not the long benchmark."""
-    section = README.read_text(encoding="utf-8").split("## DQN, and a workbench")[1].split("\n## ")[0]
+    section = (
+        README.read_text(encoding="utf-8").split("## DQN, and a workbench")[1].split("\n## ")[0]
+    )
     lines = [line.strip() for line in section.splitlines() if line.startswith("    ./ws rosrun")]
     return [shlex.join(shlex.split(line, comments=True)) for line in lines]
 

@@ -181,7 +181,9 @@ def test_a_worker_that_hangs_is_an_error(monkeypatch):
     try:
         with pytest.raises(SimulatorError, match=r"gave no answer within 0.2 s, and was ended"):
             vector.reset(seed=0)
-        with pytest.raises(SimulatorError, match="was killed by SIGKILL"):  # no late answer is taken
+        with pytest.raises(
+            SimulatorError, match="was killed by SIGKILL"
+        ):  # no late answer is taken
             vector.reset(seed=0)
     finally:
         vector.close()

@@ -57,7 +57,9 @@ class StateReport:
         self._updates = count + 1
         return count % REPORT_EVERY == 0 and self.output.sink is not None
 
-    def send(self, now: int, dt: float, set_point: float, value: float, rate: float, error: float) -> None:
+    def send(
+        self, now: int, dt: float, set_point: float, value: float, rate: float, error: float
+    ) -> None:
         """Reports process `value` and its `rate`; `now` [ns], `dt` [s]."""
         gains, sink = self._pid.gains, self.output.sink
         if sink is not None:

@@ -95,7 +95,9 @@ class ControllerPorts:
                 rospy.logerr_throttle(REPEAT, f"{topic}: {error}")
             except FAULTS as error:  # a user's code: the message is lost, the topic goes on
                 text = "".join(traceback.format_exception(error))
-                rospy.logerr_throttle(REPEAT, f"{topic}: a message is lost, its reader raised:\n{text}")
+                rospy.logerr_throttle(
+                    REPEAT, f"{topic}: a message is lost, its reader raised:\n{text}"
+                )
 
         subscriber = rospy.Subscriber(topic, kind, receive, queue_size=1, tcp_nodelay=True)
         self._closing.callback(subscriber.unregister)

@@ -82,10 +82,14 @@ class StepPlan:
         return commands
 
     def _joints(self, request: StepWorldRequest) -> list[Callable[[], None]]:
-        _check_list("commanded_joints", request.commanded_joints, "joint_commands", request.joint_commands)
+        _check_list(
+            "commanded_joints", request.commanded_joints, "joint_commands", request.joint_commands
+        )
         joints = [self._free_joint(name) for name in request.commanded_joints]
         if len({id(joint) for joint in joints}) < len(joints):
-            raise ControlError(f"commanded_joints names one twice: {list(request.commanded_joints)}")
+            raise ControlError(
+                f"commanded_joints names one twice: {list(request.commanded_joints)}"
+            )
         pairs = zip(joints, request.joint_commands, strict=True)
         return [_commanding(joint, value) for joint, value in pairs]
 
@@ -100,7 +104,9 @@ class StepPlan:
         if not found:
             raise ControlError(f"no controller named '{name}' is loaded")
         if len(found) > 1:
-            raise ControlError(f"several robots have a controller '{name}'; write /namespace/{name}")
+            raise ControlError(
+                f"several robots have a controller '{name}'; write /namespace/{name}"
+            )
         if found[0].state != RUNNING:
             raise ControlError(f"controller '{name}' is {found[0].state}, not running")
         return found[0]

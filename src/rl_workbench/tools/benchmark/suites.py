@@ -84,7 +84,9 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
             `origin` says where it stands.
     """
     if not NAME.fullmatch(name):
-        raise WorkbenchError(f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}")
+        raise WorkbenchError(
+            f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}"
+        )
     rest = dict(options)
     algorithm = str(rest.pop("algo", DQN))
     if algorithm not in ALGORITHMS:

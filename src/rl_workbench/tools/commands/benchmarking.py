@@ -100,7 +100,10 @@ def _suite(arguments: argparse.Namespace) -> Suite:
     if arguments.suites:
         raise WorkbenchError(f"which suite of {arguments.suites}? Name one")
     algorithm = arguments.algo or DQN
-    given = {"env_id": arguments.env_id or "CartPole-v1", **key_values(arguments.params, "--params")}
+    given = {
+        "env_id": arguments.env_id or "CartPole-v1",
+        **key_values(arguments.params, "--params"),
+    }
     options = {"algo": algorithm, **given}
     name = f"{algorithm}__{given['env_id'].replace('/', '-').replace(':', '-')}"
     return Suite(name, "", SEEDS, (make_variant("--params", name, options),))

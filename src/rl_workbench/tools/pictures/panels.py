@@ -45,7 +45,9 @@ def evaluation_panels(runs: Sequence[Run]) -> Figure:
     figure.supxlabel("step of the environment", fontsize="medium")
     figure.supylabel("return of greedy episodes", fontsize="medium")
     if len(variants) > 1:
-        figure.suptitle(f"blue: the variant, grey: {first}; bands: 95 % of the mean", fontsize="medium")
+        figure.suptitle(
+            f"blue: the variant, grey: {first}; bands: 95 % of the mean", fontsize="medium"
+        )
     return figure
 
 

@@ -92,9 +92,7 @@ def policy_picture(run: Run, player: Player, seed: int) -> Figure:
     return figure
 
 
-def _field(
-    plane: Plane, player: Player, angles: np.ndarray, velocities: np.ndarray
-) -> np.ndarray:
+def _field(plane: Plane, player: Player, angles: np.ndarray, velocities: np.ndarray) -> np.ndarray:
     """The preference at every point, (velocities, angles)."""
     across, up = np.meshgrid(angles, velocities)
     values = player.preference(plane.observe(across.ravel(), up.ravel()))

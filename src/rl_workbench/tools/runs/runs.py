@@ -1,6 +1,6 @@
 """Run folders as they lie on disk, whichever command wrote them: what was trained, and its curve.
 
-    config.json, scalars.csv (also while it runs), summary.json (at its end)
+config.json, scalars.csv (also while it runs), summary.json (at its end)
 """
 
 import csv

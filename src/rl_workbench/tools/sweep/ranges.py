@@ -1,8 +1,8 @@
 """The ranges that `sweep` searches, from YAML.
 
-    learning_rate: {low: 1.0e-4, high: 1.0e-2, log: true}
-    n_step: {low: 1, high: 5}                  # whole numbers, since both ends are
-    hidden_sizes: {choices: ["64,64", "128,128"]}
+learning_rate: {low: 1.0e-4, high: 1.0e-2, log: true}
+n_step: {low: 1, high: 5}                  # whole numbers, since both ends are
+hidden_sizes: {choices: ["64,64", "128,128"]}
 """
 
 from pathlib import Path
@@ -75,7 +75,9 @@ def _choices(choices: Any, origin: str) -> Range:
     if not isinstance(choices, list) or not choices:
         raise WorkbenchError(f"{origin}: choices are a list, not {choices!r}")
     if any(isinstance(each, list | dict) for each in choices):
-        raise WorkbenchError(f'{origin}: choices are single values; sizes are a text, as in "64,64"')
+        raise WorkbenchError(
+            f'{origin}: choices are single values; sizes are a text, as in "64,64"'
+        )
     return Range(0, 0, False, tuple(choices))
 
 

@@ -1,9 +1,9 @@
 """`sweep`: Optuna looks for good options; every trial is a run folder of its own.
 
-    FOLDER/study.db          the study; calling again with the same folder goes on with it
-    FOLDER/trial_0000_seed_0 a training
-    FOLDER/trials.json       what was tried, and how it went
-    FOLDER/best.yaml         the best options, for --config
+FOLDER/study.db          the study; calling again with the same folder goes on with it
+FOLDER/trial_0000_seed_0 a training
+FOLDER/trials.json       what was tried, and how it went
+FOLDER/best.yaml         the best options, for --config
 """
 
 from dataclasses import dataclass

@@ -128,7 +128,9 @@ def _contradiction(chosen: Settings) -> str:
 
 def _foreign(chosen: Settings) -> str:
     if chosen.algorithm == "document":
-        return f"the document's algorithm is made for the robot: {chosen.env_id} needs --algorithm gae"
+        return (
+            f"the document's algorithm is made for the robot: {chosen.env_id} needs --algorithm gae"
+        )
     for name in ROBOTS_OWN:
         if getattr(chosen, name):
             return f"{flag(name)} is of the robot, {ROBOT}: not with --env-id {chosen.env_id}"
@@ -242,7 +244,9 @@ def from_config(content: Any, origin: str) -> Choice:
     """
     record = content if isinstance(content, dict) else {}
     run, own = record.get("run"), record.get(ALGORITHM)
-    if record.get("algorithm") != ALGORITHM or not (isinstance(run, dict) and isinstance(own, dict)):
+    if record.get("algorithm") != ALGORITHM or not (
+        isinstance(run, dict) and isinstance(own, dict)
+    ):
         raise WorkbenchError(f"{origin} isn't the configuration of a policy-gradient training")
     return _made(OPTIONS.read({**run, **own}, origin), None)
 

@@ -87,7 +87,9 @@ def _make(choice: SB3Choice, vector: Any) -> Any:
         own["learning_rate"] = linear(_rate(own["learning_rate"]))
     if own.get("action_noise") is not None:
         own["action_noise"] = _noise(own["action_noise"], vector.action_space)
-    if isinstance(own.get("train_freq"), list):  # a number and a unit; neither YAML nor JSON has tuples
+    if isinstance(
+        own.get("train_freq"), list
+    ):  # a number and a unit; neither YAML nor JSON has tuples
         own["train_freq"] = tuple(own["train_freq"])
     return algorithm_class(choice.algorithm)(
         "MlpPolicy",

@@ -76,7 +76,9 @@ class SB3Training:
         """None where nothing is evaluated: over ROS an evaluation would move the training's robot."""
         if shares_robot(self._model.get_env().envs[0]):
             if self._run.n_envs > 1:
-                raise WorkbenchError(f"over ROS there is one robot: n_envs is 1, not {self._run.n_envs}")
+                raise WorkbenchError(
+                    f"over ROS there is one robot: n_envs is 1, not {self._run.n_envs}"
+                )
             if self._run.eval_frequency:
                 say("over ROS there is one robot: no evaluations during the training; the last "
                     "policy is kept, workbench.py eval tells what it is worth")  # fmt: skip
@@ -206,7 +208,9 @@ class SB3Training:
             failure = problem if self._interrupt.requested() else failure or problem
         self._tell()
         if failure and not (self._interrupt.requested() and self._is_written):
-            raise WorkbenchError(f"{failure}; stopped after {self._steps} steps{self._how_to_go_on}")
+            raise WorkbenchError(
+                f"{failure}; stopped after {self._steps} steps{self._how_to_go_on}"
+            )
 
     def _not_written(self, error: OSError) -> WorkbenchError:
         self._is_written = False

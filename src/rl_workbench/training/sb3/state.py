@@ -42,7 +42,9 @@ def check_weights(model: Any) -> None:
         WorkbenchError: if one isn't a number any more.
     """
     if not all(torch.isfinite(each).all() for each in model.policy.parameters()):
-        raise WorkbenchError("the weights are no numbers any more: a smaller learning_rate may help")
+        raise WorkbenchError(
+            "the weights are no numbers any more: a smaller learning_rate may help"
+        )
 
 
 def restore(model: Any, state: dict[str, Any], seed: int) -> None:

@@ -55,7 +55,12 @@ class HardwareTest(SlidesTest):
         self.assertLess(joints["effort_a"][0], 0.21)
 
     def test_limits_of_zero_hold_what_they_limit(self):
-        zero = {"has_effort_limits": True, "max_effort": 0, "has_velocity_limits": True, "max_velocity": 0}
+        zero = {
+            "has_effort_limits": True,
+            "max_effort": 0,
+            "has_velocity_limits": True,
+            "max_velocity": 0,
+        }
         rospy.set_param(LIMITS, {"effort_a": zero, "position_a": zero, "velocity_a": zero})
         self.begin()
         self.run_controllers("effort_joint", "position_joint", "velocity_joint")
@@ -78,7 +83,9 @@ class HardwareTest(SlidesTest):
 
     def test_a_reset_begins_a_control_period(self):
         self.begin("<eStopTopic>", "<controlPeriod>0.1</controlPeriod><eStopTopic>")
-        rospy.set_param("/slides/effort_position/pid", {"p": 400.0, "d": 40.0, "publish_state": True})
+        rospy.set_param(
+            "/slides/effort_position/pid", {"p": 400.0, "d": 40.0, "publish_state": True}
+        )
         self.run_controllers("effort_position")
         self.step(150)
         for reset in ("/gazebo/reset_world", "/gazebo/reset_simulation"):
@@ -91,7 +98,14 @@ class HardwareTest(SlidesTest):
 
     def test_each_field_of_a_controllers_state(self):
         self.begin()
-        pid = {"p": 20.0, "i": 2.0, "d": 0.25, "i_clamp_min": -2.0, "i_clamp_max": 3.0, "antiwindup": True}
+        pid = {
+            "p": 20.0,
+            "i": 2.0,
+            "d": 0.25,
+            "i_clamp_min": -2.0,
+            "i_clamp_max": 3.0,
+            "antiwindup": True,
+        }
         for name, joint, due in (
             ("effort_position", "effort_a", 21_000_000),
             ("velocity_position", "velocity_a", 51_000_000),
@@ -101,7 +115,9 @@ class HardwareTest(SlidesTest):
             topic = Topic(f"{name}/state", JointControllerState)
             before = self.step(20, **{name: 0.1})[joint]
             self.step(1)
-            self.assertTrue(topic.wait_for(lambda got, due=due: got and got[-1].header.stamp.nsecs == due))
+            self.assertTrue(
+                topic.wait_for(lambda got, due=due: got and got[-1].header.stamp.nsecs == due)
+            )
             state = topic.messages[-1]
             self.assertEqual((state.process_value, state.process_value_dot), before[:2])
             self.assertEqual((state.set_point, state.error), (0.1, 0.1 - before[0]))
@@ -120,7 +136,9 @@ class HardwareTest(SlidesTest):
         topic = self.start_states()
         for _ in range(35):
             self.step(1)
-        self.assertTrue(topic.wait_for(lambda got: got and got[-1].header.stamp.to_nsec() >= 2_031_000_000))
+        self.assertTrue(
+            topic.wait_for(lambda got: got and got[-1].header.stamp.to_nsec() >= 2_031_000_000)
+        )
         stamps = [message.header.stamp.to_nsec() // 1_000_000 for message in topic.messages]
         self.assertLessEqual(set(stamps), {2001, 2011, 2021, 2031})
         topic.close()
@@ -134,7 +152,9 @@ class HardwareTest(SlidesTest):
     # controllers of users
 
     def load_rude(self, where):
-        rospy.set_param("/slides/rude", {"type": "my_controllers/Rude", "joint": "effort_b", "where": where})
+        rospy.set_param(
+            "/slides/rude", {"type": "my_controllers/Rude", "joint": "effort_b", "where": where}
+        )
         return self.load("rude")
 
     def test_a_controller_that_is_made_wrongly_is_refused_and_leaves_nothing(self):
@@ -142,7 +162,9 @@ class HardwareTest(SlidesTest):
         for where in ("create", "nothing", "claimed", "topic"):
             self.assertFalse(self.load_rude(where), where)
             self.assertEqual(self.listed(), [])
-            topics = [name for name, _ in rosgraph.Master("/test").getPublishedTopics("/slides/rude")]
+            topics = [
+                name for name, _ in rosgraph.Master("/test").getPublishedTopics("/slides/rude")
+            ]
             self.assertEqual(topics, [], where)
 
     def test_a_controller_that_ends_its_thread_or_reports_nonsense_is_stopped(self):
@@ -153,7 +175,9 @@ class HardwareTest(SlidesTest):
             topic = Topic("rude/report", rospy.AnyMsg)
             self.assertTrue(self.switch(["rude"]))
             joints = self.step(500, effort_position=0.1)
-            self.assertEqual((self.state("rude"), self.state("effort_position")), ("stopped", "running"))
+            self.assertEqual(
+                (self.state("rude"), self.state("effort_position")), ("stopped", "running")
+            )
             self.assertAlmostEqual(joints["effort_a"][0], 0.1, delta=0.01)
             self.assertTrue(self.unload("rude"))
             topic.close()

@@ -95,7 +95,9 @@ class RobotsTest(unittest.TestCase):
         self.joints("/mine/joint_states")
 
     def test_two_robots_do_not_mix(self):
-        for place, name in enumerate(("first", "second")):  # side by side: they would push each other
+        for place, name in enumerate(
+            ("first", "second")
+        ):  # side by side: they would push each other
             self.assertTrue(spawn(name, robot_namespace=f"/{name}", y=float(place)).success)
         first, second = self.start("/first"), self.start("/second")
         self.command("/first/cart/command", 0.4)

@@ -51,7 +51,10 @@ class SwitchTest(PausedRobot, unittest.TestCase):
         for case, (start, stop, strict_ok, strict, loose_ok, loose) in SWITCHES.items():
             for strictness in (STRICT, *LOOSE):
                 ok, after = (strict_ok, strict) if strictness == STRICT else (loose_ok, loose)
-                expected = (ok, dict.fromkeys(CONTROLLERS, "initialized") | {"cart": "running"} | after)
+                expected = (
+                    ok,
+                    dict.fromkeys(CONTROLLERS, "initialized") | {"cart": "running"} | after,
+                )
                 found = self.switched(start, stop, strictness)
                 if found != expected:
                     wrong[case, strictness] = (found, expected)

@@ -41,7 +41,9 @@ class ControllersTest(SlidesTest):
 
     def test_effort_joint_takes_its_command_from_the_topic_once_it_runs(self):
         self.assertTrue(self.load("effort_joint"))
-        command = self.publisher("effort_joint/command", Float64)  # there is a subscriber from load on
+        command = self.publisher(
+            "effort_joint/command", Float64
+        )  # there is a subscriber from load on
         command.publish(9.0)
         self.assertTrue(self.switch(["effort_joint"]))
         command.publish(1e9)
@@ -54,9 +56,13 @@ class ControllersTest(SlidesTest):
         topic = Topic("effort_position/state", JointControllerState)
         joints = self.step(1000, effort_position=0.3)
         self.assertAlmostEqual(joints["effort_a"][0], 0.3, places=3)
-        self.assertTrue(topic.wait_for(lambda got: got and got[-1].header.stamp.to_nsec() == 991_000_000))
+        self.assertTrue(
+            topic.wait_for(lambda got: got and got[-1].header.stamp.to_nsec() == 991_000_000)
+        )
         state = topic.messages[-1]
-        self.assertEqual((state.set_point, state.time_step, state.p, state.d), (0.3, 0.001, 400.0, 40.0))
+        self.assertEqual(
+            (state.set_point, state.time_step, state.p, state.d), (0.3, 0.001, 400.0, 40.0)
+        )
         self.assertAlmostEqual(state.error, state.set_point - state.process_value, places=12)
         self.step(20, effort_position=9.0)  # beyond the rail's end
         self.assertTrue(topic.wait_for(lambda got: got[-1].set_point == 5.0))
@@ -67,7 +73,9 @@ class ControllersTest(SlidesTest):
         topic = Topic("effort_velocity/state", JointControllerState)
         joints = self.step(500, effort_velocity=0.7)
         self.assertAlmostEqual(joints["effort_a"][1], 0.7, places=6)
-        self.assertTrue(topic.wait_for(lambda got: got and got[-1].header.stamp.to_nsec() == 491_000_000))
+        self.assertTrue(
+            topic.wait_for(lambda got: got and got[-1].header.stamp.to_nsec() == 491_000_000)
+        )
         state = topic.messages[-1]
         self.assertEqual((state.set_point, state.process_value_dot), (0.7, 0.0))
         self.assertAlmostEqual(state.process_value, 0.7, places=6)
@@ -118,13 +126,17 @@ class ControllersTest(SlidesTest):
         self.assertTrue(self.switch(stop=["velocity_joint"]))
         self.assertAlmostEqual(self.step(100)["velocity_a"][1], 0.5, places=4)  # it stays latched
         self.run_controllers("velocity_position")
-        self.assertAlmostEqual(self.step(1000, velocity_position=-0.2)["velocity_a"][0], -0.2, places=3)
+        self.assertAlmostEqual(
+            self.step(1000, velocity_position=-0.2)["velocity_a"][0], -0.2, places=3
+        )
 
     def test_joints_with_gains_report_their_effort(self):
         self.run_controllers("velocity_group", "position_group")
         command = self.publisher("velocity_group/command", Float64MultiArray)
         self.publish_until(
-            command, Float64MultiArray(data=[0.5, 0.0]), lambda joints: joints["velocity_b"][2] > 0.0
+            command,
+            Float64MultiArray(data=[0.5, 0.0]),
+            lambda joints: joints["velocity_b"][2] > 0.0,
         )
         self.assertAlmostEqual(self.step(500)["velocity_b"][1], 0.5, places=4)
 
@@ -169,7 +181,9 @@ class ControllersTest(SlidesTest):
         self.step(100, position_joint=0.4, effort_position=0.3)
         names, places = ["position_a", "position_b", "effort_a"], [-0.5, 0.25, 0.1]
         request = ("slides", "robot_description", names, places)
-        self.assertTrue(call("/gazebo/set_model_configuration", SetModelConfiguration, *request).success)
+        self.assertTrue(
+            call("/gazebo/set_model_configuration", SetModelConfiguration, *request).success
+        )
         for ticks in (1, 1, 200):
             joints = self.step(ticks)
             for name, place in zip(names, places, strict=True):

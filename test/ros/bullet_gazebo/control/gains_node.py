@@ -47,7 +47,14 @@ class GainsTest(SlidesTest):
         updates = Topic("effort_position/pid/parameter_updates", Config)  # latched
         self.assertTrue(updates.wait_for(len))
         answer = reconfigure(PID, p=1e9, d=-1e9, i_clamp_max=-3.0, i_clamp_min=2.0, i=5.0)
-        wanted = {"p": 1e5, "d": -1e3, "i_clamp_max": 0.0, "i_clamp_min": 0.0, "i": 5.0, "antiwindup": False}
+        wanted = {
+            "p": 1e5,
+            "d": -1e3,
+            "i_clamp_max": 0.0,
+            "i_clamp_min": 0.0,
+            "i": 5.0,
+            "antiwindup": False,
+        }
         self.assertEqual(answer, wanted)
         self.assertTrue(updates.wait_for(lambda got: len(got) == 2))
         updates.close()

@@ -78,7 +78,9 @@ class SlidesTest(unittest.TestCase):
         return call(MANAGER + "unload_controller", UnloadController, name).ok
 
     def switch(self, start=(), stop=(), strictness=STRICT):
-        return call(MANAGER + "switch_controller", SwitchController, start, stop, strictness, False, 0.0).ok
+        return call(
+            MANAGER + "switch_controller", SwitchController, start, stop, strictness, False, 0.0
+        ).ok
 
     def run_controllers(self, *names):
         for name in names:
@@ -103,7 +105,11 @@ class SlidesTest(unittest.TestCase):
         self.assertTrue(answer.success, answer.status_message)
         states = answer.joint_states
         return dict(
-            zip(states.name, zip(states.position, states.velocity, states.effort, strict=True), strict=True)
+            zip(
+                states.name,
+                zip(states.position, states.velocity, states.effort, strict=True),
+                strict=True,
+            )
         )
 
     def publisher(self, topic, kind):

@@ -29,7 +29,10 @@ class UpstreamResetsTest(SlidesTest):
     def test_the_period_is_nominal_and_joint_states_go_on(self):
         self.run_controllers("effort_position", "states")
         self.step(2000)
-        pid, states = Topic("effort_position/pid/state", PidState), Topic("joint_states", JointState)
+        pid, states = (
+            Topic("effort_position/pid/state", PidState),
+            Topic("joint_states", JointState),
+        )
         for reset in ("/gazebo/reset_world", "/gazebo/reset_simulation"):
             call(reset, Empty)
             pid.messages.clear()

@@ -29,7 +29,15 @@ class World:
         self.log = tempfile.TemporaryFile()  # noqa: SIM115 - close() does
         port = free_port()
         self._master = rosgraph.Master("/launch_arguments", f"http://localhost:{port}")
-        command = ["roslaunch", "-p", str(port), "gazebo_ros", "empty_world.launch", "gui:=false", *args]
+        command = [
+            "roslaunch",
+            "-p",
+            str(port),
+            "gazebo_ros",
+            "empty_world.launch",
+            "gui:=false",
+            *args,
+        ]
         env = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}"}
         self.launch = subprocess.Popen(command, env=env, stdout=self.log, stderr=self.log)
 

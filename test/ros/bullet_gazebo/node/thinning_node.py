@@ -70,7 +70,9 @@ class ThinningTest(unittest.TestCase):
         cls.clock = Stamps("/clock", Clock, lambda message: message.clock.to_nsec())
         cls.joints = Stamps("/joint_states", JointState, lambda m: m.header.stamp.to_nsec())
         cls.models = Stamps("/gazebo/model_states", ModelStates, lambda message: len(message.name))
-        assert ros_gazebo.gazebo_step_physics(1)  # all three have found their publisher when it shows
+        assert ros_gazebo.gazebo_step_physics(
+            1
+        )  # all three have found their publisher when it shows
         while not (cls.clock.got and cls.joints.got and cls.models.got):
             assert ros_gazebo.gazebo_step_physics(1)
 
@@ -121,8 +123,10 @@ class ThinningTest(unittest.TestCase):
         stretch = range(0, 100 * MILLISECOND, MILLISECOND)
         self.assertTrue(
             self.joints.wait_for(
-                lambda got: got[-1] > begin + stretch[-1]
-                and [stamp - got[-100] for stamp in got[-100:]] == list(stretch)
+                lambda got: (
+                    got[-1] > begin + stretch[-1]
+                    and [stamp - got[-100] for stamp in got[-100:]] == list(stretch)
+                )
             )
         )
         call("/gazebo/pause_physics", Empty)

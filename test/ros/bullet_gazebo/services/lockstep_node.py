@@ -91,7 +91,10 @@ class LockstepTest(unittest.TestCase):
             ({"ticks": 0, "joints": ["cart_pole"], "positions": []}, "1 joints but 0 positions"),
             ({"ticks": 0, "joints": ["cart_pole"] * 2, "positions": [0, 1]}, "names one twice"),
             ({"ticks": 0, "joints": ["cart_pole"], "positions": [float("nan")]}, "not finite"),
-            ({"ticks": 1, "commanded_joints": ["stand_cart"], "joint_commands": [1.0]}, "belongs to"),
+            (
+                {"ticks": 1, "commanded_joints": ["stand_cart"], "joint_commands": [1.0]},
+                "belongs to",
+            ),
             ({"ticks": 1, "commanded_joints": ["elbow"], "joint_commands": [1.0]}, "no robot has"),
         ):
             with self.subTest(text):
@@ -103,7 +106,11 @@ class LockstepTest(unittest.TestCase):
 
     def test_an_episode_begins_in_one_call(self):
         self.step(50, [CART], [0.3])
-        place = {"joints": ["stand_cart", "cart_pole"], "positions": [0.1, -0.2], "velocities": [0.5, 1.5]}
+        place = {
+            "joints": ["stand_cart", "cart_pole"],
+            "positions": [0.1, -0.2],
+            "velocities": [0.5, 1.5],
+        }
         answer = self.step(0, reset=StepWorldRequest.SIMULATION, **place)
         self.assertTrue(answer.success, answer.status_message)
         self.assertEqual(answer.sim_time, 0.0)

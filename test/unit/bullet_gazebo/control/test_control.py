@@ -118,7 +118,9 @@ def test_of_several_transmissions_of_a_joint_the_first_counts():
     pole, cart = (f'<joint name="{name}">\n      <hard' for name in ("cart_pole", "stand_cart"))
     description = read_description(cartpole_urdf().replace(pole, cart))
     assert [t.joint for t in description.transmissions] == ["stand_cart"]
-    assert description.warnings == ["Joint 'stand_cart' has several transmissions; the first is used."]
+    assert description.warnings == [
+        "Joint 'stand_cart' has several transmissions; the first is used."
+    ]
 
 
 def test_a_negative_limit_would_push_so_it_is_refused():

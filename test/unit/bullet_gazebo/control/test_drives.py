@@ -36,7 +36,9 @@ def lift_urdf(interface, limit='<limit lower="-1" upper="1" effort="100" velocit
 class Lift:
     """A lift in a lock-step world with one controller."""
 
-    def __init__(self, engine, interface, controller="", params=None, gains=None, period=0.0, **urdf):
+    def __init__(
+        self, engine, interface, controller="", params=None, gains=None, period=0.0, **urdf
+    ):
         text = lift_urdf(interface, **urdf)
         self.sim = Simulator(World(engine), lockstep=True)
         self.model = self.sim.world.spawn("lift", parse_urdf(text), Pose())
@@ -223,7 +225,9 @@ class Probe:
         lift.manager.update = lambda now, dt: self.calls.append((now // 1_000_000, dt))
 
 
-@pytest.mark.parametrize(("period", "ticks"), [(0.0, 1), (0.001, 1), (0.004, 4), (0.0025, 3), (1e-4, 1)])
+@pytest.mark.parametrize(
+    ("period", "ticks"), [(0.0, 1), (0.001, 1), (0.004, 4), (0.0025, 3), (1e-4, 1)]
+)
 def test_controllers_run_on_every_control_period_with_the_nominal_dt(make, period, ticks):
     lift = make("Effort", period=period)
     probe = Probe(lift)
@@ -248,7 +252,9 @@ def test_limits_act_on_each_step_also_between_control_periods(make):
     lift.command(100.0)
     lift.advance(0.04)
     assert lift.joint.effort == 100.0
-    lift.advance(0.02)  # beyond the limit: clipped in place, so it stays so until the next control tick
+    lift.advance(
+        0.02
+    )  # beyond the limit: clipped in place, so it stays so until the next control tick
     assert lift.joint.effort == 0.0
     lift.advance(0.041)
     assert lift.joint.position < 0.05
@@ -322,6 +328,10 @@ def test_parameters_of_limits_that_are_no_numbers_are_a_warning():
     limits = description.joints["rail"].limits
     assert (limits.velocity, limits.acceleration) == (2.0, 4.0)
     assert any("max_velocity" in text for text in description.warnings)
-    assert read_description(lift_urdf("Velocity")).limited_by(
-        {"rail": {"angle_wraparound": True}}
-    ).joints["rail"].limits.lower is None
+    assert (
+        read_description(lift_urdf("Velocity"))
+        .limited_by({"rail": {"angle_wraparound": True}})
+        .joints["rail"]
+        .limits.lower
+        is None
+    )

@@ -87,7 +87,9 @@ def frame(values):
 
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
 @given(six, six, six, st.floats(-3.0, 3.0), st.sampled_from(["revolute", "prismatic"]))
-def test_a_joint_moves_its_child_about_its_own_frame(new_engine, parent, child, anchor, position, kind):
+def test_a_joint_moves_its_child_about_its_own_frame(
+    new_engine, parent, child, anchor, position, kind
+):
     """For any place of links and joint the child goes where the transforms say."""
     text = sdf(
         link("a", words(parent)), link("b", words(child)),
@@ -183,7 +185,9 @@ def test_limits_dynamics_defaults_and_surfaces_are_read():
 def test_a_link_without_gravity_stays_where_it_is(new_engine):
     world, model = spawn(
         new_engine(),
-        sdf(link("a", more="<gravity>false</gravity>")), Pose((0.0, 0.0, 1.0)), (0.0, 0.0, -9.8)
+        sdf(link("a", more="<gravity>false</gravity>")),
+        Pose((0.0, 0.0, 1.0)),
+        (0.0, 0.0, -9.8),
     )
     for _ in range(500):
         world.step()

@@ -146,7 +146,10 @@ def test_of_several_robots_plain_names_are_refused_and_full_ones_taken(world):
         world.add(name, "effort_joint")
     for fields, text in (
         ({"controllers": ["effort_joint"], "commands": [1.0]}, "several robots have a controller"),
-        ({"commanded_joints": ["effort_b"], "joint_commands": [1.0]}, "several robots have a joint"),
+        (
+            {"commanded_joints": ["effort_b"], "joint_commands": [1.0]},
+            "several robots have a joint",
+        ),
         ({"joints": ["effort_b"], "positions": [1.0]}, "several models have a joint"),
     ):
         answer = world.call(1, **fields)
@@ -173,12 +176,18 @@ def test_of_several_robots_plain_names_are_refused_and_full_ones_taken(world):
 @pytest.mark.parametrize(
     ("fields", "text"),
     [
-        ({"joints": ["effort_b", "slides::effort_b"], "positions": [0, 1]}, "names 'slides::effort_b' twice"),
+        (
+            {"joints": ["effort_b", "slides::effort_b"], "positions": [0, 1]},
+            "names 'slides::effort_b' twice",
+        ),
         (
             {"commanded_joints": ["effort_b", "slides::effort_b"], "joint_commands": [0, 1]},
             "commanded_joints names one twice",
         ),
-        ({"commanded_joints": ["effort_a"], "joint_commands": [1]}, "belongs to controller 'effort_joint'"),
+        (
+            {"commanded_joints": ["effort_a"], "joint_commands": [1]},
+            "belongs to controller 'effort_joint'",
+        ),
         (
             {"controllers": ["effort_joint", "/slides/effort_joint"], "commands": [0, 1]},
             "controllers names one twice",

@@ -125,7 +125,9 @@ def test_it_goes_on_from_its_state_to_the_same_bits(episodes):
     assert [agents[0].act(observation) for _ in range(50)] == [
         agents[1].act(observation) for _ in range(50)
     ]
-    for ours, theirs in zip(agents[0].value.parameters(), agents[1].value.parameters(), strict=True):
+    for ours, theirs in zip(
+        agents[0].value.parameters(), agents[1].value.parameters(), strict=True
+    ):
         assert torch.equal(ours, theirs)
 
 
@@ -144,7 +146,9 @@ def test_the_same_seed_learns_the_same_bits():
     for agent in agents:
         for seed in range(4):
             agent.learn(an_episode(seed=seed))
-    for ours, theirs in zip(agents[0].value.parameters(), agents[1].value.parameters(), strict=True):
+    for ours, theirs in zip(
+        agents[0].value.parameters(), agents[1].value.parameters(), strict=True
+    ):
         assert torch.equal(ours, theirs)
 
 
@@ -159,7 +163,9 @@ def test_a_batch_is_one_step_down_the_gradient_of_the_paper(normalize):
         agent.learn(an_episode(15, seed, actions=3))
     seen = np.array([o for seed in range(3) for o in an_episode(15, seed, actions=3).observations])
     mean, deviation = (seen / scale).mean(0), (seen / scale).std(0)
-    weight, bias = (each.detach().double().numpy() for each in (agent.policy.fc.weight, agent.policy.fc.bias))
+    weight, bias = (
+        each.detach().double().numpy() for each in (agent.policy.fc.weight, agent.policy.fc.bias)
+    )
     batch = [an_episode(9 + seed, seed, terminated=seed != 4, actions=3) for seed in (3, 4, 5)]
     inputs, actions, advantages, targets, estimates = [], [], [], [], []
     for episode in batch:
@@ -188,7 +194,9 @@ def test_a_batch_is_one_step_down_the_gradient_of_the_paper(normalize):
     for episode in batch:
         losses = agent.learn(episode)
     assert agent.policy.fc.weight.grad.numpy() == pytest.approx(slope, abs=1e-5)
-    assert losses.policy == pytest.approx(-np.mean(np.log((chances * chosen).sum(1)) * advantages), abs=1e-5)
+    assert losses.policy == pytest.approx(
+        -np.mean(np.log((chances * chosen).sum(1)) * advantages), abs=1e-5
+    )
     assert losses.value == pytest.approx(np.mean((np.array(estimates) - targets) ** 2), rel=1e-4)
 
 
@@ -269,5 +277,7 @@ def test_the_loop_keeps_observations_that_an_environment_writes_over():
             return self.array
 
     env = CartPoleEnv(FakePlant())
-    plain, written = (run_episode(each, ReinforceAgent(0), lambda: False) for each in (env, Writing(env)))
+    plain, written = (
+        run_episode(each, ReinforceAgent(0), lambda: False) for each in (env, Writing(env))
+    )
     assert np.array_equal(plain.states(), written.states())

@@ -71,7 +71,9 @@ def test_a_suite_gives_tables_with_every_seed_and_every_failure(
     command = ["benchmark", "two", f"--suites={suites}", f"--out={out}", "--episodes=2", "--jobs=2"]
     assert cli.main(command) == 0
     said = capsys.readouterr().out
-    assert re.search(r"broken, seed 0: ended with exit code 1, .*unknown environment 'NoSuch-v0'", said)
+    assert re.search(
+        r"broken, seed 0: ended with exit code 1, .*unknown environment 'NoSuch-v0'", said
+    )
     rows = {row["variant"]: row for row in json.loads((out / "results.json").read_text())["runs"]}
     assert rows["plain"]["steps"] == 300 and rows["plain"]["best"] is not None
     assert rows["plain"]["cpu_seconds"] > 0
@@ -173,7 +175,9 @@ def test_options_that_stable_baselines3_does_not_know_are_refused_before_anythin
     assert cli.main(command) == 1
     assert "did you mean n_steps" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-    check_stable_baselines3(make_variant("t", "a", {"algo": "ppo", "target_kl": None, "n_steps": 64}))
+    check_stable_baselines3(
+        make_variant("t", "a", {"algo": "ppo", "target_kl": None, "n_steps": 64})
+    )
 
 
 def test_a_failed_training_stays_in_the_table(tmp_path: Path) -> None:

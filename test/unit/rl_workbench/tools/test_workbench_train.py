@@ -245,7 +245,9 @@ def test_a_full_disk(tmp_path: Path, monkeypatch, capsys) -> None:
 
     with monkeypatch.context() as patched:
         patched.setattr(os, "fsync", full)
-        assert work(*PPO, "--total-timesteps", "320", "--eval-frequency", "64", "--run-dir", run) == 1
+        assert (
+            work(*PPO, "--total-timesteps", "320", "--eval-frequency", "64", "--run-dir", run) == 1
+        )
     assert "No space left on device; stopped after 128 steps" in capsys.readouterr().err
     assert work("train", "--resume", run) == 0, "with space again it goes on"
     assert summary(run)["steps"] == 320
@@ -284,7 +286,10 @@ def test_a_bar_on_a_terminal(tmp_path: Path) -> None:
     shown.show(1.5, 99.0)
     shown.close()
     told = terminal.getvalue()
-    assert "/200" in told and "Episode   20 | Reward:     1.50 | Avg(20):     1.50 | 99 steps/s" in told
+    assert (
+        "/200" in told
+        and "Episode   20 | Reward:     1.50 | Avg(20):     1.50 | 99 steps/s" in told
+    )
 
 
 def test_many_environments_of_training_are_one_when_playing(tmp_path: Path, recwarn) -> None:

@@ -56,7 +56,10 @@ def test_resumed(tmp_path: Path, capsys) -> None:
     ("env_id", "words"),
     [
         ("CartPol-v1", "unknown environment 'CartPol-v1'; did you mean CartPole-v1?"),
-        ("Pendulum-v1", "REINFORCE needs a choice of single actions, Discrete(n); Pendulum-v1 has Box"),
+        (
+            "Pendulum-v1",
+            "REINFORCE needs a choice of single actions, Discrete(n); Pendulum-v1 has Box",
+        ),
         ("cartpole/SwingUp-v0", "PPO, A2C, SAC, TD3 or DDPG fit it"),
     ],
 )

@@ -76,7 +76,10 @@ def test_an_evaluation_that_a_checkpoint_knows_of_is_not_held_again(tmp_path: Pa
     whole, run = (train(tmp_path / name, **options) for name in ("whole", "run"))
     for path in (run / "last.pt", sorted((run / "checkpoints").iterdir())[-1]):
         path.unlink()  # killed after the one of episode 12
-    assert len(checkpoint(run, sorted((run / "checkpoints").iterdir())[-1])["history"]["evaluations"]) == 3
+    assert (
+        len(checkpoint(run, sorted((run / "checkpoints").iterdir())[-1])["history"]["evaluations"])
+        == 3
+    )
     resume(run)
     assert_same_run(whole, run)
     without_doubles(run)
@@ -207,7 +210,9 @@ PLAIN = {"env_id": "CartPole-v1", "episodes": 70, "eval_episodes": 2, "eval_freq
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("options", "seed"), [(BULLET, 0), (PLAIN, 1)], ids=["robot", "CartPole-v1"])
+@pytest.mark.parametrize(
+    ("options", "seed"), [(BULLET, 0), (PLAIN, 1)], ids=["robot", "CartPole-v1"]
+)
 def test_killed_at_random_moments(root: Path, tmp_path: Path, options: dict, seed: int) -> None:
     options = options | {"checkpoint_frequency": 2}
     run, moments = tmp_path / "run", random.Random(seed)

@@ -198,7 +198,9 @@ def test_three_actions_and_two_observations(tmp_path: Path) -> None:
 
 
 def test_actions_that_do_not_suit(tmp_path: Path) -> None:
-    with pytest.raises(WorkbenchError, match=r"REINFORCE needs .*Pendulum-v1 has Box.*PPO.* fit it"):
+    with pytest.raises(
+        WorkbenchError, match=r"REINFORCE needs .*Pendulum-v1 has Box.*PPO.* fit it"
+    ):
         train(tmp_path, env_id="Pendulum-v1")
     assert files(tmp_path) == set()
 
