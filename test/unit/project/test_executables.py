@@ -9,7 +9,8 @@ import sys
 import pytest
 
 BOUND = 15.0  # [s]
-MAIN = "import sys; from bullet_gazebo.ros.{0} import main; sys.exit(main())"
+MAIN = "import sys; from bullet_gazebo.ros.{0}.{1} import main; sys.exit(main())"
+ROOMS = {"gazebo": "node", "gzserver": "node"}  # all others are clients
 PROGRAMS = {  # name: arguments, exit code after Ctrl-C
     "spawner": (["a_controller"], 0),
     "unspawner": (["a_controller"], 0),
@@ -32,7 +33,7 @@ def start(tmp_path):
             "ROS_LOG_DIR": str(tmp_path),
         }
         program = subprocess.Popen(
-            [sys.executable, "-c", MAIN.format(name), *arguments], env=environment,
+            [sys.executable, "-c", MAIN.format(ROOMS.get(name, "clients"), name), *arguments], env=environment,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
         programs.append(program)

@@ -3,6 +3,7 @@
 import hashlib
 import subprocess
 import sys
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -38,7 +39,7 @@ def test_ten_thousand_steps_twice_and_in_another_process(identifier, kind):
     first = long_run(identifier, kind)
     assert long_run(identifier, kind) == first
     script = f"import test_environment_determinism as t;print(t.long_run({identifier!r}, {kind!r}))"
-    path = ":".join(entry for entry in sys.path if entry)
+    path = ":".join([str(Path(__file__).parent), *(entry for entry in sys.path if entry)])
     shown = subprocess.run(
         [sys.executable, "-c", script],
         env={"PYTHONPATH": path},

@@ -61,7 +61,7 @@ def python(code, *arguments):
 
 STARTER = """
 import signal, sys, time
-from ros_utils import _processes
+from ros_utils._internal.processes import processes as _processes
 print(_processes.start(["sleep", "1000"], "node", "sleeper").process.pid, flush=True)
 signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
 if "stay" in sys.argv:
