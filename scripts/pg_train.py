@@ -5,7 +5,7 @@ import sys
 
 if __name__ == "__main__":
     try:
-        from rl_workbench.training.pg.cli import main
+        from cartpole.pg_train import main
     except KeyboardInterrupt:  # Ctrl-C while it is still being read; main() sees to the rest
         sys.exit(130)
     sys.exit(main())

@@ -1,4 +1,4 @@
-"""The command workbench.py: its subcommands, errors in one line, exit codes."""
+"""The command line: its subcommands, errors in one line, exit codes."""
 
 import argparse
 import sys
@@ -6,12 +6,14 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training import cli as training
 from rl_workbench.training.options.options import unknown
 from rl_workbench.training.run.interrupt import Interrupt
 
-COMMAND = "workbench.py"
+PROG = "rl-workbench"
+PROGRAM = (sys.executable, "-m", "rl_workbench")
 DESCRIPTION = """\
-Looks at trainings of dqn_train.py, pg_train.py and of its own command train.
+Trains agents in Gymnasium's environments, and looks at what they learned.
 
 RUN is a run folder, as runs/CartPole-v1__dqn__0__1700000000. No ROS master is needed.
 Exit codes: 0 done, 1 failed, 2 wrong arguments; 130 after Ctrl-C."""
@@ -32,7 +34,7 @@ COMMANDS = {
     "plot": _Command("drawing", "the training curves of runs as PNG"),
     "policy": _Command("drawing", "the policy over the pole's angle and velocity as PNG"),
     "compare": _Command("comparing", "groups of runs: table per seed, IQM, intervals, curves"),
-    "train": _Command("training", "train by DQN, policy gradient or Stable-Baselines3"),
+    TRAIN: _Command("", "train by DQN, REINFORCE or Stable-Baselines3"),
     "sweep": _Command("searching", "search options with Optuna"),
     "benchmark": _Command(
         "benchmarking", "train several seeds, or a suite; table per seed, curves"
@@ -41,37 +43,40 @@ COMMANDS = {
 PACKAGE = "rl_workbench.tools.commands"
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Does what the arguments say; returns the process's exit code."""
+def main(
+    argv: list[str] | None = None, prog: str = PROG, program: tuple[str, ...] = PROGRAM
+) -> int:
+    """Does what the arguments say; returns the process's exit code.
+
+    Args:
+        prog: the command's name, for --help and errors.
+        program: how it is started, for trainings in processes of their own.
+    """
     argv = sys.argv[1:] if argv is None else argv
+    if argv[:1] == [TRAIN]:  # its flags depend on the algorithm
+        return training.main(argv[1:], prog=f"{prog} {TRAIN}")
     interrupt = Interrupt().install()
     try:
-        if argv[:1] == [TRAIN]:  # its flags depend on the algorithm
-            return int(_module(TRAIN).train(plain(argv[1:]), interrupt))
-        arguments = parse(plain(argv))
+        arguments = parse(argv, prog)
+        arguments.program = program
         _module(arguments.command).run(arguments, interrupt)
         return interrupt.exit_code
     except WorkbenchError as error:
-        print(f"{COMMAND}: {error}", file=sys.stderr, flush=True)
+        print(f"{prog}: {error}", file=sys.stderr, flush=True)
         return interrupt.exit_code or 1
     except KeyboardInterrupt:
-        print(f"{COMMAND}: interrupted", file=sys.stderr)
+        print(f"{prog}: interrupted", file=sys.stderr)
         return interrupt.exit_code or 130
 
 
-def plain(argv: list[str]) -> list[str]:
-    """The arguments without what roslaunch adds (`__name:=`, `__log:=`)."""
-    return [each for each in argv if not (each.startswith("__") and ":=" in each)]
-
-
-def parse(argv: list[str]) -> argparse.Namespace:
+def parse(argv: list[str], prog: str = PROG) -> argparse.Namespace:
     """The arguments of the subcommand.
 
     Raises:
         SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
     """
     parser = argparse.ArgumentParser(
-        COMMAND,
+        prog,
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,

@@ -13,12 +13,9 @@ import numpy as np
 import torch
 from torch import nn
 
+from rl_workbench.agents.pg.settings import DocumentSettings
 from rl_workbench.agents.pg.two_networks import TwoNetworks
 from rl_workbench.errors import WorkbenchError
-
-GAMMA = 0.99
-POLICY_LEARNING_RATE = 0.01
-VALUE_LEARNING_RATE = 0.1
 
 
 class PolicyNetwork(nn.Module):
@@ -66,7 +63,7 @@ class Episode:
 
     @property
     def total_reward(self) -> float:
-        """The undiscounted sum, added in order as the document's script does."""
+        """The undiscounted sum, added in order as the existing script does."""
         return float(sum(self.rewards))
 
     def states(self) -> list[np.ndarray]:
@@ -107,7 +104,7 @@ class Losses(NamedTuple):
     value: float
 
 
-def discounted_returns(rewards: list[float], gamma: float = GAMMA) -> np.ndarray:
+def discounted_returns(rewards: list[float], gamma: float) -> np.ndarray:
     """Each step's return, from the last step backwards: G_t = r_t + gamma G_t+1.
 
     Returns:
@@ -125,24 +122,26 @@ class PolicyGradientAgent(TwoNetworks):
     """Learns from whole episodes; acts from a NumPy copy of the linear policy.
 
     Both output layers start at zero: a uniform policy, and a value of 0 everywhere. From random
-    ones, as in the document's script, several seeds in ten need more than 600 episodes: a weight
+    ones, as in the existing script, several seeds in ten need more than 600 episodes: a weight
     of the policy that starts with the wrong sign has to be unlearned, and a hidden unit that
     starts with a negative weight to the value's output is soon dead, since returns are positive.
 
     Args:
         seed: makes the initial weights and the choice of actions repeatable, through
             generators of its own.
-        random_weights: draw the output layers too, as the document's script does.
+        settings: the algorithm's options.
     """
 
-    def __init__(self, seed: int = 0, random_weights: bool = False) -> None:
+    def __init__(self, seed: int = 0, settings: DocumentSettings | None = None) -> None:
+        self.settings = settings = settings or DocumentSettings()
         with torch.random.fork_rng():
             torch.manual_seed(seed)
             policy, value = PolicyNetwork(), ValueNetwork()
-        if not random_weights:
+        if not settings.random_weights:
             start_at_zero(policy.fc)
             start_at_zero(value.fc2)
-        super().__init__(policy, value, (POLICY_LEARNING_RATE, VALUE_LEARNING_RATE), seed)
+        rates = (settings.policy_learning_rate, settings.value_learning_rate)
+        super().__init__(policy, value, rates, seed)
         self._output = policy.fc
         self.sync()
 
@@ -180,7 +179,9 @@ class PolicyGradientAgent(TwoNetworks):
         """
         observations = torch.from_numpy(np.stack(episode.observations))  # (T, 4)
         actions = torch.tensor(episode.actions)  # (T,)
-        returns = torch.from_numpy(discounted_returns(episode.rewards))  # (T,) float64
+        returns = torch.from_numpy(
+            discounted_returns(episode.rewards, self.settings.gamma)
+        )  # (T,) float64
         values = self.value(observations).squeeze(1)  # (T,)
         advantages = (returns - values.detach().double()).float()
         value_loss = nn.functional.mse_loss(values, returns.float())

@@ -1,6 +1,6 @@
 """REINFORCE with a learned baseline: generalised advantages, one step of the policy a batch of episodes.
 
-Against the document's algorithm (policy_gradient.py) it differs in four things, each of which takes variance
+Against the algorithm of the ROS policy-gradient document (document.py) it differs in four things, each of which takes variance
 out of the gradient: advantages are weighted sums of temporal differences (Schulman et al. 2016, λ = 0.95)
 instead of whole returns; they are normalised over the batch; the baseline is fitted to each batch, not
 nudged towards it once; and observations come scaled, so that one learning rate suits all weights. A
@@ -125,7 +125,7 @@ class ReinforceAgent(TwoNetworks):
     def _update(self, batch: list[Episode]) -> Losses:
         observations = torch.cat([self._seen(episode.observations) for episode in batch])
         actions = torch.tensor([action for episode in batch for action in episode.actions])
-        advantages, targets = self._judge(batch)
+        advantages, targets = self._advantages(batch)
         spread = float(advantages.std(correction=0))
         advantages = (advantages - advantages.mean()) / (spread + SMALLEST_SPREAD)
         policy_loss = self._policy_loss(observations, actions, advantages)
@@ -149,7 +149,7 @@ class ReinforceAgent(TwoNetworks):
         entropy = torch.special.entr(probabilities.clamp_min(SMALLEST_CHANCE)).sum(1).mean()
         return loss - self.settings.entropy_coefficient * entropy
 
-    def _judge(self, batch: list[Episode]) -> tuple[torch.Tensor, torch.Tensor]:
+    def _advantages(self, batch: list[Episode]) -> tuple[torch.Tensor, torch.Tensor]:
         """Advantages and the baseline's targets, each (T,) over all episodes' steps."""
         advantages, targets = [], []
         for episode in batch:

@@ -1,7 +1,8 @@
-"""All that REINFORCE with a baseline can be told, each option with its default."""
+"""All that the policy gradients can be told, each option with its default."""
 
 from dataclasses import dataclass
 
+from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import check_options, option
 
 
@@ -27,8 +28,33 @@ class ReinforceSettings:
     )
     value_hidden: int = option(32, "units in each of the baseline's two layers", 1, 2**16)
     normalize_observations: bool = option(
-        False, "by mean and deviation as seen so far; switched on where no scale is known"
+        False, "by mean and deviation as seen so far; for where no scale is known"
     )
+    observation_scale: tuple[float, ...] = option(
+        (), "what each number of an observation is divided by; none: 1"
+    )
+
+    def __post_init__(self) -> None:
+        check_options(self)
+        if not all(each > 0.0 for each in self.observation_scale):
+            raise WorkbenchError(f"observation_scale is positive, not {self.observation_scale}")
+
+
+@dataclass(frozen=True)
+class DocumentSettings:
+    """The options of the ROS policy-gradient document's algorithm; its script has them as constants.
+
+    Raises:
+        WorkbenchError: if a value is beyond its limits; names the option and these.
+    """
+
+    gamma: float = option(0.99, "discount of rewards, for each step that they come later", 0, 1)
+    policy_learning_rate: float = option(0.01, "of the policy's Adam", 0, 10)
+    value_learning_rate: float = option(0.1, "of the value network's Adam", 0, 10)
+    random_weights: bool = option(
+        False, "draw all initial weights at random, as the script does; else the output layers "
+        "start at zero, which learns more reliably",
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         check_options(self)

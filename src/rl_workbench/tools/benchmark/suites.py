@@ -6,19 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.tools.algorithms import ALGORITHMS, DQN
-from rl_workbench.tools.runs.runs import POLICY_GRADIENT
-from rl_workbench.training.dqn import settings as dqn_settings
+from rl_workbench.training.algorithms import ALGORITHMS, algorithm
 from rl_workbench.training.options.config_file import default_file, read_section
-from rl_workbench.training.pg import settings as pg_settings
-from rl_workbench.training.run.record import is_plain
-from rl_workbench.training.sb3 import settings as sb3_settings
+from rl_workbench.training.options.record import is_plain
+from rl_workbench.training.options.training_options import choose, known_options
 
 CONFIG = "benchmark.yaml"
 # Flags that are no options: which section of the algorithm's file, or which other file.
-SPECIAL = {DQN: ("preset", "config")}
-OTHERS_SPECIAL = ("config",)
-KNOWN = {DQN: dqn_settings.OPTIONS, POLICY_GRADIENT: pg_settings.OPTIONS}
+SPECIAL = ("preset", "config")
 NAME = re.compile(r"\w[\w.+-]*")  # of a variant, which is a folder's too
 MOST_SEEDS = 10_000
 OWN = ("seed", "run_dir", "exp_name")  # the benchmark gives these
@@ -88,36 +83,36 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
             f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}"
         )
     rest = dict(options)
-    algorithm = str(rest.pop("algo", DQN))
-    if algorithm not in ALGORITHMS:
-        raise WorkbenchError(f"{origin}: algo is one of {', '.join(ALGORITHMS)}, not {algorithm!r}")
+    kind = str(rest.pop("algo", "dqn"))
+    if kind not in ALGORITHMS:
+        raise WorkbenchError(f"{origin}: algo is one of {', '.join(ALGORITHMS)}, not {kind!r}")
     taken = [key for key in rest if key in OWN]
     if taken:
         raise WorkbenchError(f"{origin}: {taken[0]} is given by the benchmark")
-    if algorithm in KNOWN:
+    if not algorithm(kind).package:  # the others are asked only when they are trained
         rest = {key: value for key, value in rest.items() if value is not None}
-        KNOWN[algorithm].read(_without_special(algorithm, rest), f"{origin}: {name}")
-    return Variant(name, algorithm, rest)
+        known_options(algorithm(kind)).read(_without_special(rest), f"{origin}: {name}")
+    return Variant(name, kind, rest)
 
 
-def check_stable_baselines3(variant: Variant) -> None:
-    """Looks whether Stable-Baselines3 is there, and takes the options, if the variant is of it.
+def check_package(variant: Variant) -> None:
+    """Looks whether the package of the variant's algorithm is there, and takes the options.
 
     Raises:
         WorkbenchError: if not.
     """
-    if variant.algorithm in sb3_settings.CLASSES:
-        sb3_settings.choose(variant.algorithm, arguments(variant, 0, Path("run"))[2:])
+    kind = algorithm(variant.algorithm)
+    if kind.package:
+        choose(kind, arguments(variant, 0, Path("run"))[2:])
 
 
-def _without_special(algorithm: str, options: dict[str, Any]) -> dict[str, Any]:
-    special = SPECIAL.get(algorithm, OTHERS_SPECIAL)
-    return {key: value for key, value in options.items() if key not in special}
+def _without_special(options: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in options.items() if key not in SPECIAL}
 
 
 def arguments(variant: Variant, seed: int, folder: Path) -> list[str]:
     """What `workbench.py train` is told for one run."""
-    rest = _without_special(variant.algorithm, variant.options)
+    rest = _without_special(variant.options)
     special = {key: value for key, value in variant.options.items() if key not in rest}
     own = {"run_dir": folder, "exp_name": variant.name, "seed": seed, **special}
     flags = [f"--{key.replace('_', '-')}={value}" for key, value in own.items()]

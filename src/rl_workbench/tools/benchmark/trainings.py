@@ -5,7 +5,6 @@ import os
 import shutil
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -72,10 +71,11 @@ class Trainings:
 
     Args:
         say: is told of the end of each.
+        program: what starts the command line, without `train`.
     """
 
-    def __init__(self, say: Callable[[str], None]) -> None:
-        self._say = say
+    def __init__(self, say: Callable[[str], None], program: Sequence[str]) -> None:
+        self._say, self._program = say, program
         self._lock = Lock()
         self._running: set[int] = set()  # process ids
         self._stopped = False
@@ -121,7 +121,7 @@ class Trainings:
             if self._stopped:
                 return
             process = subprocess.Popen(
-                command(job),
+                command(job, self._program),
                 env=os.environ | ONE_CORE | own_master(),
                 stdin=subprocess.DEVNULL,
                 stdout=log,
@@ -154,13 +154,13 @@ def own_master() -> dict[str, str]:
         return {"ROS_MASTER_URI": f"http://127.0.0.1:{probe.getsockname()[1]}"}
 
 
-def command(job: Job) -> list[str]:
+def command(job: Job, program: Sequence[str]) -> list[str]:
     """What is run: a new training, or one that goes on.
 
     Raises:
         WorkbenchError: if one runs there, which has outlived its benchmark.
     """
-    begin = [sys.executable, "-m", "rl_workbench", "train"]
+    begin = [*program, "train"]
     if job.folder.exists():
         with run_folder.held(job.folder):
             if (job.folder / LAST).exists():

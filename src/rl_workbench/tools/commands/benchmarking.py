@@ -14,12 +14,11 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.tools.algorithms import ALGORITHMS, DQN
 from rl_workbench.tools.benchmark import benchmark
 from rl_workbench.tools.benchmark.suites import (
     SEEDS,
     Suite,
-    check_stable_baselines3,
+    check_package,
     make_variant,
     read_suite,
 )
@@ -27,11 +26,12 @@ from rl_workbench.tools.benchmark.trainings import Job, Trainings
 from rl_workbench.tools.commands.shared import number
 from rl_workbench.tools.pictures.curves import learning_curves
 from rl_workbench.tools.pictures.panels import evaluation_panels
-from rl_workbench.tools.runs.players import warn
 from rl_workbench.tools.runs.runs import Run, open_run, threshold
+from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.options.options import key_values
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.progress import warn
 from rl_workbench.training.run.results import write_figure, write_file, write_json
 
 RECORD = "suite.json"
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """
     suite = _suite(arguments)
     for variant in suite.variants:
-        check_stable_baselines3(variant)
+        check_package(variant)
     folder = (arguments.out or Path("runs/benchmark") / suite.name).resolve()
     seeds = range(arguments.first_seed, arguments.first_seed + (arguments.seeds or suite.seeds))
     _claim(folder, suite)
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     ]
     with run_folder.held(folder):
         interrupt.defer()
-        Trainings(_say).run(jobs, arguments.jobs, interrupt)
+        Trainings(_say, arguments.program).run(jobs, arguments.jobs, interrupt)
         if interrupt.requested():
             _say("interrupted; the same command goes on")
             return
@@ -99,7 +99,7 @@ def _suite(arguments: argparse.Namespace) -> Suite:
         return read_suite(arguments.suite, arguments.suites)
     if arguments.suites:
         raise WorkbenchError(f"which suite of {arguments.suites}? Name one")
-    algorithm = arguments.algo or DQN
+    algorithm = arguments.algo or "dqn"
     given = {
         "env_id": arguments.env_id or "CartPole-v1",
         **key_values(arguments.params, "--params"),

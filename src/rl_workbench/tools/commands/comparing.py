@@ -14,9 +14,10 @@ from rl_workbench.tools.benchmark.comparison import (
 )
 from rl_workbench.tools.commands.shared import number
 from rl_workbench.tools.pictures.curves import learning_curves
-from rl_workbench.tools.runs.players import WHICH, warn
+from rl_workbench.tools.runs.players import WHICH
 from rl_workbench.tools.runs.runs import find_runs
 from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.progress import warn
 from rl_workbench.training.run.results import check_writable, write_figure, write_json
 
 

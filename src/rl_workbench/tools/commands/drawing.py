@@ -7,9 +7,10 @@ from rl_workbench.tools.commands.shared import add_policy_flags, env_options
 from rl_workbench.tools.pictures.state_plane import plane_of, policy_picture
 from rl_workbench.tools.pictures.training_curves import training_curves
 from rl_workbench.tools.runs.episodes import TEST_SEED
-from rl_workbench.tools.runs.players import load_player, warn
+from rl_workbench.tools.runs.players import load_player
 from rl_workbench.tools.runs.runs import find_runs, open_run
 from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.progress import warn
 from rl_workbench.training.run.results import check_writable, write_figure
 
 

@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import Any
 
 from rl_workbench.extras import need
-from rl_workbench.tools.algorithms import DQN
 from rl_workbench.tools.commands.shared import number
 from rl_workbench.tools.sweep.ranges import read_ranges
 from rl_workbench.tools.sweep.sweep import Sweep, run_sweep
-from rl_workbench.tools.sweep.trainers import names_of, trainer
+from rl_workbench.tools.sweep.trainers import trainer
+from rl_workbench.training.algorithms import ALGORITHMS
+from rl_workbench.training.options.training_options import known_options
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.sb3 import settings as sb3_settings
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
     """Its flags."""
     add = parser.add_argument
-    add("--algo", choices=(DQN, *sb3_settings.CLASSES), default=DQN, help="default dqn")
+    add("--algo", choices=tuple(ALGORITHMS), default="dqn", help="default dqn")
     add("--env-id", default="CartPole-v1", metavar="ID", help="default CartPole-v1")
     add("--ranges", type=Path, metavar="FILE", help="what is searched (config/sweep.yaml)")
     add("--trials", type=number(1), default=20, metavar="N", help="in all (default 20)")
@@ -37,11 +37,12 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     """
     need("optuna", "Optuna", "sweep")
     algorithm, env_id = arguments.algo, arguments.env_id
-    ranges = read_ranges(arguments.ranges, algorithm, env_id, names_of(algorithm))
+    kind = ALGORITHMS[algorithm]
+    ranges = read_ranges(arguments.ranges, algorithm, env_id, known_options(kind).names)
     fixed: dict[str, Any] = {"env_id": env_id}
     if arguments.total_timesteps:
         fixed["total_timesteps"] = arguments.total_timesteps
-    section = env_id if algorithm == DQN else f"{algorithm} {env_id}"
+    section = kind.section.format(env_id=env_id)
     place = f"runs/sweep__{env_id.replace('/', '-')}__{algorithm}__{int(time.time())}"
     folder = arguments.out or Path(place)
     sweep = Sweep(folder, section, ranges, arguments.trials, arguments.seeds, arguments.seed)

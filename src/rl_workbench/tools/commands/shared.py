@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from rl_workbench.tools.runs.players import WHICH
-from rl_workbench.training.dqn.settings import OPTIONS
+from rl_workbench.training.options.options import Options
+from rl_workbench.training.options.run_options import RunOptions
 
 
 def add_policy_flags(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +27,9 @@ def env_options(arguments: argparse.Namespace) -> dict[str, Any]:
         WorkbenchError: if one isn't KEY=VALUE.
     """
     text = ",".join(arguments.env_kwargs)
-    return dict(OPTIONS.read({"env_kwargs": text}, "--env-kwargs").get("env_kwargs", {}))
+    return dict(
+        Options(RunOptions).read({"env_kwargs": text}, "--env-kwargs").get("env_kwargs", {})
+    )
 
 
 def number(lowest: int) -> Any:

@@ -15,15 +15,12 @@ import gymnasium
 import numpy as np
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.run.evaluation import NOISE
-from rl_workbench.training.run.record import CONFIG_RECORD
+from rl_workbench.training.options.record import CONFIG_RECORD
 from rl_workbench.training.run.scalar_log import NAME as SCALARS
 
 SUMMARY = "summary.json"
 RETURN, EVALUATION = "charts/episodic_return", "eval/mean_reward"  # tags
 CONFIRMED = "eval/confirmed_reward"  # of a policy that became the best one
-POLICY_GRADIENT = "pg"
-PG_ENVIRONMENT = ("cartpole/Balance-v0", {"noise": NOISE})  # what pg_train.py evaluates in
 _NOT_THERE = (FileNotFoundError, NotADirectoryError)
 
 
@@ -32,7 +29,7 @@ class Run:
     """One training's folder."""
 
     folder: Path
-    algorithm: str  # dqn, pg, or one of Stable-Baselines3's
+    algorithm: str  # of --algo
     experiment: str
     env_id: str
     env_kwargs: dict[str, Any]
@@ -78,9 +75,8 @@ def open_run(folder: Path) -> Run:
 
 def _with_config(folder: Path, config: dict[str, Any]) -> Run:
     run = config["run"]
-    env_kwargs = dict(run["env_kwargs"])
-    if (config["algorithm"], run["env_id"]) == (POLICY_GRADIENT, PG_ENVIRONMENT[0]):
-        env_kwargs |= PG_ENVIRONMENT[1]
+    # Those of its evaluations, without what was its training's alone; older records have neither.
+    env_kwargs = {**run["env_kwargs"], **run.get("eval_env_kwargs", {})}
     return Run(
         folder,
         config["algorithm"],

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, fields
 from difflib import get_close_matches
 from types import NoneType
-from typing import Any, get_args, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 import yaml
 
@@ -22,13 +22,12 @@ class Options:
     def __init__(self, *classes: type) -> None:
         self._fields: dict[str, Field[Any]] = {}
         self._types: dict[str, Any] = {}
-        self._owner: dict[str, type] = {}
         for owner in classes:
             hints = get_type_hints(owner)
             for each in fields(owner):
-                self._fields[each.name] = each
-                self._types[each.name] = hints[each.name]
-                self._owner[each.name] = owner
+                # The first one to have an option explains it; others of its name have its value.
+                self._fields.setdefault(each.name, each)
+                self._types.setdefault(each.name, hints[each.name])
 
     @property
     def names(self) -> list[str]:
@@ -60,11 +59,10 @@ class Options:
         Raises:
             WorkbenchError: if a value is beyond its limits.
         """
-        return owner(
-            **{name: value for name, value in values.items() if self._owner[name] is owner}
-        )
+        own = {each.name for each in fields(owner)}
+        return owner(**{name: value for name, value in values.items() if name in own})
 
-    def add_flags(self, parser: argparse.ArgumentParser) -> None:
+    def add_flags(self, parser: argparse._ActionsContainer) -> None:
         """A flag for each option; those that aren't given don't appear in the result."""
         for name, each in self._fields.items():
             flag = f"--{name.replace('_', '-')}"
@@ -131,7 +129,31 @@ def _converted(kind: Any, value: Any) -> Any:
         return _number(value)
     if kind is str:
         return str(value)
-    return _mapping(value) if kind is not tuple and "dict" in str(kind) else _sizes(value)
+    if kind is Any:
+        return plain_value(value)
+    if get_origin(kind) is tuple:
+        return _sizes(value, get_args(kind)[0])
+    return _mapping(value)
+
+
+def plain_value(value: Any) -> Any:
+    """A text as a YAML value; 1e-3 is a number, too, which YAML writes 1.0e-3.
+
+    Raises:
+        ValueError: if it isn't one.
+    """
+    if not isinstance(value, str):
+        return value
+    try:
+        value = yaml.safe_load(value)
+    except yaml.YAMLError:
+        raise ValueError("a YAML value") from None
+    try:
+        number = float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
+    is_whole = isinstance(value, str) and number.is_integer() and abs(number) >= 1
+    return int(number) if is_whole else number
 
 
 def _switch(value: Any) -> bool:
@@ -170,14 +192,15 @@ def _exact(number: float) -> int:
     return int(number)
 
 
-def _sizes(value: Any) -> tuple[int, ...]:
+def _sizes(value: Any, kind: type) -> tuple[Any, ...]:
     items = value.strip("[]() ").split(",") if isinstance(value, str) else value
     if not isinstance(items, list | tuple):
         items = [items]
     try:
-        return tuple(_whole(item) for item in items)
+        return tuple((_whole if kind is int else _number)(item) for item in items)
     except ValueError:
-        raise ValueError("whole numbers, as in 128,128") from None
+        example = "whole numbers, as in 128,128" if kind is int else "numbers, as in 0.5,2"
+        raise ValueError(example) from None
 
 
 def _scalar(text: str) -> Any:

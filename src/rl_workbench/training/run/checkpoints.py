@@ -24,7 +24,7 @@ from rl_workbench.training.run.files import save_tensors
 LAST, BEST, FAILURE = "last.pt", "best.pt", "failure.pt"
 FOLDER = "checkpoints"
 LEFTOVERS = (".*.pt.*", ".*.pt.new", ".*.pth.*", ".*.json.*", ".*.png.*")  # of a kill while writing
-FORMAT = "cartpole 1"  # changes when older files can't be read any more
+FORMAT = "rl_workbench 2"  # changes when older files can't be read any more
 _DAMAGED = (RuntimeError, pickle.UnpicklingError, EOFError, ValueError, KeyError, TypeError,
             AttributeError, IndexError, zipfile.BadZipFile, zlib.error)  # fmt: skip
 

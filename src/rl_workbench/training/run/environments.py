@@ -39,11 +39,11 @@ def make_environment(
     except _REFUSED as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise WorkbenchError(f"can't make {env_id}: {reason}") from error
-    return FiniteNumbers(_flat(env, env_id), env_id)
+    return CheckedEnvironment(_flat(env, env_id), env_id)
 
 
-class FiniteNumbers(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Ends with an error what would spoil replay, statistics and weights, before it gets there.
+class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Ends with one line what would spoil replay, statistics and weights, before it gets there.
 
     Args:
         env: its observations are vectors.
@@ -60,9 +60,13 @@ class FiniteNumbers(gymnasium.Wrapper[Any, Any, Any, Any]):
         """As the environment's.
 
         Raises:
-            WorkbenchError: if the observation isn't finite in single precision.
+            WorkbenchError: if the observation isn't finite in single precision, or the environment
+                fails as Gymnasium's do.
         """
-        observation, info = self.env.reset(seed=seed, options=options)
+        try:
+            observation, info = self.env.reset(seed=seed, options=options)
+        except gymnasium.error.Error as error:
+            raise WorkbenchError(str(error)) from error
         self._check(observation)
         return observation, info
 
@@ -70,9 +74,13 @@ class FiniteNumbers(gymnasium.Wrapper[Any, Any, Any, Any]):
         """As the environment's.
 
         Raises:
-            WorkbenchError: if the observation or the reward isn't finite in single precision.
+            WorkbenchError: if the observation or the reward isn't finite in single precision, or the
+                environment fails as Gymnasium's do.
         """
-        observation, reward, terminated, truncated, info = self.env.step(action)
+        try:
+            observation, reward, terminated, truncated, info = self.env.step(action)
+        except gymnasium.error.Error as error:
+            raise WorkbenchError(str(error)) from error
         self._check(observation)
         if not abs(float(reward)) <= LARGEST:  # so that NaN is refused too
             raise self._error("reward", reward)

@@ -9,9 +9,6 @@ from typing import Any, BinaryIO
 
 import torch
 
-from rl_workbench.agents.pg.two_networks import TwoNetworks
-from rl_workbench.training.pg.loop import EpisodeRecord
-
 
 def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
     """Lets `write` fill a file that replaces `path` only once it is whole and on disk.
@@ -59,27 +56,3 @@ def _sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-class NetworkSaver:
-    """Saves both networks, every so many episodes and when asked.
-
-    Args:
-        folder: where `policy_network*.pth` and `value_network*.pth` go.
-        every: episodes between two saves (the first is episode 0); 0 saves only at the end.
-    """
-
-    def __init__(self, folder: Path, agent: TwoNetworks, every: int) -> None:
-        self._folder = folder
-        self._agent = agent
-        self._every = every
-
-    def episode_done(self, record: EpisodeRecord) -> None:
-        if self._every and record.index % self._every == 0:
-            self.save(f"_episode_{record.index}")
-
-    def save(self, suffix: str = "") -> None:
-        """Writes policy_network{suffix}.pth and value_network{suffix}.pth."""
-        networks = {"policy_network": self._agent.policy, "value_network": self._agent.value}
-        for name, network in networks.items():
-            save_tensors(self._folder / f"{name}{suffix}.pth", network.state_dict())

@@ -14,18 +14,22 @@ from pathlib import Path
 from typing import Any
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.options.record import CONFIG_RECORD, read_record
 from rl_workbench.training.run.files import write_atomically
 
 LIBRARIES = ("python", "numpy", "torch", "gymnasium")  # a training's bits depend on them
 
 
-def create(run_dir: str | None, env: str, experiment: str, seed: int) -> Path:
-    """Makes the run's folder: the one given, or runs/{env}__{experiment}__{seed}__{time}.
+@contextlib.contextmanager
+def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]:
+    """A new run's folder, held: the one given, or runs/{env}__{experiment}__{seed}__{time}.
 
-    Slashes and colons of the names become hyphens there.
+    Slashes and colons of the names become hyphens there. Whoever makes a folder and can't begin
+    leaves none behind; who comes second leaves the first one's alone.
 
     Raises:
-        WorkbenchError: if the folder holds something already, or can't be made or written to.
+        WorkbenchError: if the folder holds something already, another training runs in it, or it
+            can't be made or written to.
     """
     name = re.sub("[/:]", "-", f"{env}__{experiment}__{seed}__{int(time.time())}")
     folder = Path(run_dir or Path("runs") / name)
@@ -34,23 +38,33 @@ def create(run_dir: str | None, env: str, experiment: str, seed: int) -> Path:
             folder.mkdir(parents=True, exist_ok=True)
         else:
             folder = _fresh(folder)
+    except OSError as error:
+        raise _no_place(folder, error) from error
+    with held(folder):
+        try:
+            _check_empty(folder)
+            yield folder.resolve()
+        finally:
+            with contextlib.suppress(OSError):  # it isn't empty: all is well
+                folder.rmdir()
+
+
+def _check_empty(folder: Path) -> None:
+    try:
         taken = next(folder.iterdir(), None) is not None
         if not taken:
             write_atomically(folder / ".probe", lambda stream: None)
             (folder / ".probe").unlink()
     except OSError as error:
-        raise WorkbenchError(f"can't write to the run folder {folder}: {error.strerror}") from error
+        raise _no_place(folder, error) from error
     if taken:
         raise WorkbenchError(
             f"the run folder {folder} isn't empty; name another one or remove its contents"
         )
-    return folder.resolve()
 
 
-def remove_if_empty(folder: Path) -> None:
-    """Leaves no folder behind of a training that couldn't begin."""
-    with contextlib.suppress(OSError):
-        folder.rmdir()
+def _no_place(folder: Path, error: OSError) -> WorkbenchError:
+    return WorkbenchError(f"can't write to the run folder {folder}: {error.strerror}")
 
 
 @contextlib.contextmanager
@@ -65,12 +79,22 @@ def held(folder: Path) -> Iterator[None]:
     except OSError as error:
         raise WorkbenchError(f"{folder} is no run folder: {error.strerror}") from error
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise WorkbenchError(f"a training is running in {folder}") from error
+        if not _is_at(descriptor, folder):  # its last holder has removed it meanwhile
+            raise WorkbenchError(f"{folder} is no run folder: it was removed just now")
         yield
-    except BlockingIOError as error:
-        raise WorkbenchError(f"a training is running in {folder}") from error
     finally:
         os.close(descriptor)
+
+
+def _is_at(descriptor: int, folder: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(descriptor), folder.stat())
+    except FileNotFoundError:
+        return False
 
 
 def _fresh(wanted: Path) -> Path:
@@ -120,3 +144,16 @@ def versions() -> dict[str, str]:
         "machine": platform.platform(),
         "command": shlex.join(sys.argv),
     }
+
+
+def write_record(folder: Path, config: dict[str, Any], resumed: bool) -> None:
+    """Writes it; of a resumed training, whose length may be new, versions and begin stay.
+
+    Raises:
+        OSError: if the disk refuses.
+        WorkbenchError: if the record of a resumed training is damaged.
+    """
+    record: dict[str, Any] = {"versions": versions(), "began": time.time()}
+    if resumed:
+        record = read_record(folder)
+    write_summary(folder / CONFIG_RECORD, {**record, **config})

@@ -1,13 +1,13 @@
-"""Ctrl-C and SIGTERM: at once while things start, at the next step while training."""
+"""Ctrl-C, SIGTERM and a closed terminal: at once while things start, at the next step while training."""
 
 import signal
 from types import FrameType
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Interrupt:
-    """Takes over both signals from `install()` on, until the process ends.
+    """Takes over these signals from `install()` on, until the process ends.
 
     Before `defer()` a signal raises KeyboardInterrupt, so any wait ends at once. After it, a
     signal only makes `requested` true: the loop ends at its next step, and saving and
@@ -20,7 +20,9 @@ class Interrupt:
 
     def install(self) -> "Interrupt":
         for number in _SIGNALS:
-            signal.signal(number, self._handle)
+            # Under nohup a closed terminal is no reason to end.
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+                signal.signal(number, self._handle)
         return self
 
     def defer(self) -> None:

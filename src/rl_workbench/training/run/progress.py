@@ -1,15 +1,28 @@
-"""What the user sees while training: a bar on a terminal, else a line every 20 episodes."""
+"""What the user sees while training: a bar on a terminal, and a line every 20 episodes."""
 
+import contextlib
 import os
 import sys
-from typing import TextIO
+import time
+from collections.abc import Sequence
+from typing import Any, TextIO
 
 from tqdm import tqdm
 
-from rl_workbench.training.pg.loop import EpisodeRecord
-
 LINE_EVERY = 20  # [episodes]
+REFRESH = 0.1  # [s]
 WIDTH = 100  # [columns] of the bar on a terminal that doesn't tell its size
+
+
+def tell(text: str, stream: TextIO | None = None) -> None:
+    """Tells the user, at once also when the output is a pipe; one that is gone costs no training."""
+    with contextlib.suppress(OSError):
+        print(text, file=stream, flush=True)
+
+
+def warn(text: str) -> None:
+    """Tells the user beside the results."""
+    tell(text, sys.stderr)
 
 
 def _has_size(stream: TextIO) -> bool:
@@ -20,7 +33,7 @@ def _has_size(stream: TextIO) -> bool:
         return False
 
 
-def terminal_bar(total: int, unit: str, stream: TextIO, done: int = 0) -> tqdm:
+def _terminal_bar(total: int, unit: str, stream: TextIO, done: int) -> tqdm:
     """An empty bar that suits the terminal."""
     sized = _has_size(stream)
     return tqdm(
@@ -34,55 +47,69 @@ def terminal_bar(total: int, unit: str, stream: TextIO, done: int = 0) -> tqdm:
     )
 
 
-class Bar:
-    """A tqdm bar with the last return, the last length and the steps per second."""
+class Progress:
+    """A bar over what the training's length is counted in, and lines.
 
-    def __init__(self, episodes: int, stream: TextIO, done: int = 0) -> None:
-        self._bar = terminal_bar(episodes, "episode", stream, done)
+    Args:
+        total: steps or episodes of the whole training.
+        unit: which of them, "step" or "episode".
+        done: of these, what was done before.
+        stream: where it goes; standard error unless told otherwise.
+    """
 
-    def episode_done(self, record: EpisodeRecord) -> None:
-        self._bar.set_postfix_str(
-            f"return {record.total_reward:.0f}, length {record.length}, "
-            f"{record.steps_per_second:.0f} steps/s",
-            refresh=False,
-        )
-        self._bar.update()
+    def __init__(self, total: int, unit: str, done: int, stream: TextIO | None = None) -> None:
+        self._stream = stream or sys.stderr
+        self._counts_steps = unit == "step"
+        self._done = self._shown = done
+        self._time = time.monotonic()
+        self._bar: Any = None
+        if self._stream.isatty():
+            self._bar = _terminal_bar(total, unit, self._stream, done)
+
+    def step_done(self, steps: int) -> None:
+        """Moves a bar of steps, now and then."""
+        if self._counts_steps:
+            self._advance(steps)
+
+    def _advance(self, done: int) -> None:
+        self._done = done
+        if self._bar is not None and time.monotonic() - self._time > REFRESH:
+            self._move()
+
+    def _move(self) -> None:
+        self._bar.update(self._done - self._shown)
+        self._shown, self._time = self._done, time.monotonic()
+
+    def episode_done(self, returns: Sequence[float], length: int, speed: str, note: str) -> None:
+        """Puts an episode's figures beside the bar; of every 20th one there is a line.
+
+        Args:
+            returns: of all episodes so far.
+            length: of the last one [steps].
+            speed: in steps a second, as a text.
+            note: what the algorithm says of itself; the speed if it is empty.
+        """
+        if not self._counts_steps:
+            self._advance(len(returns))
+        if self._bar is not None:
+            parts = [f"return {returns[-1]:.0f}", f"length {length}", note.replace(":", ""), speed]
+            self._bar.set_postfix_str(", ".join(filter(None, parts)), refresh=False)
+        if len(returns) % LINE_EVERY == 0:
+            mean = sum(returns[-LINE_EVERY:]) / LINE_EVERY
+            self.say(
+                f"Episode {len(returns):4d} | Reward: {returns[-1]:3.0f} | "
+                f"Avg({LINE_EVERY}): {mean:6.1f} | {note or speed}"
+            )
+
+    def say(self, text: str) -> None:
+        """A line of its own, above the bar."""
+        if self._bar is not None:
+            self._bar.write(text, file=self._stream)
+        else:
+            tell(text, self._stream)
 
     def close(self) -> None:
-        self._bar.close()
-
-
-class Lines:
-    """Means over the last 20 episodes, one line for each 20."""
-
-    def __init__(self, episodes: int, stream: TextIO) -> None:
-        self._episodes = episodes
-        self._stream = stream
-        self._recent: list[EpisodeRecord] = []
-
-    def episode_done(self, record: EpisodeRecord) -> None:
-        self._recent.append(record)
-        if (record.index + 1) % LINE_EVERY == 0:
-            self._print()
-            self._recent.clear()
-
-    def _print(self) -> None:
-        count = len(self._recent)
-        length = sum(record.length for record in self._recent) / count
-        total = sum(record.total_reward for record in self._recent) / count
-        last = self._recent[-1]
-        print(
-            f"episode {last.index + 1:5d}/{self._episodes}  mean length {length:7.1f}  "
-            f"mean return {total:8.1f}  {last.steps_per_second:6.0f} steps/s",
-            file=self._stream,
-            flush=True,
-        )
-
-    def close(self) -> None:
-        """Nothing to close."""
-
-
-def progress(episodes: int, stream: TextIO | None = None, done: int = 0) -> Bar | Lines:
-    """The form that suits where the output goes (standard error unless told otherwise)."""
-    stream = stream or sys.stderr
-    return Bar(episodes, stream, done) if stream.isatty() else Lines(episodes, stream)
+        """Ends the bar, where the training has come to."""
+        if self._bar is not None:
+            self._move()
+            self._bar.close()

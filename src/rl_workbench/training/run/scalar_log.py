@@ -13,9 +13,6 @@ from typing import Any
 from torch.utils.tensorboard import SummaryWriter
 from torch.utils.tensorboard.summary import hparams
 
-from rl_workbench.agents.dqn.agent import Learned
-from rl_workbench.training.dqn.loop import Episode
-
 NAME = "scalars.csv"
 HEADER = "step,tag,value,wall_time\n"
 EVENTS = "events.out.tfevents.*"
@@ -81,31 +78,6 @@ class ScalarLog:
         """Writes what is still in memory."""
         self._writer.close()
         self._file.close()
-
-
-class Figures:
-    """The observer that writes the field's tags to the log."""
-
-    def __init__(self, log: ScalarLog) -> None:
-        self._log = log
-
-    def step_done(self, steps: int) -> None:
-        """Nothing to write."""
-
-    def learned(self, steps: int, learned: Learned) -> None:
-        """The losses/ tags."""
-        values = {"losses/td_loss": learned.td_loss, "losses/q_values": learned.q_values}
-        self._log.add(steps, values)
-
-    def episode_done(self, episode: Episode) -> None:
-        """The charts/ tags."""
-        values = {
-            "charts/episodic_return": episode.total_reward,
-            "charts/episodic_length": episode.length,
-            "charts/SPS": episode.steps_per_second,
-            "charts/epsilon": episode.epsilon,
-        }
-        self._log.add(episode.steps, values)
 
 
 def _cut(path: Path, length: int, say: Callable[[str], None]) -> list[Point]:

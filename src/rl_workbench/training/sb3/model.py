@@ -1,4 +1,4 @@
-"""Stable-Baselines3's algorithms made from our settings; what fits which actions."""
+"""Stable-Baselines3's models made from our options; what fits which actions."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,12 +9,13 @@ import torch
 from gymnasium import spaces
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.environments import make_environment
-from rl_workbench.training.sb3.settings import (
+from rl_workbench.training.sb3.options import (
     CLASSES,
     NETWORK,
     ON_POLICY,
-    SB3Choice,
+    SB3Options,
     algorithm_class,
 )
 
@@ -38,16 +39,16 @@ def check_fit(algorithm: str, env_id: str, space: gymnasium.Space[Any]) -> None:
     if isinstance(space, FITS[algorithm]):
         return
     fitting = [name for name in CLASSES if isinstance(space, FITS[name])]
-    others = [*fitting, *(["dqn_train.py"] if isinstance(space, spaces.Discrete) else [])]
+    others = [*fitting, *(["dqn", "reinforce"] if isinstance(space, spaces.Discrete) else [])]
     hint = f"{', '.join(others)} fit it" if others else "none here fits it"
     raise WorkbenchError(f"{algorithm} can't choose from {space}, the actions of {env_id}; {hint}")
 
 
-def make_model(choice: SB3Choice, envs: int | None = None) -> Any:
+def make_model(options: TrainingOptions, for_acting: bool = False) -> Any:
     """A new model with its environments; the caller closes `model.get_env()`.
 
     Args:
-        envs: how many, if not as many as in training.
+        for_acting: with one environment, and no room to learn.
 
     Raises:
         WorkbenchError: if the environment can't be made, the algorithm doesn't fit it, or an
@@ -55,50 +56,60 @@ def make_model(choice: SB3Choice, envs: int | None = None) -> Any:
     """
     from stable_baselines3.common.vec_env import DummyVecEnv
 
-    run = choice.run
-    vector = DummyVecEnv([_maker(choice)] * (envs or run.n_envs))
+    name, run, settings = options.kind.name, options.run, options.hyperparameters
+    own = settings.own
+    if for_acting and name in ON_POLICY:  # of one environment as many steps as of all
+        own["n_steps"] *= settings.n_envs
+    elif for_acting:
+        own["buffer_size"] = 1  # nothing is learned, so nothing is kept
+    vector = DummyVecEnv([_maker(options)] * (1 if for_acting else settings.n_envs))
     try:
-        check_fit(choice.algorithm, run.env_id, vector.action_space)
-        return _make(choice, vector)
+        check_fit(name, run.env_id, vector.action_space)
+        torch.empty(0, device=run.device)  # where there is none, the model would take the CPU
+        return algorithm_class(name)(
+            "MlpPolicy",
+            vector,
+            seed=run.seed,
+            device=run.device,
+            policy_kwargs=_network(own),
+            **_translated(settings, own, vector.action_space),
+        )
     except WorkbenchError:
         vector.close()
         raise
     except (TypeError, ValueError, AssertionError, RuntimeError, ArithmeticError) as error:
         vector.close()
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise WorkbenchError(f"{choice.algorithm} can't be made: {text}") from error
+        raise WorkbenchError(f"{name} can't be made: {text}") from error
 
 
-def _maker(choice: SB3Choice) -> Callable[[], gymnasium.Env[Any, Any]]:
+def _maker(options: TrainingOptions) -> Callable[[], gymnasium.Env[Any, Any]]:
     from stable_baselines3.common.monitor import Monitor
 
-    run = choice.run
-    return lambda: Monitor(make_environment(run.env_id, run.env_kwargs))
+    run = options.run
+    return lambda: Monitor(make_environment(run.env_id, run.training_environment))
 
 
-def _make(choice: SB3Choice, vector: Any) -> Any:
-    torch.empty(0, device=choice.run.device)  # where there is none, the model would take the CPU
-    own = dict(choice.hyperparameters)
+def _network(own: dict[str, Any]) -> dict[str, Any] | None:
+    """Takes the network's options out of the algorithm's."""
     network = {name: own.pop(name, None) for name in NETWORK}
     network = {name: value for name, value in network.items() if value is not None}
     if "net_arch" in network:
         network["net_arch"] = _layers(network["net_arch"])
-    if choice.run.lr_schedule == "linear":
+    return network or None
+
+
+def _translated(
+    settings: SB3Options, own: dict[str, Any], actions: gymnasium.Space[Any]
+) -> dict[str, Any]:
+    """What no file can hold, made from what it can."""
+    if settings.lr_schedule == "linear":
         own["learning_rate"] = linear(_rate(own["learning_rate"]))
     if own.get("action_noise") is not None:
-        own["action_noise"] = _noise(own["action_noise"], vector.action_space)
-    if isinstance(
-        own.get("train_freq"), list
-    ):  # a number and a unit; neither YAML nor JSON has tuples
+        own["action_noise"] = _noise(own["action_noise"], actions)
+    if isinstance(own.get("train_freq"), list):  # a number and a unit
         own["train_freq"] = tuple(own["train_freq"])
-    return algorithm_class(choice.algorithm)(
-        "MlpPolicy",
-        vector,
-        seed=choice.run.seed,
-        device=choice.run.device,
-        policy_kwargs=network or None,
-        **own,
-    )
+    return own
 
 
 def _layers(value: Any) -> Any:
@@ -122,19 +133,11 @@ def linear(start: float) -> Callable[[float], float]:
     return lambda remaining: start * remaining
 
 
-def _noise(deviation: Any, space: spaces.Box) -> Any:
+def _noise(deviation: Any, space: gymnasium.Space[Any]) -> Any:
     """The option action_noise is a standard deviation, of each action alike."""
     from stable_baselines3.common.noise import NormalActionNoise
 
     if not isinstance(deviation, int | float):
         raise WorkbenchError(f"action_noise is a standard deviation, a number, not {deviation!r}")
-    return NormalActionNoise(np.zeros(space.shape), np.full(space.shape, float(deviation)))
-
-
-def greedy(model: Any) -> Callable[[np.ndarray], Any]:
-    """The model as a function of one observation (D,)."""
-
-    def act(observation: np.ndarray) -> Any:
-        return model.policy.predict(observation, deterministic=True)[0]
-
-    return act
+    shape = space.shape or ()
+    return NormalActionNoise(np.zeros(shape), np.full(shape, float(deviation)))

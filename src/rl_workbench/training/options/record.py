@@ -2,12 +2,10 @@
 
 import json
 import math
-import time
 from pathlib import Path
 from typing import Any
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.run import folder as run_folder
 
 CONFIG_RECORD = "config.json"
 
@@ -36,16 +34,3 @@ def read_record(folder: Path) -> Any:
         raise WorkbenchError(f"{folder} is no run folder: {path}: {error.strerror}") from error
     except ValueError as error:
         raise WorkbenchError(f"{path} isn't JSON: {error}") from error
-
-
-def write_record(folder: Path, config: dict[str, Any], resumed: bool) -> None:
-    """Writes it; of a resumed training, whose length may be new, versions and begin stay.
-
-    Raises:
-        OSError: if the disk refuses.
-        WorkbenchError: if the record of a resumed training is damaged.
-    """
-    record: dict[str, Any] = {"versions": run_folder.versions(), "began": time.time()}
-    if resumed:
-        record = read_record(folder)
-    run_folder.write_summary(folder / CONFIG_RECORD, {**record, **config})

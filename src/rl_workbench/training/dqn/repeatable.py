@@ -1,7 +1,7 @@
-"""The environment of a training, with a tape of the episode under way.
+"""The environment of a training, with what brings back the episode under way.
 
 No environment has a way to be saved in the middle of an episode. But the same start and the
-same actions bring it back there: that is what the tape holds.
+same actions bring it back there: that is what is kept.
 """
 
 import json
@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 
-class EpisodeTape:
+class RepeatableEnvironment:
     """An environment that can be brought back into the middle of an episode.
 
     Args:

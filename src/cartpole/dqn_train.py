@@ -1,0 +1,20 @@
+"""The command dqn_train.py: `train --algo dqn`, also as a node with ROS parameters."""
+
+import sys
+
+from robot_envs.errors import RobotEnvError
+
+from cartpole.ros_options import ros_options
+from rl_workbench.training import cli
+
+NODE = "dqn_train"
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Trains as the arguments say; returns the process's exit code."""
+    try:
+        flags, parameters, _ = ros_options(sys.argv[1:] if argv is None else argv, NODE)
+    except RobotEnvError as error:
+        print(f"{NODE}.py: {error}", file=sys.stderr)
+        return 1
+    return cli.main(flags, parameters, f"{NODE}.py", "dqn")

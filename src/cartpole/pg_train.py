@@ -1,0 +1,174 @@
+"""The command pg_train.py: trains the cart-pole, over ROS in lock-step unless told otherwise."""
+
+import argparse
+import contextlib
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from robot_envs.errors import RobotEnvError
+
+from cartpole.registration import NAMESPACE
+from cartpole.ros_options import ros_options
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.option import check_options, option
+from rl_workbench.training.cli import choose_training, train
+from rl_workbench.training.options.command_line import flag
+from rl_workbench.training.options.options import Options
+from rl_workbench.training.options.training_options import TrainingOptions
+from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.progress import tell
+
+NODE = "pg_train"
+PROG = f"{NODE}.py"
+ENV_ID = f"{NAMESPACE}/Balance-v0"
+LARGEST_NOISE = 0.2  # [m], [rad]; just inside the angle at which an episode ends
+
+
+@dataclass(frozen=True)
+class RobotOptions:
+    """Where the robot is, and how its episodes start.
+
+    Raises:
+        WorkbenchError: if a value is beyond its limits.
+    """
+
+    backend: str = option(
+        "ros", "ros: the robot in a simulator over ROS, which is started if none runs; bullet: in "
+        "this process, with the same bits, several times as fast, and no ROS needed",
+        choices=("ros", "bullet"),
+    )  # fmt: skip
+    realtime: bool = option(False, "let the world run by itself, as the existing script does")
+    start_noise: float = option(
+        0.0, "episodes start within +-X of the origin [m] and of upright [rad]; 0, as the existing "
+        "script does, starts them all alike", 0, LARGEST_NOISE,
+    )  # fmt: skip
+    gui: bool = option(False, "show the simulator's window")
+    headless: bool = option(False, "no window")
+
+    def __post_init__(self) -> None:
+        check_options(self)
+        if self.headless and self.gui:
+            raise WorkbenchError("--headless: not with --gui")
+        if self.backend == "bullet" and (self.realtime or self.gui):
+            raise WorkbenchError(
+                "--realtime and --gui are of a simulator over ROS: not with --backend bullet"
+            )
+
+    @property
+    def environment(self) -> dict[str, Any]:
+        """What it comes to as options of the environment."""
+        noise = {"noise": self.start_noise} if self.start_noise else {}
+        if not self.realtime:
+            return {"backend": self.backend, **noise}
+        # The newest joint state, without waiting for another one: as the existing script does.
+        return {"backend": "ros-realtime", "control_period": None, **noise}
+
+
+ROBOT_OPTIONS = Options(RobotOptions)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Trains as the arguments say; returns the process's exit code."""
+    argv = sys.argv[1:] if argv is None else argv
+    interrupt = Interrupt().install()
+    try:
+        flags, parameters, name = ros_options(argv, NODE)
+        options, robot = choose(flags, parameters)
+        with session(options, name, argv, robot.gui):
+            return _train(options, interrupt)
+    except (WorkbenchError, RobotEnvError) as error:
+        return _failed(error, interrupt)
+    except KeyboardInterrupt:
+        print(f"{PROG}: interrupted before the training began", file=sys.stderr)
+        return interrupt.exit_code or 130
+    finally:
+        interrupt.defer()
+
+
+def _train(options: TrainingOptions, interrupt: Interrupt) -> int:
+    """Tells of a failure before the session is closed: a simulator that hangs takes its time."""
+    try:
+        train(options, interrupt)
+        return interrupt.exit_code
+    except WorkbenchError as error:
+        return _failed(error, interrupt)
+
+
+def _failed(error: Exception, interrupt: Interrupt) -> int:
+    print(f"{PROG}: {error}", file=sys.stderr, flush=True)
+    return interrupt.exit_code or 1
+
+
+def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOptions, RobotOptions]:
+    """What the arguments say of the training and of the robot.
+
+    Raises:
+        SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
+        WorkbenchError: if a name is unknown or a value wrong.
+    """
+    parser = argparse.ArgumentParser(
+        PROG, add_help=False, allow_abbrev=False, argument_default=argparse.SUPPRESS
+    )
+    ROBOT_OPTIONS.add_flags(parser.add_argument_group("the robot"))
+    known, rest = parser.parse_known_args(flags)
+    own = {key: value for key, value in parameters.items() if key in ROBOT_OPTIONS.names}
+    others = {key: value for key, value in parameters.items() if key not in own}
+    given = ROBOT_OPTIONS.read(own, "rosparam") | vars(known)
+    try:
+        robot = ROBOT_OPTIONS.make(RobotOptions, given)
+        options = choose_training(rest, others, PROG, "reinforce", ENV_ID, parser)
+        return _joined(options, robot, given), robot
+    except WorkbenchError as error:
+        parser.error(str(error))
+
+
+def _joined(
+    options: TrainingOptions, robot: RobotOptions, given: dict[str, Any]
+) -> TrainingOptions:
+    recorded = [key for key in given if key not in ("gui", "headless")]
+    if options.resume:
+        if recorded:
+            raise WorkbenchError(
+                f"a resumed training keeps its settings: --resume allows no {flag(recorded[0])}"
+            )
+        return options
+    run = options.run
+    if not run.env_id.startswith(f"{NAMESPACE}/"):
+        if given:
+            name = next(each.name for each in fields(RobotOptions) if each.name in given)
+            raise WorkbenchError(f"{flag(name)} is of the robot: not with --env-id {run.env_id}")
+        return options
+    return options._replace(
+        run=replace(run, train_env_kwargs=run.train_env_kwargs | robot.environment)
+    )
+
+
+@contextlib.contextmanager
+def session(options: TrainingOptions, name: str, argv: list[str], gui: bool) -> Iterator[None]:
+    """What the robot needs to be running, for as long as it is trained; nothing in this process.
+
+    Args:
+        name: this node's full name.
+        argv: the process's arguments, with roslaunch's remappings.
+        gui: ask a simulator that is started here for its window.
+
+    Raises:
+        RobotEnvError: if something can't be started, or what runs doesn't fit.
+    """
+    backend = options.run.training_environment.get("backend", "bullet")
+    if backend == "bullet" or not options.run.env_id.startswith(f"{NAMESPACE}/"):
+        yield
+        return
+    from robot_envs.backends.session import RosSession
+
+    from cartpole.robot import ROBOT
+
+    height = None if "SwingUp" in options.run.env_id else 0.0
+    opened = RosSession(ROBOT, name, argv, backend == "ros-realtime", gui, options.run.seed, height)
+    try:
+        opened.start(tell)
+        yield
+    finally:
+        opened.close()

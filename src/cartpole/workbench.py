@@ -1,0 +1,18 @@
+"""The command workbench.py: rl_workbench's command line, with the cart-pole's environments."""
+
+import sys
+
+from rl_workbench import cli
+
+PROGRAM = (sys.executable, "-m", "cartpole.workbench")  # importing cartpole registers them
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Does what the arguments say; returns the process's exit code."""
+    argv = sys.argv[1:] if argv is None else argv
+    plain = [each for each in argv if not (each.startswith("__") and ":=" in each)]  # roslaunch's
+    return cli.main(plain, "workbench.py", PROGRAM)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

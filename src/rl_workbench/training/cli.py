@@ -1,0 +1,123 @@
+"""`train`: one command line for every algorithm; errors in one line, exit codes."""
+
+import argparse
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, NoReturn
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.algorithms import ALGORITHMS, algorithm, recorded_kind
+from rl_workbench.training.options.kind import AlgorithmKind
+from rl_workbench.training.options.training_options import TrainingOptions, choose
+from rl_workbench.training.run import folder as run_folder
+from rl_workbench.training.run.interrupt import Interrupt
+
+PROG = "rl-workbench train"
+EPILOG = """\
+dqn and the two of REINFORCE are our own, the others Stable-Baselines3's.
+Each has flags of its own: --algo NAME --help shows them."""
+
+
+def choose_training(
+    argv: list[str],
+    parameters: dict[str, Any] | None = None,
+    prog: str = PROG,
+    default: str | None = None,
+    env_id: str | None = None,
+    parent: argparse.ArgumentParser | None = None,
+) -> TrainingOptions:
+    """What the arguments say, --algo first, since the other flags depend on it.
+
+    Args:
+        parameters: ROS parameters of the node that trains, if it is one.
+        prog: the command, for --help.
+        default: the algorithm if none is named.
+        env_id: the environment if none is named.
+        parent: has further flags, which were read already; --help shows them.
+
+    Raises:
+        SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
+        WorkbenchError: if a name is unknown or a value wrong.
+    """
+    parser, parameters = _parser(prog), dict(parameters or {})
+    known, rest = parser.parse_known_args(argv)
+    named = known.algo or parameters.pop("algo", None) or None
+    resumed = known.resume or parameters.get("resume")
+    if known.resume:
+        rest += ["--resume", known.resume]
+    if named is None and resumed:
+        return choose(recorded_kind(Path(resumed)), rest, parameters, prog, env_id, parent)
+    if named is None and default is None:
+        _without_algorithm(parser, rest)
+    try:
+        kind: AlgorithmKind = algorithm(named or str(default))
+    except WorkbenchError as error:
+        parser.error(str(error))
+    return choose(kind, rest, parameters, prog, env_id, parent)
+
+
+def _parser(prog: str) -> argparse.ArgumentParser:
+    result = argparse.ArgumentParser(
+        prog,
+        description="Trains an agent.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+        add_help=False,  # --algo NAME --help is the algorithm's
+    )
+    result.add_argument("--algo", metavar="NAME", help=f"one of {', '.join(ALGORITHMS)}")
+    result.add_argument("--resume", metavar="RUN", help="go on with the training in a run folder")
+    return result
+
+
+def _without_algorithm(parser: argparse.ArgumentParser, rest: list[str]) -> NoReturn:
+    if "-h" in rest or "--help" in rest:
+        parser.print_help()
+        parser.exit()
+    parser.error(f"--algo is missing, one of {', '.join(ALGORITHMS)}")
+
+
+def train(options: TrainingOptions, interrupt: Interrupt) -> Path:
+    """Trains into the options' folder, or a new one below runs/; returns it.
+
+    Raises:
+        WorkbenchError: if something fails that the user can mend; what was learned is saved.
+    """
+    from rl_workbench.training.run.training import Training  # slow to import; --help needs none
+
+    run = options.run
+    try:
+        with ExitStack() as holding:
+            if options.resume:
+                folder = options.resume.resolve()
+                holding.enter_context(run_folder.held(folder))
+            else:
+                place = (run.run_dir, run.env_id, run.exp_name, run.seed)
+                folder = holding.enter_context(run_folder.opened(*place))
+            training = Training(options, folder, interrupt)
+            interrupt.defer()
+            training.run()
+    finally:
+        interrupt.defer()
+    return folder
+
+
+def main(
+    argv: list[str] | None = None,
+    parameters: dict[str, Any] | None = None,
+    prog: str = PROG,
+    default: str | None = None,
+) -> int:
+    """Trains as the arguments say; returns the process's exit code."""
+    interrupt = Interrupt().install()
+    try:
+        train(choose_training(sys.argv[1:] if argv is None else argv, parameters, prog, default),
+              interrupt)  # fmt: skip
+        return interrupt.exit_code
+    except WorkbenchError as error:
+        print(f"{prog}: {error}", file=sys.stderr, flush=True)
+        return interrupt.exit_code or 1
+    except KeyboardInterrupt:
+        print(f"{prog}: interrupted before the training began", file=sys.stderr)
+        return interrupt.exit_code or 130

@@ -1,0 +1,102 @@
+"""The command line of a training: a flag for each option, --config, --params and --resume."""
+
+import argparse
+import shlex
+from typing import Any
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.options.kind import AlgorithmKind
+from rl_workbench.training.options.options import Options, key_values, unknown
+
+RENAMED = {  # flags that earlier versions had
+    "--algorithm": "--algo",
+    "--stop-at": "--stop-at-length",
+}
+DESCRIPTION = """\
+Trains {about} in a Gymnasium environment.
+
+What isn't given comes from config/{config}. {ros}--params wins over the file{over}, and a flag
+over all of them.
+Ctrl-C saves everything and exits with 130 (SIGTERM: 143, SIGHUP: 129); --resume goes on from there.
+Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
+
+
+def flag(name: str) -> str:
+    """An option's flag."""
+    return f"--{name.replace('_', '-')}"
+
+
+class CommandLine:
+    """What was given: --params, overridden by ROS parameters, overridden by flags.
+
+    Args:
+        kind: the algorithm.
+        options: all of its options; each gets a flag, and a ROS parameter.
+        prog: the command, for --help.
+        parent: has further flags, for --help.
+    """
+
+    def __init__(
+        self,
+        kind: AlgorithmKind,
+        options: Options,
+        prog: str,
+        parent: argparse.ArgumentParser | None = None,
+    ) -> None:
+        self._options = options
+        self._special = ("config", "params", "resume", *(("preset",) if kind.presets else ()))
+        is_node = prog.endswith(".py")
+        self.parser = argparse.ArgumentParser(
+            prog,
+            usage=f"{prog} [--help] [--OPTION VALUE ...]",
+            description=DESCRIPTION.format(
+                about=kind.about,
+                config=kind.config,
+                ros="Under roslaunch every flag is a private ROS parameter, too. "
+                if is_node
+                else "",
+                over=", a ROS parameter over --params" if is_node else "",
+            ),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
+            argument_default=argparse.SUPPRESS,
+            parents=[parent] if parent else [],
+        )
+        add = self.parser.add_argument
+        add("--config", metavar="FILE", help=f"options in YAML (config/{kind.config})")
+        if kind.presets:
+            add("--preset", metavar="NAME", help="a section of that file, as in: tutorial")
+        add("--params", metavar="KEY=VALUE", nargs="+", help="options by name")
+        add("--resume", metavar="RUN_DIR", help="go on with an interrupted training")
+        options.add_flags(self.parser)
+
+    def given(
+        self, flags: list[str], parameters: dict[str, Any]
+    ) -> tuple[dict[str, Any], dict[str, str]]:
+        """Options that somebody gave, and the texts of --config, --preset and --resume.
+
+        Raises:
+            SystemExit: with code 2 and a usage line, if a flag is wrong; with 0 after --help.
+            WorkbenchError: if a name is unknown or a value wrong anywhere else.
+        """
+        from_flags = self._read_flags(flags)
+        known = [*self._special, *self._options.names]
+        for name in parameters:
+            if name not in known:
+                raise WorkbenchError(f"rosparam: {unknown('parameter', name, known)}")
+        special = {name: str(parameters[name]) for name in self._special if parameters.get(name)}
+        own = {name: value for name, value in parameters.items() if name not in self._special}
+        pairs = [*shlex.split(special.pop("params", "")), *from_flags.pop("params", [])]
+        special |= {name: from_flags.pop(name) for name in self._special if name in from_flags}
+        listed = self._options.read(key_values(pairs, "--params"), "--params")
+        return listed | self._options.read(own, "rosparam") | from_flags, special
+
+    def _read_flags(self, flags: list[str]) -> dict[str, Any]:
+        known, strange = self.parser.parse_known_args(flags)
+        if strange:
+            given = strange[0].partition("=")[0]
+            if given in RENAMED:
+                self.parser.error(f"{given} is called {RENAMED[given]} now")
+            names = [flag(name) for name in (*self._special, *self._options.names)]
+            self.parser.error(unknown("flag", given, names))
+        return vars(known)

@@ -1,0 +1,175 @@
+"""A policy gradient at work: run an episode, learn from it."""
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from rl_workbench.agents.pg.document import PolicyGradientAgent
+from rl_workbench.agents.pg.reinforce import ReinforceAgent
+from rl_workbench.agents.pg.settings import DocumentSettings
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.options.training_options import TrainingOptions
+from rl_workbench.training.pg.episodes import EpisodeGenerators, run_episode
+from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
+from rl_workbench.training.run.environments import discrete_actions, make_environment
+from rl_workbench.training.run.files import save_tensors
+from rl_workbench.training.run.policy import Policy
+
+Agent = PolicyGradientAgent | ReinforceAgent
+
+
+def make(options: TrainingOptions) -> "PolicyGradientTraining":
+    """A new training; see `make_algorithm`."""
+    run = options.run
+    env = make_environment(run.env_id, run.training_environment)
+    try:
+        return PolicyGradientTraining(options, env, make_agent(options, env))
+    except WorkbenchError:
+        env.close()
+        raise
+
+
+def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
+    """A new agent for an environment.
+
+    Raises:
+        WorkbenchError: if the environment doesn't suit it; says what does.
+    """
+    run, settings = options.run, options.hyperparameters
+    actions = discrete_actions(env, run.env_id, "REINFORCE")
+    (size,) = env.observation_space.shape or (0,)
+    if isinstance(settings, DocumentSettings):
+        if (size, actions) != (4, 2):
+            raise WorkbenchError(
+                f"{options.kind.name} is made for 4 observations and 2 actions; {run.env_id} has {size} "
+                f"and {actions}: --algo reinforce learns in it"
+            )
+        return PolicyGradientAgent(run.seed, settings)
+    if settings.observation_scale and len(settings.observation_scale) != size:
+        raise WorkbenchError(
+            f"observation_scale has {len(settings.observation_scale)} numbers, the observations of "
+            f"{run.env_id} {size}"
+        )
+    return ReinforceAgent(run.seed, settings.observation_scale or (1.0,) * size, settings, actions)
+
+
+def load_policy(
+    options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
+) -> Policy:
+    """The policy of a checkpoint; see `policy.load_policy`."""
+    agent = make_agent(options, env)
+    agent.load_state_dict(content["agent"])
+
+    def preference(observations: np.ndarray) -> np.ndarray:
+        found = [agent.probabilities(each) for each in observations]
+        return np.array([each[-1] - each[0] for each in found])
+
+    return Policy(agent.act_greedily, preference, "P(right) - P(left)")
+
+
+class PolicyGradientTraining(Algorithm):
+    """Runs episodes and learns from each; it can be saved between two of them.
+
+    Args:
+        options: what the user chose.
+        env: is learned in.
+        agent: acts and learns.
+    """
+
+    def __init__(
+        self, options: TrainingOptions, env: gymnasium.Env[Any, Any], agent: Agent
+    ) -> None:
+        self.env, self._agent = env, agent
+        self._seed, self._save_every = options.run.seed, options.hyperparameters.save_every
+        self._generators = EpisodeGenerators(env, agent.generator)
+        self._episodes = self._steps = self._stride = 0
+
+    @property
+    def steps(self) -> int:
+        """See `Algorithm.steps`."""
+        return self._steps
+
+    @property
+    def stride(self) -> int:
+        """The length of the last episode."""
+        return self._stride
+
+    def act_greedily(self, observation: np.ndarray) -> int:
+        """See `Algorithm.act_greedily`."""
+        return self._agent.act_greedily(observation)
+
+    def learn(self, frame: Frame) -> None:
+        """See `Algorithm.learn`."""
+        self._generators.mark()
+        while not frame.is_over():
+            episode = run_episode(self.env, self._agent, frame.is_interrupted)
+            if episode is None:
+                break
+            losses = self._agent.learn(episode)
+            self._steps += episode.length
+            self._stride = episode.length
+            by_episode = {"Reward": episode.total_reward}  # the tags of the existing script
+            by_step = {}
+            if losses is not None:
+                by_episode |= {"Value Loss": losses.value, "Policy Loss": losses.policy}
+                by_step = {"losses/value_loss": losses.value, "losses/policy_loss": losses.policy}
+            frame.log.add(self._episodes, by_episode)
+            frame.episode_done(episode.total_reward, episode.length, by_step)
+            self._save_networks_if_due(frame.folder)
+            self._episodes += 1
+            self._generators.mark()
+            frame.step_done()
+        self._generators.rewind()
+
+    def _save_networks_if_due(self, folder: Path) -> None:
+        if self._save_every and self._episodes % self._save_every == 0:
+            self._save_networks(folder, f"_episode_{self._episodes}")
+
+    def _save_networks(self, folder: Path, suffix: str = "") -> None:
+        networks = {"policy_network": self._agent.policy, "value_network": self._agent.value}
+        for name, network in networks.items():
+            save_tensors(folder / f"{name}{suffix}.pth", network.state_dict())
+
+    def export(self, folder: Path) -> None:
+        """Writes policy_network.pth and value_network.pth."""
+        self._save_networks(folder)
+
+    def settle(self) -> bool:
+        """Takes back the draws of the episode that failed."""
+        self._generators.rewind()
+        return True
+
+    def state_dict(self) -> dict[str, Any]:
+        """See `Algorithm.state_dict`."""
+        return {
+            "agent": self._agent.state_dict(),
+            "episodes": self._episodes,
+            "stride": self._stride,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """See `Algorithm.load_state_dict`."""
+        try:
+            self._agent.load_state_dict(state["agent"])
+            self._episodes, self._stride = int(state["episodes"]), int(state["stride"])
+            self._steps = int(state["steps"])
+        except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
+            text = str(error).split("\n")[0]
+            raise WorkbenchError(f"the checkpoint holds another agent: {text}") from error
+
+    def environment_state(self) -> str:
+        """The state of the environment's generator; there is no episode under way."""
+        return self._generators.environment
+
+    def start_environment(self, state: str | None, say: Say) -> None:
+        """See `Algorithm.start_environment`."""
+        self.env.reset(seed=self._seed)  # the episodes' own resets go on from here
+        if state is not None:
+            self._generators.environment = state
+        self._generators.mark()
+
+    def restore_environment(self, state: str, say: Say) -> None:
+        """See `Algorithm.restore_environment`; the next episode begins with a reset anyway."""
+        self._generators.environment = state

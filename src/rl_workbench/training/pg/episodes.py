@@ -1,0 +1,92 @@
+"""One episode with a policy's random choice of actions, and the way back from a broken-off one."""
+
+import json
+import random
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import gymnasium
+import numpy as np
+import torch
+
+from rl_workbench.agents.pg.document import Episode
+
+
+class Actor(Protocol):
+    """Chooses actions."""
+
+    def act(self, observation: np.ndarray) -> int:
+        """Draws an action for an observation (D,)."""
+        ...
+
+
+def run_episode(
+    env: gymnasium.Env[Any, Any], actor: Actor, should_stop: Callable[[], bool]
+) -> Episode | None:
+    """Runs one episode.
+
+    Returns:
+        The episode, or None if it was broken off because `should_stop()` became true.
+    """
+    episode = Episode()
+    observation = _vector(env.reset()[0])
+    finished = False
+    while not finished:
+        if should_stop():
+            return None
+        action = actor.act(observation)
+        following, reward, terminated, truncated, _ = env.step(action)
+        episode.add(observation, action, float(reward))
+        observation = _vector(following)
+        finished = terminated or truncated
+    episode.final_observation, episode.terminated = observation, bool(terminated)
+    return episode
+
+
+def _vector(observation: Any) -> np.ndarray:
+    """A copy: an environment may well write into the array that it returned."""
+    return np.array(observation, dtype=np.float32)
+
+
+class EpisodeGenerators:
+    """All generators that an episode draws from: the process's, the environment's, the agent's.
+
+    An episode that is broken off has drawn from them, but nothing was learned from it: `rewind`
+    takes its draws back, so that it can be run again as it would have been.
+
+    Args:
+        environment: has a generator once it was seeded.
+        agent: its own generator.
+    """
+
+    def __init__(self, environment: gymnasium.Env[Any, Any], agent: np.random.Generator) -> None:
+        self._environment, self._agent = environment.unwrapped, agent
+
+    def _own(self) -> tuple[Any, Any]:
+        """The environment's, which is another one after each seeding, and the agent's."""
+        return self._environment.np_random.bit_generator, self._agent.bit_generator
+
+    def mark(self) -> None:
+        """Remembers where they all are."""
+        self._process: Any = (
+            random.getstate(), np.random.get_state(legacy=False), torch.get_rng_state()
+        )  # fmt: skip
+        self._states = [each.state for each in self._own()]
+
+    def rewind(self) -> None:
+        """Brings them back to where `mark` found them."""
+        python, numpy, tensor = self._process
+        random.setstate(python)
+        np.random.set_state(numpy)
+        torch.set_rng_state(tensor)
+        for generator, state in zip(self._own(), self._states, strict=True):
+            generator.state = state
+
+    @property
+    def environment(self) -> str:
+        """The environment's, as JSON; some hold arrays."""
+        return json.dumps(self._own()[0].state, default=lambda array: array.tolist())
+
+    @environment.setter
+    def environment(self, text: str) -> None:
+        self._own()[0].state = json.loads(text)

@@ -1,0 +1,362 @@
+"""The frame of every training: open or resume a folder, learn, evaluate, keep the best, save, tell."""
+
+import contextlib
+import os
+import shlex
+import time
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.options.record import read_record
+from rl_workbench.training.options.training_options import TrainingOptions
+from rl_workbench.training.run import folder as run_folder
+from rl_workbench.training.run.algorithm import make_algorithm
+from rl_workbench.training.run.checkpoints import Checkpoints, candidates, read_newest
+from rl_workbench.training.run.evaluator import Evaluation, Evaluator
+from rl_workbench.training.run.history import History
+from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.learning_curve import learning_curve
+from rl_workbench.training.run.progress import Progress, tell
+from rl_workbench.training.run.random_states import random_states, restore_random_states, seed_all
+from rl_workbench.training.run.scalar_log import ScalarLog
+
+WINDOW = 20  # [episodes] over which a mean length counts
+LAST = 100  # [episodes] over which the summary reports a mean return
+
+
+class Training:
+    """One training; new, or resumed from its folder.
+
+    Args:
+        options: what the user chose.
+        folder: an empty folder for all results, or the one of the resumed training.
+        interrupt: tells when to stop.
+
+    Raises:
+        WorkbenchError: if the environment can't be made or doesn't suit, or there is nothing
+            to resume from.
+    """
+
+    log: ScalarLog
+
+    def __init__(self, options: TrainingOptions, folder: Path, interrupt: Interrupt) -> None:
+        torch.set_num_threads(1)  # networks this small only lose by more
+        self._options, self._run = options, options.run
+        self.folder, self._interrupt = folder, interrupt
+        self._checkpoints = Checkpoints(folder, self._run.keep_checkpoints)
+        self._history = History()
+        self._resumed = self._read_checkpoint() if options.resume else None
+        seed_all(self._run.seed)
+        self._algorithm = make_algorithm(options)
+        try:
+            self._evaluator = Evaluator(self._run, self._algorithm, interrupt.requested)
+            if self._resumed:
+                self._algorithm.load_state_dict(self._resumed)
+                self._history.load_state_dict(self._resumed["history"])
+        except WorkbenchError:
+            self._algorithm.close()
+            raise
+        self._saved_at = -1  # [steps]
+        self._is_written = True  # whatever was to be
+        self._evaluation: Evaluation | None = None  # the one at the end
+        self._shown: Progress
+        self._began, self._first_step = time.monotonic(), self._algorithm.steps
+        self._seconds_before = self._history.seconds
+
+    def _read_checkpoint(self) -> dict[str, Any] | None:
+        """None if the training was killed before its first checkpoint: it begins anew."""
+        if not candidates(self.folder):
+            tell(f"{self.folder} has no checkpoint yet; beginning anew")
+            return None
+        content = read_newest(self.folder, tell)
+        self._options.check_same(content.get("config"), str(self.folder))
+        return content
+
+    # --- the course of a training ---------------------------------------------------------------
+
+    def run(self) -> None:
+        """Trains and writes everything; what was learned is saved also when it fails.
+
+        Raises:
+            WorkbenchError: if the disk, the environment or the arithmetic fails.
+        """
+        failure: WorkbenchError | None = None
+        try:
+            self._train()
+        except WorkbenchError as error:
+            failure = error
+        except OSError as error:
+            failure = self._not_written(error)
+        finally:
+            self._evaluator.close()
+            self._algorithm.close()
+        self._finish(failure)
+
+    def _train(self) -> None:
+        self._checkpoints.remove_leftovers()
+        record = self._options.record()
+        run_folder.write_record(self.folder, record, bool(self._resumed))
+        length = self._resumed["log_bytes"] if self._resumed else 0
+        self.log = ScalarLog(
+            self.folder, {**record["run"], **record["hyperparameters"]}, length, tell
+        )
+        self._shown = self._make_progress()
+        try:
+            self._begin()
+            self._algorithm.learn(self)
+            self._update_clock()
+            self._saved_at = -1  # some learn once more after their last step
+            self._save()
+            self._evaluate_at_the_end()
+        except WorkbenchError:
+            self._save_after_failure()
+            raise
+        finally:
+            self._shown.close()
+            self.log.close()
+
+    def _make_progress(self) -> Progress:
+        if self._run.total_timesteps:
+            return Progress(self._run.total_timesteps, "step", self._algorithm.steps)
+        return Progress(self._run.episodes, "episode", len(self._history.returns))
+
+    def _begin(self) -> None:
+        """Brings environment and generators to where they begin, or were."""
+        run, algorithm = self._run, self._algorithm
+        if not self._resumed:
+            algorithm.start_environment(None, self._shown.say)
+            about = f"training {self._options.kind.name} in {run.env_id} with seed {run.seed}"
+            tell(f"{about}: {self.folder}")
+            self._save()  # so that there is something to go on from, whatever happens
+            return
+        others = run_folder.other_versions(read_record(self.folder).get("versions", {}))
+        if others:
+            tell(f"{others}: from here on it may come to other bits")
+        algorithm.start_environment(self._resumed["environment"], self._shown.say)
+        restore_random_states(self._resumed["random"])
+        tell(f"going on at step {algorithm.steps}{self._of_total()}: {self.folder}")
+        self._resumed = None  # a replay buffer's worth of memory
+        if algorithm.steps:
+            self._evaluate_if_due()  # the interruption may have come before it
+
+    def _of_total(self) -> str:
+        run, done = self._run, len(self._history.returns)
+        if run.total_timesteps:
+            return f" of {run.total_timesteps}"
+        return f" after episode {done} of {run.episodes}"
+
+    # --- what an algorithm calls while it learns ------------------------------------------------
+
+    def is_interrupted(self) -> bool:
+        """Whether the user interrupts."""
+        return self._interrupt.requested()
+
+    def is_over(self) -> bool:
+        """Whether it is complete, or the user interrupts."""
+        return self._is_complete() or self._interrupt.requested()
+
+    def _is_complete(self) -> bool:
+        run, history = self._run, self._history
+        recent = history.lengths[-WINDOW:]
+        return (
+            bool(run.total_timesteps and self._algorithm.steps >= run.total_timesteps)
+            or bool(run.episodes and len(history.returns) >= run.episodes)
+            or (run.stop_at_return is not None and self._best_return() >= run.stop_at_return)
+            or (
+                bool(run.stop_at_length)
+                and len(recent) == WINDOW
+                and sum(recent) >= run.stop_at_length * WINDOW
+            )
+        )
+
+    def episode_done(
+        self, total_reward: float, length: int, scalars: Mapping[str, float], note: str = ""
+    ) -> None:
+        """Takes an episode down, logs it, shows it; see `Frame.episode_done`."""
+        history, steps = self._history, self._algorithm.steps
+        history.returns.append(total_reward)
+        history.lengths.append(length)
+        speed = (steps - self._first_step) / self._update_clock()
+        charts = {
+            "charts/episodic_return": total_reward,
+            "charts/episodic_length": float(length),
+            "charts/SPS": speed,
+        }
+        self.log.add(steps, {**charts, **scalars})
+        self._shown.episode_done(history.returns, length, f"{speed:.0f} steps/s", note)
+
+    def step_done(self) -> None:
+        """Does what is due at this step: an evaluation, a checkpoint."""
+        self._shown.step_done(self._algorithm.steps)
+        self._evaluate_if_due()
+        if self._is_due(self._run.checkpoint_frequency):
+            self._save()
+
+    def _is_due(self, frequency: int) -> bool:
+        """Whether a multiple of it lies within the last stride: episodes and vectors pass over some."""
+        steps = self._algorithm.steps
+        return (
+            bool(frequency) and steps // frequency > (steps - self._algorithm.stride) // frequency
+        )
+
+    def _update_clock(self) -> float:
+        """Brings the history's seconds up to now; returns those since the training was made."""
+        elapsed = max(time.monotonic() - self._began, 1e-9)
+        self._history.seconds = self._seconds_before + elapsed
+        return elapsed
+
+    # --- evaluations and checkpoints ------------------------------------------------------------
+
+    def _best_return(self) -> float:
+        return self._history.best[1] if self._history.best else float("-inf")
+
+    def _was_evaluated(self) -> bool:
+        evaluations = self._history.evaluations
+        return bool(evaluations) and evaluations[-1][0] == self._algorithm.steps
+
+    def _evaluate_if_due(self) -> None:
+        is_due = self._is_due(self._run.eval_frequency) and not self._was_evaluated()
+        if is_due and not self._evaluator.waits_for_the_end and self._evaluate(is_last=False):
+            self._save(best=True)
+
+    def _evaluate_at_the_end(self) -> None:
+        """Evaluates the complete training, unless that was done at this step already.
+
+        The last checkpoint doesn't know of it: a training that is prolonged goes on as if it had
+        been longer from the beginning.
+        """
+        if not self._is_complete() or self._interrupt.requested() or self._was_evaluated():
+            return
+        content = self._content()
+        if self._evaluate(is_last=True):
+            self._checkpoints.save(self._algorithm.steps, content, best=True)
+
+    def _evaluate(self, is_last: bool) -> bool:
+        """Evaluates the policy and writes it down; returns whether it is the best one so far."""
+        score = self._evaluator.evaluate(self._best_return(), self._shown.say, is_last)
+        if score is None:
+            return False
+        steps, history = self._algorithm.steps, self._history
+        self._evaluation = score.evaluation
+        mean = score.evaluation.mean_return
+        self.log.add(steps, {"eval/mean_reward": mean})
+        history.evaluations.append((steps, mean))
+        if score.confirmed <= self._best_return():
+            return False
+        if self._run.confirm_episodes:
+            self.log.add(steps, {"eval/confirmed_reward": score.confirmed})
+        history.best = (steps, score.confirmed)
+        return True
+
+    def _save(self, best: bool = False) -> None:
+        """Writes a checkpoint, unless this step has one already.
+
+        Raises:
+            OSError: if the disk refuses; the earlier checkpoints are untouched.
+        """
+        steps = self._algorithm.steps
+        if steps != self._saved_at or best:
+            self._checkpoints.save(steps, self._content(), best)
+            self._saved_at = steps
+
+    def _content(self) -> dict[str, Any]:
+        return {
+            **self._algorithm.state_dict(),
+            "steps": self._algorithm.steps,
+            "config": self._options.record(),
+            "history": self._history.state_dict(),
+            "environment": self._algorithm.environment_state(),
+            "random": random_states(),
+            "log_bytes": self.log.sync(),
+        }
+
+    def _save_after_failure(self) -> None:
+        """What can't be written now is not what the user has to hear of."""
+        with contextlib.suppress(OSError, WorkbenchError):
+            if self._algorithm.settle():
+                self._save()
+            else:
+                self._checkpoints.save_failure(self._content())
+
+    # --- the end --------------------------------------------------------------------------------
+
+    def _finish(self, failure: WorkbenchError | None) -> None:
+        """Draws and tells; then passes a failure on, unless the user had stopped anyway."""
+        try:
+            self._algorithm.export(self.folder)
+            self._draw()
+            run_folder.write_summary(self.folder / "summary.json", self._summary(failure))
+        except OSError as error:
+            problem = self._not_written(error)
+            failure = problem if self._interrupt.requested() else failure or problem
+        self._tell()
+        # A simulator dies of the same Ctrl-C; what couldn't be written has to be told all the same.
+        if failure and not (self._interrupt.requested() and self._is_written):
+            raise WorkbenchError(f"{failure}; {self._what_is_left()}")
+
+    def _not_written(self, error: OSError) -> WorkbenchError:
+        self._is_written = False
+        return WorkbenchError(f"can't write {error.filename or self.folder}: {error.strerror}")
+
+    def _what_is_left(self) -> str:
+        text = f"stopped after {self._algorithm.steps} steps, {len(self._history.returns)} episodes"
+        if self._is_written:
+            text += f", what was learned is saved in {self.folder}"
+        return text + self._how_to_go_on()
+
+    def _how_to_go_on(self) -> str:
+        if not candidates(self.folder):
+            return ""
+        return f"; --resume {shlex.quote(str(self.folder))} goes on from the last checkpoint"
+
+    def _draw(self) -> None:
+        history, run = self._history, self._run
+        if history.returns:
+            title = f"{self._options.kind.name}, {run.env_id}, seed {run.seed}"
+            path = self.folder / "learning_curve.png"
+            learning_curve(path, history.lengths, history.returns, title)
+
+    def _summary(self, failure: WorkbenchError | None) -> dict[str, Any]:
+        history = self._history
+        return {
+            **self._options.record(),
+            "versions": run_folder.versions(),
+            "failure": str(failure) if failure else None,
+            "complete": self._is_complete(),
+            "interrupted": self._interrupt.requested(),
+            "episodes": len(history.returns),
+            "steps": self._algorithm.steps,
+            "seconds": round(history.seconds, 3),
+            f"mean_return_last_{LAST}": _mean(history.returns[-LAST:]),
+            f"mean_length_last_{WINDOW}": _mean(history.lengths[-WINDOW:]),
+            "best": history.best,
+            "evaluations": history.evaluations,
+            "evaluation": asdict(self._evaluation) if self._evaluation else None,
+            "lengths": history.lengths,
+            "returns": history.returns,
+        }
+
+    def _tell(self) -> None:
+        history, evaluation = self._history, self._evaluation
+        line = f"trained {len(history.returns)} episodes, {self._algorithm.steps} steps in "
+        line += f"{history.seconds:.1f} s"
+        if history.best:
+            line += f"; best evaluation {history.best[1]:.1f} at step {history.best[0]}"
+        if evaluation:
+            line += f"; the last one over {len(evaluation.lengths)} greedy episodes: length "
+            line += f"{evaluation.mean_length:.1f}, return {evaluation.mean_return:.1f}"
+        tell(line)
+        stopped = self._how_to_go_on() if self._interrupt.requested() else ""
+        tell(f"everything lies in {self.folder}{stopped}")
+        workspace = os.environ.get("CARTPOLE_WS")  # outside of it there is no tensorboard on PATH
+        command = f"{shlex.quote(workspace)} tensorboard" if workspace else "tensorboard"
+        tell(f"watch: {command} --logdir {shlex.quote(str(self.folder))}")
+
+
+def _mean(values: list[float] | list[int]) -> float | None:
+    return sum(values) / len(values) if values else None

@@ -1,0 +1,229 @@
+"""Stable-Baselines3 at work: its own loop, with a callback that tells the frame."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import KVWriter, Logger
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.options.training_options import TrainingOptions
+from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
+from rl_workbench.training.run.environments import shares_robot
+from rl_workbench.training.run.files import write_atomically
+from rl_workbench.training.run.policy import Policy
+from rl_workbench.training.sb3.model import make_model
+from rl_workbench.training.sb3.options import ON_POLICY
+from rl_workbench.training.sb3.state import check_weights, restore, state_of
+
+# What the library raises in the midst of learning: weights or options that are no good.
+_LEARNING = (ArithmeticError, AssertionError, LookupError, RuntimeError, TypeError, ValueError)
+MODEL = "model.zip"  # Stable-Baselines3's own form, for its own load()
+TAGS = {  # Stable-Baselines3's: ours
+    "train/loss": "losses/loss",
+    "train/value_loss": "losses/value_loss",
+    "train/policy_loss": "losses/policy_loss",
+    "train/policy_gradient_loss": "losses/policy_loss",
+    "train/actor_loss": "losses/actor_loss",
+    "train/critic_loss": "losses/critic_loss",
+}
+
+
+def make(options: TrainingOptions) -> "SB3Training":
+    """A new training; see `make_algorithm`."""
+    if not options.run.total_timesteps:
+        raise WorkbenchError(
+            f"{options.kind.name} needs total_timesteps: its schedules depend on them"
+        )
+    training = SB3Training(options, make_model(options))
+    envs = options.hyperparameters.n_envs
+    if shares_robot(training.env) and envs > 1:
+        training.close()
+        raise WorkbenchError(f"over ROS there is one robot: n_envs is 1, not {envs}")
+    return training
+
+
+class SB3Training(Algorithm):
+    """A model of Stable-Baselines3.
+
+    Not in a checkpoint: the state of the environment and of the random generators, and a rollout
+    that isn't whole yet. So a resumed training begins a new episode, and isn't the same to the bit.
+
+    Args:
+        options: what the user chose.
+        model: with its environments.
+    """
+
+    can_yield_robot = False  # the episode under way couldn't be brought back
+
+    def __init__(self, options: TrainingOptions, model: Any) -> None:
+        self._run, self._name, self._model = options.run, options.kind.name, model
+        self.env = model.get_env().envs[0]
+
+    @property
+    def steps(self) -> int:
+        """See `Algorithm.steps`."""
+        return int(self._model.num_timesteps)
+
+    @property
+    def stride(self) -> int:
+        """A step of each environment."""
+        return int(self._model.n_envs)
+
+    def act_greedily(self, observation: np.ndarray) -> Any:
+        """See `Algorithm.act_greedily`."""
+        return self._model.policy.predict(observation, deterministic=True)[0]
+
+    def learn(self, frame: Frame) -> None:
+        """See `Algorithm.learn`."""
+        remaining = max(self._run.total_timesteps - self.steps, 0)
+        self._model.set_logger(Logger(None, [_LossWriter(frame)]))
+        try:
+            self._model.learn(
+                remaining,
+                callback=_FrameCallback(frame, self._run.total_timesteps),
+                reset_num_timesteps=False,
+            )
+        except WorkbenchError:
+            raise
+        except _LEARNING as error:
+            self.check_weights()  # torch tells of it in its own words, if at all
+            text = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise WorkbenchError(f"{self._name} failed: {text}") from error
+
+    def check_weights(self) -> None:
+        """See `Algorithm.check_weights`."""
+        check_weights(self._model)
+
+    def state_dict(self) -> dict[str, Any]:
+        """See `Algorithm.state_dict`."""
+        return state_of(self._model)
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """See `Algorithm.load_state_dict`."""
+        # Another seed than at the start, or the same episodes would be explored again.
+        restore(self._model, state, (self._run.seed + int(state["steps"])) % 2**31)
+
+    def environment_state(self) -> None:
+        """None: it can't be brought back."""
+        return
+
+    def start_environment(self, state: None, say: Say) -> None:
+        """Nothing to do: the model seeds it, and begins a new episode."""
+        if self.steps:
+            say("it goes on with a new episode and other random numbers")
+        if shares_robot(self.env) and self._run.eval_frequency:
+            say("over ROS there is one robot: no evaluation before the end")
+
+    def export(self, folder: Path) -> None:
+        """Writes model.zip, for Stable-Baselines3's own load()."""
+        write_atomically(folder / MODEL, self._model.save)
+
+    def close(self) -> None:
+        """Closes all environments."""
+        self._model.get_env().close()
+
+
+class _LossWriter(KVWriter):
+    """Writes the losses that a model reports."""
+
+    def __init__(self, frame: Frame) -> None:
+        self._frame = frame
+
+    def write(
+        self, key_values: dict[str, Any], key_excluded: dict[str, Any], step: int = 0
+    ) -> None:
+        found = {TAGS[key]: float(key_values[key]) for key in TAGS if key in key_values}
+        for tag, value in found.items():
+            _check_finite(tag, value)
+        self._frame.log.add(step, found)
+
+    def close(self) -> None:
+        """The log is closed by who made it."""
+
+
+class _FrameCallback(BaseCallback):
+    """Tells the frame of episodes and steps, and stops when it says so."""
+
+    def __init__(self, frame: Frame, total_timesteps: int) -> None:
+        super().__init__()
+        self._frame, self._total = frame, total_timesteps
+        self._episodes = 0
+
+    def _on_training_start(self) -> None:
+        self.num_timesteps = self.model.num_timesteps
+
+    def _on_step(self) -> bool:
+        for info in self.locals["infos"]:
+            if "episode" in info:
+                total, length = float(info["episode"]["r"]), int(info["episode"]["l"])
+                self._episodes += 1
+                _check_finite(f"the return of episode {self._episodes}", total)
+                self._frame.episode_done(total, length, {})
+        self._frame.step_done()
+        # At its full length it ends by itself, and learns from the last rollout.
+        return self.num_timesteps >= self._total or not self._frame.is_over()
+
+
+def _check_finite(name: str, value: float) -> None:
+    """Ends a training whose figures are none, and which would only learn nonsense.
+
+    Raises:
+        WorkbenchError: if the value isn't a number, or infinite.
+    """
+    if not math.isfinite(value):
+        raise WorkbenchError(f"{name} is {value}: a smaller learning_rate may help")
+
+
+def load_policy(
+    options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
+) -> Policy:
+    """The policy of a checkpoint; see `policy.load_policy`.
+
+    The checkpoint holds plain tensors, and the model is made anew from the recorded options: so a
+    foreign file can't run code, as it could in Stable-Baselines3's own zip.
+    """
+    model = make_model(options, for_acting=True)
+    model.get_env().close()
+    model.policy.load_state_dict(content["policy"])
+    preference, meaning = _preference(model, options.kind.name, env.action_space)
+    return Policy(
+        lambda observation: model.policy.predict(observation, deterministic=True)[0],
+        preference,
+        meaning,
+    )
+
+
+def _preference(
+    model: Any, algorithm: str, space: gymnasium.Space[Any]
+) -> tuple[Callable[[np.ndarray], np.ndarray], str]:
+    """What it would rather do in observations (N, D), as (N,), and what these numbers mean."""
+    if not isinstance(space, spaces.Discrete):
+        return lambda seen: _first(model.policy.predict(seen, deterministic=True)[0]), "action"
+    if algorithm in ON_POLICY:
+        return lambda seen: _spread(_probabilities(model, seen)), "P(right) - P(left)"
+    return lambda seen: _spread(model.q_net(_tensor(seen))), "Q(right) - Q(left)"
+
+
+def _probabilities(model: Any, observations: np.ndarray) -> torch.Tensor:
+    found: torch.Tensor = model.policy.get_distribution(_tensor(observations)).distribution.probs
+    return found
+
+
+def _tensor(observations: np.ndarray) -> torch.Tensor:
+    return torch.as_tensor(observations, dtype=torch.float32)
+
+
+def _first(actions: np.ndarray) -> np.ndarray:
+    return np.asarray(actions, float).reshape(len(actions), -1)[:, 0]
+
+
+def _spread(values: torch.Tensor) -> np.ndarray:
+    """The last action's against the first one's, of (N, actions)."""
+    return np.asarray((values[:, -1] - values[:, 0]).detach().cpu())
