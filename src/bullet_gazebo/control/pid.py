@@ -1,4 +1,4 @@
-"""The PID of control_toolbox, to the letter of ros_control.md section 4."""
+"""The PID of control_toolbox, to the letter of docs/contract/ros_control.md 4."""
 
 import math
 from collections.abc import Callable, Mapping

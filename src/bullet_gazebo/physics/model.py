@@ -93,7 +93,7 @@ class Model:
     def set_joint_positions(self, positions: Mapping[str, float]) -> None:
         """Puts joints at `positions` [rad, m], clamped to their limits, at rest with all they carry.
 
-        Unknown names are ignored and joints are taken in order of name (gazebo_api.md section 2.16).
+        Unknown names are ignored and joints are taken in order of name (docs/contract/gazebo.md 2.16).
         """
         for name in sorted(set(positions) & set(self._joints)):
             joint = self.description.joints[name]

@@ -44,7 +44,7 @@ class Input:
 
 
 class Controller(ABC):
-    """One controller (contract: ros_control.md sections 1 and 3). Times are in [ns], periods in [s].
+    """One controller (docs/contract/ros_control.md 1 and 3). Times are in [ns], periods in [s].
 
     How to write one's own: docs/controllers.md.
     """

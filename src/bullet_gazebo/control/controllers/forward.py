@@ -1,4 +1,4 @@
-"""Controllers that hand their command to the joints as it is (ros_control.md section 3.4)."""
+"""Controllers that hand their command to the joints as it is (docs/contract/ros_control.md 3.4)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Self

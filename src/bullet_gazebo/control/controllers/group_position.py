@@ -1,4 +1,7 @@
-"""effort_controllers/JointGroupPositionController: a position loop for each joint (section 3.4)."""
+"""effort_controllers/JointGroupPositionController: a position loop for each joint.
+
+See docs/contract/ros_control.md 3.4.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Self

@@ -1,4 +1,7 @@
-"""joint_state_controller/JointStateController: reports joints, drives none (ros_control.md section 3.1)."""
+"""joint_state_controller/JointStateController: reports joints, drives none.
+
+See docs/contract/ros_control.md 3.1.
+"""
 
 from collections.abc import Mapping
 

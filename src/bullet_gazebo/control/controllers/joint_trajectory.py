@@ -1,4 +1,7 @@
-"""The JointTrajectoryController of effort, position and velocity interfaces (ros_control.md section 3.5)."""
+"""The JointTrajectoryController of effort, position and velocity interfaces.
+
+See docs/contract/ros_control.md 3.5.
+"""
 
 from collections.abc import Mapping
 from typing import Self

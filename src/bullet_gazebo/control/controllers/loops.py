@@ -14,7 +14,7 @@ REPORT_EVERY = 10  # updates
 
 
 class PositionLoop:
-    """Holds a joint at its set-point [rad, m] (ros_control.md section 3.2)."""
+    """Holds a joint at its set-point [rad, m] (docs/contract/ros_control.md 3.2)."""
 
     __slots__ = ("_compute", "_straight", "joint", "pid", "set_point")
 

@@ -1,4 +1,4 @@
-"""The parameters of a JointTrajectoryController (ros_control.md section 3.5)."""
+"""The parameters of a JointTrajectoryController (docs/contract/ros_control.md 3.5)."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Topics of a loaded controller: they exist from load to unload (ros_control.md section 1.4)."""
+"""Topics of a loaded controller: they exist from load to unload (docs/contract/ros_control.md 1.4)."""
 
 import math
 import traceback

@@ -1,4 +1,4 @@
-"""The six services of a controller manager (contract: ros_control.md sections 1.2 to 1.7)."""
+"""The six services of a controller manager (docs/contract/ros_control.md 1.2 to 1.7)."""
 
 import threading
 import traceback
@@ -155,7 +155,7 @@ class ControllerServices:
 
 
 def _refused(error: ControlError) -> bool:
-    """A refused request is ok=false, and its reason stands in the log (ros_control.md section 1.3)."""
+    """A refused request is ok=false, and its reason stands in the log (docs/contract/ros_control.md 1.3)."""
     rospy.logerr("Controller manager: %s", error)
     return False
 

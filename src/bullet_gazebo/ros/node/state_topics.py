@@ -1,4 +1,4 @@
-"""/clock, model_states and link_states (contract: gazebo_api.md section 1.3)."""
+"""/clock, model_states and link_states (docs/contract/gazebo.md 1.3)."""
 
 from collections.abc import Callable
 from functools import partial
