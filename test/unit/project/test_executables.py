@@ -8,6 +8,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 BOUND = 15.0  # [s]
 MAIN = "import sys; from bullet_gazebo.ros.{0}.{1} import main; sys.exit(main())"
 ROOMS = {"gazebo": "node", "gzserver": "node"}  # all others are clients

@@ -23,7 +23,7 @@ def run(tmp_path, root):
     def run(*options):
         done = subprocess.run(
             [sys.executable, "-m", "pytest", "-p", "progress_plugin", "--rootdir", tmp_path, *options],
-            cwd=tmp_path, env={"PYTHONPATH": str(root / "test")}, text=True, check=False,
+            cwd=tmp_path, env={"PYTHONPATH": str(root / "test/support")}, text=True, check=False,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip
         assert done.returncode == 1, done.stdout
