@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 HISTORY = "CHANGELOG.md"
 RESULTS = ("runs", "models")  # folders that trainings make, as in .gitignore
 BLOCK = re.compile(
-    r"^(?P<fence>```|~~~)(?P<fenced>.*?)^(?P=fence)[^\n]*$"
+    r"^ {0,3}(?P<fence>```|~~~)(?P<fenced>.*?)^ {0,3}(?P=fence)[^\n]*$"
     r"|(?:\A|(?<=\n\n))(?P<indented>(?:(?: {4}|\t)[^\n]*\n|\n)+)",
     re.MULTILINE | re.DOTALL,
 )
