@@ -157,7 +157,7 @@ def _text(element: Element) -> str:
     return (element.text or "").strip()
 
 
-def _overridden(joint: JointHandle, params: Mapping, warnings: list[str]) -> JointLimits:
+def _overridden(joint: JointHandle, params: Mapping[str, Any], warnings: list[str]) -> JointLimits:
     """`has_X_limits` switches X on (with its values) or off; what isn't named stays as in the URDF."""
     limits = joint.limits
     for what, fields in OVERRIDES.items():

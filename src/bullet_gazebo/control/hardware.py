@@ -30,7 +30,6 @@ class RobotHardware:
 
         Errors: ControlError if a transmission's joint isn't in the description, or gains are wrong.
         """
-        self.urdf_joints = description.joints
         self.interfaces: dict[str, dict[str, JointHandle]] = {}
         for transmission in description.transmissions:
             joint = description.joints.get(transmission.joint)

@@ -60,12 +60,6 @@ class Model:
             link = parents[link].parent
         return [name for name in found if name in self._joints]
 
-    @property
-    def geom_names(self) -> list[str]:
-        """Names of the collision shapes, link by link."""
-        links = self.description.links
-        return [shape.name for link in self.link_names for shape in links[link].collisions]
-
     def link_state(self, name: str) -> tuple[Pose, Twist]:
         """Returns pose and twist of the frame of link `name`, in world axes."""
         return self.body.link_state(name)

@@ -84,7 +84,7 @@ class PidJoint(Controller):
         self.pids = {"pid": pid}
 
     @classmethod
-    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> Self:
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
         joint = joint_param(params, name, cls.interface, hardware)
         return cls(name, joint, Pid.from_params(params.get("pid"), f"{name}/pid"))
 

@@ -3,6 +3,7 @@
 import threading
 import traceback
 from collections.abc import Callable
+from typing import Any
 
 import rosgraph
 import rospy
@@ -66,7 +67,7 @@ class ControllerServices:
             self._gone = True
             self._close_all()
 
-    def _advertise(self, name: str, kind: type, handler: Callable) -> rospy.Service:
+    def _advertise(self, name: str, kind: type, handler: Callable[[Any], object]) -> rospy.Service:
         def handle(request: object) -> object:
             with self._one_at_a_time:
                 if self._gone:  # rospy keeps persistent connections to a service that is shut down
