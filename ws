@@ -32,12 +32,21 @@ DEFAULT_MASTER=http://127.0.0.1:$((20000 + CHECKSUM % 10000))
 source "$ROOT/tools/ws_steps.sh"
 # shellcheck source=tools/ws_environment.sh
 source "$ROOT/tools/ws_environment.sh"
+# shellcheck source=tools/ws_check.sh
+source "$ROOT/tools/ws_check.sh"
+
+# The markers (pyproject.toml) of what `ws test --fast` leaves out.
+NOT_FAST="rostest or slow or long or extras"
 
 usage() {
     cat <<END
 usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
        ws test [ARG...]      run all tests; ARGs go to pytest, e.g. -k gazebo
-       ws check              lint (ruff), types (mypy), catkin packages (catkin_lint)
+       ws test --fast [ARG...]
+                             run the tests of about a minute, without those through ROS (test/ros),
+                             those that take seconds each (marked slow or long), and those that
+                             need requirements/extras.txt (marked extras)
+       ws check [NAME...]    run the checks, or those named: ${CHECKS[*]}
        ws shell              an interactive shell in the workspace
        ws extras [CMD...]    install requirements/extras.txt too, then run CMD, if any
        ws clean              remove everything that ws made
@@ -60,13 +69,16 @@ left out.
 END
 }
 
-check() {
-    local status=0
+run_tests() {  # [--fast] [ARG...]
+    local argument fast='' arguments=()
+    for argument in "$@"; do
+        if [[ $argument == --fast ]]; then fast=yes; else arguments+=("$argument"); fi
+    done
+    # All tests take two processes: one for those through ROS, one for the others.
+    [[ ${#arguments[@]} -gt 0 ]] || arguments=(--numprocesses 2 --dist loadgroup)
+    [[ -z $fast ]] || arguments=(-m "not ($NOT_FAST)" "${arguments[@]}")
     cd -- "$ROOT"
-    "$VENV/bin/ruff" check . || status=1
-    "$VENV/bin/mypy" || status=1
-    /usr/bin/catkin_lint --quiet --offline --ignore env_var --strict -W2 "$WS/src" || status=1
-    return $status
+    exec "$VENV/bin/python3" -m pytest "${arguments[@]}"
 }
 
 interactive_shell() {
@@ -103,13 +115,8 @@ main() {
     esac
     enter_workspace
     case $command in
-        test)
-            cd -- "$ROOT"
-            # All tests take two processes: one for those through ROS, one for the others.
-            [[ $# -gt 1 ]] || set -- test --numprocesses 2 --dist loadgroup
-            exec "$VENV/bin/python3" -m pytest "${@:2}"
-            ;;
-        check) check ;;
+        test) run_tests "${@:2}" ;;
+        check) check "${@:2}" ;;
         shell) interactive_shell ;;
         extras) [[ $# -eq 1 ]] || exec -- "${@:2}" ;;
         *) run "$@" ;;

@@ -11,6 +11,7 @@ environments.json.
 import statistics
 import time
 from collections.abc import Callable
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -34,7 +35,7 @@ def rate(batch: Callable[[], int], seconds: float) -> float:
     return steps / passed
 
 
-def single(identifier: str, **options: object) -> Callable[[], int]:
+def single(identifier: str, **options: Any) -> Callable[[], int]:
     """Random actions in one environment."""
     env = gymnasium.make(identifier, **options).unwrapped
     env.action_space.seed(0)
@@ -51,7 +52,7 @@ def single(identifier: str, **options: object) -> Callable[[], int]:
     return batch
 
 
-def several(worlds: int, **options: object) -> Callable[[], int]:
+def several(worlds: int, **options: Any) -> Callable[[], int]:
     """Random actions in many environments."""
     env = gymnasium.make_vec(VECTOR, worlds, **options)
     env.action_space.seed(0)
@@ -68,7 +69,7 @@ def several(worlds: int, **options: object) -> Callable[[], int]:
 
 def plant_alone() -> Callable[[], int]:
     """What of a step is the simulator's."""
-    env = gymnasium.make(VECTOR).unwrapped
+    env: Any = gymnasium.make(VECTOR).unwrapped
     env.reset(seed=0)
 
     def batch() -> int:

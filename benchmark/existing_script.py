@@ -23,6 +23,7 @@ import threading
 import time
 import uuid
 from pathlib import Path
+from typing import Any
 
 from rl_workbench.training.run.learning_curve import learning_curve
 
@@ -56,8 +57,9 @@ class Watcher:
         self.last_step = time.monotonic()
 
 
-def follow(process: subprocess.Popen, watcher: Watcher, log: Path) -> threading.Thread:
+def follow(process: subprocess.Popen[str], watcher: Watcher, log: Path) -> threading.Thread:
     def read() -> None:
+        assert process.stdout is not None
         with log.open("w") as copy:
             for line in process.stdout:
                 watcher.read(line)
@@ -69,7 +71,7 @@ def follow(process: subprocess.Popen, watcher: Watcher, log: Path) -> threading.
     return thread
 
 
-def wait(process: subprocess.Popen, watcher: Watcher, episodes: int, log: Path) -> None:
+def wait(process: subprocess.Popen[str], watcher: Watcher, episodes: int, log: Path) -> None:
     """Waits for the episodes, telling how far it is every ten seconds."""
     told = 0.0
     while len(watcher.lengths) < episodes:
@@ -94,7 +96,7 @@ def marked(mark: str) -> dict[int, str]:
     return found
 
 
-def press_ctrl_c(process: subprocess.Popen, mark: str) -> tuple[int, float, list[str]]:
+def press_ctrl_c(process: subprocess.Popen[str], mark: str) -> tuple[int, float, list[str]]:
     """Interrupts the script's process group, as a terminal does.
 
     Returns:
@@ -110,7 +112,7 @@ def press_ctrl_c(process: subprocess.Popen, mark: str) -> tuple[int, float, list
     return code, seconds, list(marked(mark).values())
 
 
-def run(script: Path, episodes: int, folder: Path) -> dict:
+def run(script: Path, episodes: int, folder: Path) -> dict[str, Any]:
     """Runs the script in that folder; returns the benchmark's result."""
     mark = uuid.uuid4().hex
     with socket.create_server(("127.0.0.1", 0)) as probe:
@@ -160,7 +162,7 @@ def means(lengths: list[int]) -> dict[str, float]:
     }
 
 
-def report(result: dict) -> str:
+def report(result: dict[str, Any]) -> str:
     rows = [f"| {span} | {mean} |" for span, mean in result["mean_lengths"].items()]
     return "\n".join(
         [

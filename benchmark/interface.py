@@ -96,6 +96,7 @@ def factor(simulation: Simulation) -> list[float]:
     ]
     try:
         for listener in listeners:
+            assert listener.stdout is not None
             listener.stdout.readline()  # it hears the clock now, or has ended
         begin, start = time.perf_counter(), ros_gazebo.gazebo_get_world_properties()[1]
         time.sleep(FACTOR_TIME)

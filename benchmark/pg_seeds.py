@@ -17,6 +17,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ RECENT = 20  # [episodes]; the training's own, for --stop-at
 SOLVED = 2400  # [steps] of 3000
 
 
-def train(seed: int, episodes: int, folder: Path, extra: list[str]) -> dict:
+def train(seed: int, episodes: int, folder: Path, extra: list[str]) -> dict[str, Any]:
     """Runs one training; returns its row of the table."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         master = f"http://127.0.0.1:{probe.getsockname()[1]}"
@@ -48,7 +49,7 @@ def train(seed: int, episodes: int, folder: Path, extra: list[str]) -> dict:
     return row
 
 
-def result(seed: int, summary: dict) -> dict:
+def result(seed: int, summary: dict[str, Any]) -> dict[str, Any]:
     lengths, greedy = summary["lengths"], summary["evaluation"]["lengths"]
     return {
         "seed": seed,
@@ -72,7 +73,7 @@ def first_above(lengths: list[int], limit: float, window: int = 20) -> int | Non
     return None
 
 
-def table(rows: list[dict]) -> str:
+def table(rows: list[dict[str, Any]]) -> str:
     columns = [name for name in rows[0] if name != "lengths"]
     lines = [" | ".join(columns), " | ".join("---" for _ in columns)]
     lines += [" | ".join(str(row[name]) for name in columns) for row in rows]

@@ -15,6 +15,7 @@ import time
 import xmlrpc.client
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import reporting
 import rosgraph
@@ -56,7 +57,8 @@ def listening(simulation: Simulation) -> Iterator[None]:
 
 def simulator_process(simulation: Simulation) -> int:
     uri = rosgraph.Master("/realtime", simulation.master_uri).lookupNode("/gazebo")
-    return int(xmlrpc.client.ServerProxy(uri).getPid("/realtime")[2])  # type: ignore[index]
+    answer: Any = xmlrpc.client.ServerProxy(uri).getPid("/realtime")
+    return int(answer[2])
 
 
 def processor_time(process: int) -> float:

@@ -9,7 +9,7 @@ median round. Prints a table and writes ticks.json.
 
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import reporting
 
@@ -32,7 +32,7 @@ TARGETS = {"tick with two controllers": 10.0, "JointPositionController update": 
 SHARE = 0.5  # of bare steps, in ticks with two controllers
 
 
-def make_world(urdf: str, controllers: dict[str, dict]) -> Simulator:
+def make_world(urdf: str, controllers: Mapping[str, Mapping[str, object]]) -> Simulator:
     """The cart-pole in a lock-step world, its controllers running and listened to."""
     sim = Simulator(World(BulletEngine()), lockstep=True)
     model = sim.world.spawn("cartpole", parse_urdf(urdf), Pose())
@@ -47,7 +47,7 @@ def make_world(urdf: str, controllers: dict[str, dict]) -> Simulator:
     return sim
 
 
-def _drop(sample: tuple) -> None:
+def _drop(sample: tuple[object, ...]) -> None:
     """Stands for a listener."""
 
 

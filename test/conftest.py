@@ -1,4 +1,4 @@
-"""What all tests share: rostest files as test items, and the extras that a test asks for."""
+"""What all tests share: rostest files as test items, progress, and the extras that a test asks for."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from progress_plugin import pytest_configure
 from rostest_plugin import pytest_collect_file
 
-__all__ = ["pytest_collect_file"]
+__all__ = ["pytest_collect_file", "pytest_configure"]
 
 # Nodes of rostest files: only roslaunch can run them.
 collect_ignore_glob = ["ros/**/*.py"]

@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # Sourced by ws: the environment that a command of the workspace runs in.
 
 is_loopback() {
@@ -6,7 +7,7 @@ is_loopback() {
 
 # Nothing of the caller's Python, CMake or ROS environment may decide what runs here.
 leave_other_workspaces() {
-    local prefix kept= entry
+    local prefix kept='' entry
     callers_packages=${callers_packages-${ROS_PACKAGE_PATH-}}
     IFS=: read -ra prefixes <<<"${CMAKE_PREFIX_PATH-}"
     IFS=: read -ra entries <<<"${LD_LIBRARY_PATH-}"

@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # Sourced by ws: the steps that make the workspace ready.
 #
 # A step NAME has two functions: key_NAME prints what the step depends on, make_NAME makes it.

@@ -1,4 +1,4 @@
-"""Efforts and wrenches that clients apply for a time (contract: gazebo_api.md sections 2.18 and 2.19)."""
+"""Efforts and wrenches that clients apply for a time (docs/contract/gazebo.md 2.18 and 2.19)."""
 
 import math
 from dataclasses import dataclass

@@ -92,7 +92,7 @@ class Robot:
         self.model.body.apply_efforts(efforts)
 
     def _halt(self) -> None:
-        """What an emergency stop leaves of the commands (gazebo_api.md section 6.7)."""
+        """What an emergency stop leaves of the commands (docs/contract/gazebo_ros_control.md 6.7)."""
         for joint, _, index in self._effort_joints:
             joint.effort = self._efforts[index] = 0.0
         for drive, _ in self._drives:

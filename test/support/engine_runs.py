@@ -124,7 +124,7 @@ def _held(state: np.ndarray, force: float, step: float) -> np.ndarray:
 
 
 def _limited(force: float, state: np.ndarray) -> float:
-    """Effort saturation of a joint (ros_control.md section 5)."""
+    """Effort saturation of a joint (docs/contract/ros_control.md 5)."""
     most = 0.0 if state[0] > RAIL or state[1] > SPEED else EFFORT
     least = 0.0 if state[0] < -RAIL or state[1] < -SPEED else -EFFORT
     return min(most, max(least, force))

@@ -40,6 +40,7 @@ class RostestFile(pytest.File):
         item = RostestItem.from_parent(self, name=self.path.stem)
         # One after the other on one of pytest-xdist's workers: each starts several processes.
         item.add_marker(pytest.mark.xdist_group("ros"))
+        item.add_marker(pytest.mark.rostest)
         yield item
 
 

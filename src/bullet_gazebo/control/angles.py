@@ -1,4 +1,4 @@
-"""Distances between angles (contract: ros_control.md section 3.2)."""
+"""Distances between angles (docs/contract/ros_control.md 3.2)."""
 
 import math
 

@@ -50,7 +50,7 @@ class RobotDescription:
 
 
 def read_description(text: str) -> RobotDescription:
-    """Reads URDF text (contract: gazebo_api.md section 6.3, ros_control.md sections 3.0 and 5).
+    """Reads URDF text (docs/contract/gazebo_ros_control.md 6.3, docs/contract/ros_control.md 3.0 and 5).
 
     Errors: ControlError if it isn't XML, or a transmission names an interface that doesn't exist.
     """
@@ -157,7 +157,7 @@ def _text(element: Element) -> str:
     return (element.text or "").strip()
 
 
-def _overridden(joint: JointHandle, params: Mapping, warnings: list[str]) -> JointLimits:
+def _overridden(joint: JointHandle, params: Mapping[str, Any], warnings: list[str]) -> JointLimits:
     """`has_X_limits` switches X on (with its values) or off; what isn't named stays as in the URDF."""
     limits = joint.limits
     for what, fields in OVERRIDES.items():

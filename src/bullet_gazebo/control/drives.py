@@ -1,4 +1,4 @@
-"""How a position or velocity command moves a joint (contract: gazebo_api.md section 6.4)."""
+"""How a position or velocity command moves a joint (docs/contract/gazebo_ros_control.md 6.4)."""
 
 import math
 from abc import ABC, abstractmethod

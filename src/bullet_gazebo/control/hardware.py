@@ -17,7 +17,7 @@ GAINS = "gazebo_ros_control/pid_gains"  # where, in the robot's namespace, gains
 
 
 class RobotHardware:
-    """The joints that have a transmission (contract: gazebo_api.md sections 6.3 and 6.4).
+    """The joints that have a transmission (docs/contract/gazebo_ros_control.md 6.3 and 6.4).
 
     `joints` is in alphabetical order, the order of joint states. `effort_joints` take their command
     for an effort, once their `enforcers` have clipped it; `drives` are the others.
@@ -30,7 +30,6 @@ class RobotHardware:
 
         Errors: ControlError if a transmission's joint isn't in the description, or gains are wrong.
         """
-        self.urdf_joints = description.joints
         self.interfaces: dict[str, dict[str, JointHandle]] = {}
         for transmission in description.transmissions:
             joint = description.joints.get(transmission.joint)
@@ -78,7 +77,10 @@ class RobotHardware:
                 drive.relatch()
 
     def halt(self) -> None:
-        """An emergency stop: no effort, no velocity, and positions as they are (gazebo_api.md 6.7)."""
+        """An emergency stop: no effort, no velocity, and positions as they are.
+
+        See docs/contract/gazebo_ros_control.md 6.7.
+        """
         if not self.halted:
             for drive in self.drives:
                 drive.begin_hold()

@@ -32,7 +32,7 @@ class JointHandle:
     """One joint of the robot's hardware. `kind` is revolute, continuous or prismatic.
 
     `command` is a position, a velocity or an effort, as the joint's hardware interface has it. It is
-    kept until it is replaced, also when its controller stops (ros_control.md section 1.6).
+    kept until it is replaced, also when its controller stops (docs/contract/ros_control.md 1.6).
     `effort` is the effort [N m, N] applied in the last step.
     """
 
@@ -54,7 +54,7 @@ class JointHandle:
         return min(position, limits.upper)
 
     def way_to(self, position: float) -> float:
-        """Returns the way from here to `position` [rad, m] (ros_control.md section 3.2).
+        """Returns the way from here to `position` [rad, m] (docs/contract/ros_control.md 3.2).
 
         For an angle it is the shortest turn, within the limits of a revolute joint.
         """

@@ -1,4 +1,7 @@
-"""Joint limits on commands (joint_limits_interface; ros_control.md section 5, gazebo_api.md 6.5)."""
+"""Joint limits on commands, as joint_limits_interface has them.
+
+See docs/contract/ros_control.md 5 and docs/contract/gazebo_ros_control.md 6.5.
+"""
 
 from collections.abc import Callable
 

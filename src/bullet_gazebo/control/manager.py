@@ -1,4 +1,4 @@
-"""The controller manager: loads, switches and updates controllers (ros_control.md section 1)."""
+"""The controller manager: loads, switches and updates controllers (docs/contract/ros_control.md 1)."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
@@ -100,7 +100,9 @@ class ControllerManager:
     def switch(
         self, start: Iterable[str], stop: Iterable[str], strictness: int = BEST_EFFORT
     ) -> None:
-        """Stops and starts controllers as one act (section 1.6), also while the world is paused.
+        """Stops and starts controllers as one act, also while the world is paused.
+
+        See docs/contract/ros_control.md 1.6.
 
         A running controller that is in both lists, or in the start list under BEST_EFFORT, is restarted;
         under STRICT both are refused.

@@ -1,4 +1,4 @@
-"""The PID of control_toolbox, to the letter of ros_control.md section 4."""
+"""The PID of control_toolbox, to the letter of docs/contract/ros_control.md 4."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -38,7 +38,7 @@ class Gains:
         )
 
 
-def _number(params: Mapping, key: str, default: float, place: str) -> float:
+def _number(params: Mapping[str, object], key: str, default: float, place: str) -> float:
     value = params.get(key, default)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise ControlError(f"{place}/{key} is {value!r}: it must be a finite number")

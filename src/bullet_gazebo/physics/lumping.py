@@ -1,4 +1,4 @@
-"""Fixed-joint lumping, as sdformat does it when Gazebo loads a URDF (gazebo_api.md section 2.4).
+"""Fixed-joint lumping, as sdformat does it when Gazebo loads a URDF (docs/contract/gazebo.md 2.4).
 
 The child of a fixed joint melts into its parent: inertia, shapes and the joints below it move up, and
 its name is gone. A root link called `world` stands for the world itself. Links without mass are dropped.

@@ -60,12 +60,6 @@ class Model:
             link = parents[link].parent
         return [name for name in found if name in self._joints]
 
-    @property
-    def geom_names(self) -> list[str]:
-        """Names of the collision shapes, link by link."""
-        links = self.description.links
-        return [shape.name for link in self.link_names for shape in links[link].collisions]
-
     def link_state(self, name: str) -> tuple[Pose, Twist]:
         """Returns pose and twist of the frame of link `name`, in world axes."""
         return self.body.link_state(name)
@@ -93,7 +87,7 @@ class Model:
     def set_joint_positions(self, positions: Mapping[str, float]) -> None:
         """Puts joints at `positions` [rad, m], clamped to their limits, at rest with all they carry.
 
-        Unknown names are ignored and joints are taken in order of name (gazebo_api.md section 2.16).
+        Unknown names are ignored and joints are taken in order of name (docs/contract/gazebo.md 2.16).
         """
         for name in sorted(set(positions) & set(self._joints)):
             joint = self.description.joints[name]

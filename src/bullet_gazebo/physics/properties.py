@@ -1,6 +1,5 @@
 """Properties of links and joints that change while the world runs."""
 
-import math
 from dataclasses import dataclass, replace
 
 from bullet_gazebo.physics.description import Inertia
@@ -73,8 +72,3 @@ def set_joint_properties(
 def at(inertia: Inertia, position: tuple[float, float, float]) -> Inertia:
     """Returns `inertia` with its centre of mass at `position` [m] of the link; its axes stay."""
     return replace(inertia, com=inertia.com._replace(position=position))
-
-
-def is_bounded(values: tuple[float, ...], most: float = math.inf) -> bool:
-    """Returns whether all are finite, and none is larger than `most` either way."""
-    return all(math.isfinite(value) and abs(value) <= most for value in values)

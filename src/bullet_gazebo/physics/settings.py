@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """ODE's figures, with sdformat's defaults (gazebo_api.md section 2.20).
+    """ODE's figures, with sdformat's defaults (docs/contract/gazebo.md 2.20).
 
     PyBullet's solver is another one: only `iterations` acts on it. The others are kept for who reads them.
     """

@@ -77,7 +77,7 @@ class World:
         self._index()
 
     def model(self, name: str) -> Model | None:
-        """Returns what the name look-up finds, if it is a model (gazebo_api.md section 2.0)."""
+        """Returns what the name look-up finds, if it is a model (docs/contract/gazebo.md 2.0)."""
         entity = self._entities.get(name)
         return entity.model if entity is not None and entity.kind == "model" else None
 

@@ -88,7 +88,7 @@ class PluginRegistry:
 
     def load(self, model: Model, robot_namespace: str) -> None:
         """Starts the plugins of `model`. One that is unknown or fails is a message, and left out
-        (gazebo_api.md section 2.4)."""
+        (docs/contract/gazebo.md 2.4)."""
         loaded = self._loaded.setdefault(model, [])
         places = _registered() if model.description.plugins else {}
         for plugin in model.description.plugins:

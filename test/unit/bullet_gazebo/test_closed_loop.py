@@ -60,7 +60,7 @@ def integrated(tick):
 
 
 def limited(force, state):
-    """Effort saturation of a joint (ros_control.md section 5)."""
+    """Effort saturation of a joint (docs/contract/ros_control.md 5)."""
     most = 0.0 if state[0] > RAIL or state[1] > SPEED else EFFORT
     least = 0.0 if state[0] < -RAIL or state[1] < -SPEED else -EFFORT
     return min(most, max(least, force))

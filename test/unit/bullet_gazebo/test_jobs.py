@@ -1,4 +1,7 @@
-"""Efforts and wrenches that act for a time: spans, adding up, overwriting, clearing (sections 2.18, 2.19)."""
+"""Efforts and wrenches that act for a time: spans, adding up, overwriting, clearing.
+
+See docs/contract/gazebo.md 2.18 and 2.19.
+"""
 
 import math
 from types import SimpleNamespace

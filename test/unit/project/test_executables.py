@@ -8,6 +8,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 BOUND = 15.0  # [s]
 MAIN = "import sys; from bullet_gazebo.ros.{0}.{1} import main; sys.exit(main())"
 ROOMS = {"gazebo": "node", "gzserver": "node"}  # all others are clients
@@ -33,8 +35,8 @@ def start(tmp_path):
             "ROS_LOG_DIR": str(tmp_path),
         }
         program = subprocess.Popen(
-            [sys.executable, "-c", MAIN.format(ROOMS.get(name, "clients"), name), *arguments], env=environment,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            [sys.executable, "-c", MAIN.format(ROOMS.get(name, "clients"), name), *arguments],
+            env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
         programs.append(program)
         return program

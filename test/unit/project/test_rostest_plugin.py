@@ -7,6 +7,8 @@ import os
 import pytest
 import rostest_plugin
 
+pytestmark = pytest.mark.slow
+
 PACKAGE = """<package format="3"><name>probe</name><version>0.0.0</version><description/>
 <maintainer email="probe@example.com">probe</maintainer><license>none</license></package>"""
 

@@ -47,7 +47,7 @@ def variable(ws, name, **environment):
 def test_help(ws, option):
     result = ws(option)
     assert result.returncode == 0
-    for word in ("test", "check", "shell", "clean", "ROS_MASTER_URI", "http://127.0.0.1:2"):
+    for word in ("test --fast", "check", "shell", "clean", "ROS_MASTER_URI", "http://127.0.0.1:2"):
         assert word in result.stdout
 
 
@@ -252,6 +252,24 @@ def test_a_remote_master_gets_no_loopback_address(ws):
     assert variable(ws, "ROS_IP", ROS_MASTER_URI="http://robot.example:11311") == "-"
 
 
+# --- tests and checks --------------------------------------------------------------------------
+
+
+def test_fast_leaves_out_what_takes_long(ws):
+    files = ["test_rostest_plugin.py", "test_ci.py", "test_catkin_workspace.py"]
+    paths = [f"test/unit/project/{name}" for name in files]
+    result = ws("test", "--collect-only", "-q", "--fast", *paths, "test/ros/robot_envs")
+    assert result.returncode == 0, result.stdout
+    tests = [line.split("::")[0] for line in result.stdout.splitlines() if "::" in line]
+    assert set(tests) == {"test/unit/project/test_ci.py"}
+
+
+def test_an_unknown_check_is_a_usage_error(ws):
+    result = ws("check", "nonsense")
+    assert result.returncode == 2
+    assert "no check 'nonsense', only lint format types" in result.stderr
+
+
 # --- checkouts of its own ----------------------------------------------------------------------
 
 
@@ -273,6 +291,7 @@ def test_two_checkouts_have_two_masters(ws, checkout, root):
     assert line(ws("--help")) != line(ws("--help", script=checkout / "ws"))
 
 
+@pytest.mark.slow
 def test_failed_step_says_what_and_the_next_call_resumes(ws, checkout):
     pinned = checkout / "requirements/base.txt"
     pinned.write_text("./no-such-folder\n")

@@ -1,9 +1,11 @@
 """The complete list of ros_utils' functions: names, orders and defaults of the arguments.
 
-Additions are keyword-only, so that calls written for the list keep their meaning.
+Additions are keyword-only, so that calls written for the list keep their meaning
+(docs/contract/ros_utils.md 10).
 """
 
 import inspect
+import re
 import socket
 
 import pytest
@@ -113,6 +115,20 @@ SIGNATURES = [(module, each) for module, signatures in CONTRACT.items() for each
 
 def test_the_list_is_complete():
     assert len(SIGNATURES) == 53
+
+
+def test_the_list_is_the_contracts(root):
+    page = (root / "docs/contract/ros_utils.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"`(\w+)`:\n\n```\n(.*?)```", page.split("\n## 10 ")[1], re.DOTALL)
+    listed = {module: text.splitlines() for module, text in blocks}
+    # A list as a default could be changed by a caller; an empty tuple means the same.
+    ours = {
+        module.__name__.rpartition(".")[2]: [
+            each.replace("controllers_list=()", "controllers_list=[]") for each in signatures
+        ]
+        for module, signatures in CONTRACT.items()
+    }
+    assert listed == ours
 
 
 @pytest.mark.parametrize(("module", "signature"), SIGNATURES, ids=[s for _, s in SIGNATURES])

@@ -75,6 +75,7 @@ def test_no_master(no_master, parameters, capsys, call):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", [*CALLS[:2], lambda path: ros_gazebo.launch_Gazebo(gui=False)])
 def test_a_master_that_does_not_answer(mute_master, parameters, capsys, call):
     begin = time.monotonic()

@@ -44,7 +44,7 @@ class Input:
 
 
 class Controller(ABC):
-    """One controller (contract: ros_control.md sections 1 and 3). Times are in [ns], periods in [s].
+    """One controller (docs/contract/ros_control.md 1 and 3). Times are in [ns], periods in [s].
 
     How to write one's own: docs/controllers.md.
     """
@@ -62,7 +62,9 @@ class Controller(ABC):
 
     @classmethod
     @abstractmethod
-    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> "Controller":
+    def create(
+        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
+    ) -> "Controller":
         """Makes the controller from its parameters `<ns>/<name>`.
 
         Errors: ControlError if a parameter or a joint is missing or wrong.
@@ -82,7 +84,7 @@ class Controller(ABC):
         """Called when something other than time changed the joints' state."""
 
 
-def text_param(params: Mapping, key: str, place: str) -> str:
+def text_param(params: Mapping[str, object], key: str, place: str) -> str:
     """Returns the string parameter `key`; ControlError if it is missing or no string."""
     value = params.get(key)
     if not isinstance(value, str) or not value:
@@ -90,7 +92,7 @@ def text_param(params: Mapping, key: str, place: str) -> str:
     return value
 
 
-def number_param(params: Mapping, key: str, place: str) -> float:
+def number_param(params: Mapping[str, object], key: str, place: str) -> float:
     """Returns the numeric parameter `key`; ControlError if it is missing or no number."""
     value = params.get(key)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
@@ -100,13 +102,15 @@ def number_param(params: Mapping, key: str, place: str) -> float:
     return float(value)
 
 
-def joint_param(params: Mapping, name: str, interface: str, hardware: RobotHardware) -> JointHandle:
+def joint_param(
+    params: Mapping[str, object], name: str, interface: str, hardware: RobotHardware
+) -> JointHandle:
     """Returns the joint that the parameter `joint` of controller `name` names; ControlError if none."""
     return hardware.joint(interface, text_param(params, "joint", name))
 
 
 def joints_param(
-    params: Mapping, name: str, interface: str, hardware: RobotHardware
+    params: Mapping[str, object], name: str, interface: str, hardware: RobotHardware
 ) -> list[JointHandle]:
     """Returns the joints that the parameter `joints` of controller `name` lists.
 

@@ -1,4 +1,4 @@
-"""Controllers that hand their command to the joints as it is (ros_control.md section 3.4)."""
+"""Controllers that hand their command to the joints as it is (docs/contract/ros_control.md 3.4)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Self
@@ -38,7 +38,7 @@ class ForwardJoint(Forward):
         self.inputs = [Input("command", "Float64", self.command)]
 
     @classmethod
-    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> Self:
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
         return cls(name, [joint_param(params, name, cls.interface, hardware)])
 
     def command(self, value: float) -> None:
@@ -53,7 +53,7 @@ class ForwardGroup(Forward):
         self.inputs = [Input("command", "Float64MultiArray", self.command_all)]
 
     @classmethod
-    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> Self:
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
         return cls(name, joints_param(params, name, cls.interface, hardware))
 
     def command_all(self, values: Sequence[float]) -> None:

@@ -1,4 +1,7 @@
-"""effort_controllers/JointGroupPositionController: a position loop for each joint (section 3.4)."""
+"""effort_controllers/JointGroupPositionController: a position loop for each joint.
+
+See docs/contract/ros_control.md 3.4.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Self
@@ -24,7 +27,7 @@ class EffortGroupPosition(Controller):
         self.pids = {f"{loop.joint.name}/pid": loop.pid for loop in loops}
 
     @classmethod
-    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> Self:
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
         loops = []
         for joint in joints_param(params, name, cls.interface, hardware):
             own = params.get(joint.name)

@@ -1,4 +1,7 @@
-"""JointPositionController: a PID from position error to effort or velocity (ros_control.md section 3.2)."""
+"""JointPositionController: a PID from position error to effort or velocity.
+
+See docs/contract/ros_control.md 3.2.
+"""
 
 from bullet_gazebo.control.controllers.loops import PidJoint, PositionLoop
 from bullet_gazebo.control.hardware import EFFORT, VELOCITY

@@ -1,4 +1,7 @@
-"""joint_state_controller/JointStateController: reports joints, drives none (ros_control.md section 3.1)."""
+"""joint_state_controller/JointStateController: reports joints, drives none.
+
+See docs/contract/ros_control.md 3.1.
+"""
 
 from collections.abc import Mapping
 
@@ -10,6 +13,7 @@ from bullet_gazebo.control.samples import JointStateSample
 
 NANOSECONDS = 1_000_000_000
 SLOWEST = 1e-6  # [Hz]; below it, as at 0, nothing is ever published
+Extra = tuple[str, float, float, float]  # a constant joint: name, position, velocity, effort
 EXTRA_FIELDS = ("position", "velocity", "effort")
 
 
@@ -20,19 +24,25 @@ class JointStateController(Controller):
     interface = STATE
 
     def __init__(
-        self, name: str, joints: list[JointHandle], rate: float, extra: list[tuple]
+        self, name: str, joints: list[JointHandle], rate: float, extra: list[Extra]
     ) -> None:
         super().__init__(name)
         self._joints = joints
         self._period = round(NANOSECONDS / rate) if rate > SLOWEST else None
         self._last = 0
         self._names = tuple(j.name for j in joints) + tuple(e[0] for e in extra)
-        self._extra = tuple(tuple(e[k] for e in extra) for k in (1, 2, 3))
+        self._extra = (
+            tuple(e[1] for e in extra),
+            tuple(e[2] for e in extra),
+            tuple(e[3] for e in extra),
+        )
         self._output = Output("joint_states", "JointState", shared=True)
         self.outputs = [self._output]
 
     @classmethod
-    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> "JointStateController":
+    def create(
+        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
+    ) -> "JointStateController":
         rate = number_param(params, "publish_rate", name)
         wanted = params.get("joints", list(hardware.joints))
         if not isinstance(wanted, list) or not all(isinstance(joint, str) for joint in wanted):
@@ -74,9 +84,9 @@ class JointStateController(Controller):
         )
 
 
-def _extra_joints(entries: object, names: list[str]) -> list[tuple]:
+def _extra_joints(entries: object, names: list[str]) -> list[Extra]:
     """Constant joints (name, position, velocity, effort); as upstream, a bad or repeated one is left out."""
-    extra: list[tuple] = []
+    extra: list[Extra] = []
     seen = set(names)
     for entry in entries if isinstance(entries, list) else []:
         values = [entry.get(key, 0.0) for key in EXTRA_FIELDS] if isinstance(entry, Mapping) else []

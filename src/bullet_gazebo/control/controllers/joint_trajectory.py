@@ -1,4 +1,7 @@
-"""The JointTrajectoryController of effort, position and velocity interfaces (ros_control.md section 3.5)."""
+"""The JointTrajectoryController of effort, position and velocity interfaces.
+
+See docs/contract/ros_control.md 3.5.
+"""
 
 from collections.abc import Mapping
 from typing import Self
@@ -48,7 +51,7 @@ class JointTrajectoryController(Controller):
         self._next_state = self._next_report = 0
 
     @classmethod
-    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> Self:
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
         joints = joints_param(params, name, cls.interface, hardware)
         settings = read_settings(params, joints, name)
         if cls.interface == POSITION:

@@ -1,4 +1,7 @@
-"""effort_controllers/JointVelocityController: a PID from velocity error to effort (section 3.3)."""
+"""effort_controllers/JointVelocityController: a PID from velocity error to effort.
+
+See docs/contract/ros_control.md 3.3.
+"""
 
 from bullet_gazebo.control.controllers.loops import PidJoint
 from bullet_gazebo.control.hardware import EFFORT

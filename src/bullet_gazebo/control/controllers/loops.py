@@ -14,7 +14,7 @@ REPORT_EVERY = 10  # updates
 
 
 class PositionLoop:
-    """Holds a joint at its set-point [rad, m] (ros_control.md section 3.2)."""
+    """Holds a joint at its set-point [rad, m] (docs/contract/ros_control.md 3.2)."""
 
     __slots__ = ("_compute", "_straight", "joint", "pid", "set_point")
 
@@ -84,7 +84,7 @@ class PidJoint(Controller):
         self.pids = {"pid": pid}
 
     @classmethod
-    def create(cls, name: str, params: Mapping, hardware: RobotHardware) -> Self:
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:
         joint = joint_param(params, name, cls.interface, hardware)
         return cls(name, joint, Pid.from_params(params.get("pid"), f"{name}/pid"))
 

@@ -1,4 +1,4 @@
-"""The parameters of a JointTrajectoryController (ros_control.md section 3.5)."""
+"""The parameters of a JointTrajectoryController (docs/contract/ros_control.md 3.5)."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -25,7 +25,9 @@ class Settings(NamedTuple):
     constraints: Constraints
 
 
-def read_settings(params: Mapping, joints: Sequence[JointHandle], name: str) -> Settings:
+def read_settings(
+    params: Mapping[str, object], joints: Sequence[JointHandle], name: str
+) -> Settings:
     """Reads the settings of controller `name`; ControlError if a parameter is of the wrong type."""
     state_rate = _number(params, "state_publish_rate", 50.0, name)
     monitor_rate = _number(params, "action_monitor_rate", 20.0, name)
@@ -45,7 +47,7 @@ def read_settings(params: Mapping, joints: Sequence[JointHandle], name: str) -> 
     )
 
 
-def read_axes(params: Mapping, joints: Sequence[JointHandle], name: str) -> list[Axis]:
+def read_axes(params: Mapping[str, object], joints: Sequence[JointHandle], name: str) -> list[Axis]:
     """Makes axes with a PID from `gains` and `velocity_ff`.
 
     Errors: ControlError if a joint has no gains, or a parameter is of the wrong type.
@@ -58,7 +60,9 @@ def read_axes(params: Mapping, joints: Sequence[JointHandle], name: str) -> list
     return axes
 
 
-def _constraints(params: Mapping, joints: Sequence[JointHandle], place: str) -> Constraints:
+def _constraints(
+    params: Mapping[str, object], joints: Sequence[JointHandle], place: str
+) -> Constraints:
     stopped = _number(params, "stopped_velocity_tolerance", STOPPED_VELOCITY, place)
     path, goal = [], []
     for joint in joints:
@@ -68,16 +72,16 @@ def _constraints(params: Mapping, joints: Sequence[JointHandle], place: str) -> 
     return Constraints(tuple(path), tuple(goal), _duration(params, "goal_time", place))
 
 
-def _duration(params: Mapping, key: str, place: str) -> int:
+def _duration(params: Mapping[str, object], key: str, place: str) -> int:
     return max(0, round(_number(params, key, 0.0, place) * NANOSECONDS))
 
 
-def _tree(params: Mapping, key: str, place: str) -> Mapping:
+def _tree(params: Mapping[str, object], key: str, place: str) -> Mapping[str, object]:
     tree = params.get(key, {})
     if not isinstance(tree, Mapping):
         raise ControlError(f"parameter {place}/{key} must hold parameters by name: {tree!r}")
     return tree
 
 
-def _number(params: Mapping, key: str, default: float, place: str) -> float:
+def _number(params: Mapping[str, object], key: str, default: float, place: str) -> float:
     return number_param(params, key, place) if key in params else default

@@ -1,1 +1,4 @@
-"""Joint trajectories (ros_control.md section 3.5): splines, plans, tolerances, goals. No ROS, no engine."""
+"""Joint trajectories: splines, plans, tolerances, goals. No ROS, no engine.
+
+See docs/contract/ros_control.md 3.5.
+"""

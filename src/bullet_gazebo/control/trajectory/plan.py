@@ -1,4 +1,4 @@
-"""What a client wants of the joints, and what of it can't be done (ros_control.md section 3.5)."""
+"""What a client wants of the joints, and what of it can't be done (docs/contract/ros_control.md 3.5)."""
 
 import math
 from collections.abc import Sequence

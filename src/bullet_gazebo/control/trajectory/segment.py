@@ -1,4 +1,4 @@
-"""One piece of a joint's trajectory: a spline between two waypoints (ros_control.md section 3.5)."""
+"""One piece of a joint's trajectory: a spline between two waypoints (docs/contract/ros_control.md 3.5)."""
 
 from typing import NamedTuple
 

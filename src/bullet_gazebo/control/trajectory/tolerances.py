@@ -1,4 +1,4 @@
-"""How far a joint may be off its trajectory (ros_control.md section 3.5)."""
+"""How far a joint may be off its trajectory (docs/contract/ros_control.md 3.5)."""
 
 from typing import NamedTuple
 

@@ -6,6 +6,7 @@ from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics import elements
 from bullet_gazebo.physics.description import (
+    Color,
     DescriptionError,
     Inertia,
     Joint,
@@ -54,7 +55,7 @@ def read_urdf(robot: Element, resources: Resources, folder: Path | None = None) 
     return lump_fixed_joints(model)
 
 
-def _link(element: Element, materials: dict, meshes: MeshFinder) -> Link:
+def _link(element: Element, materials: dict[str, Color | None], meshes: MeshFinder) -> Link:
     name = named(element, "link")
     place = f"link '{name}'"
     inertial = element.find("inertial")
@@ -83,13 +84,15 @@ def _inertia(inertial: Element, place: str) -> Inertia:
 
 
 def _shapes(
-    link: Element, tag: str, place: str, materials: dict, meshes: MeshFinder
+    link: Element, tag: str, place: str, materials: dict[str, Color | None], meshes: MeshFinder
 ) -> list[Shape]:
     shapes = (_shape(e, f"{place}, {tag}", materials, meshes) for e in link.findall(tag))
     return [shape for shape in shapes if shape is not None]
 
 
-def _shape(element: Element, place: str, materials: dict, meshes: MeshFinder) -> Shape | None:
+def _shape(
+    element: Element, place: str, materials: dict[str, Color | None], meshes: MeshFinder
+) -> Shape | None:
     """Returns None for a visual whose mesh is missing."""
     geometry = element.find("geometry")
     if geometry is None or len(geometry) == 0:
@@ -183,7 +186,7 @@ def _origin(element: Element, place: str) -> Pose:
     return Pose((position[0], position[1], position[2]), from_rpy(*rpy))
 
 
-def _rgba(material: Element) -> tuple[float, float, float, float] | None:
+def _rgba(material: Element) -> Color | None:
     color = material.find("color")
     if color is None:
         return None

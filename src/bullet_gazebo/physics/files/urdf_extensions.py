@@ -1,6 +1,6 @@
 """What `<gazebo>` blocks of a URDF say beyond URDF: plugins, friction, gravity, kept fixed joints.
 
-Contract: gazebo_api.md section 2.4. Sensors are out of scope: they are listed in `left_out`.
+See docs/contract/gazebo.md 2.4. Sensors are out of scope: they are listed in `left_out`.
 """
 
 from dataclasses import replace

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics import elements
@@ -143,7 +144,7 @@ def included(include: Element, origin: Origin) -> Light | ModelDescription | tup
 
 
 def _keep(world: WorldDescription, entity: Light | ModelDescription) -> None:
-    kept: dict = world.lights if isinstance(entity, Light) else world.models
+    kept: dict[str, Any] = world.lights if isinstance(entity, Light) else world.models
     if entity.name in kept:
         raise DescriptionError(f"'{shown(entity.name)}' is there twice")
     kept[entity.name] = entity

@@ -1,4 +1,4 @@
-"""Python module `gazebo_ros.gazebo_interface` (contract: gazebo_api.md section 4.2)."""
+"""Python module `gazebo_ros.gazebo_interface` (docs/contract/gazebo_launch.md 4.2)."""
 
 from collections.abc import Sequence
 from typing import Any

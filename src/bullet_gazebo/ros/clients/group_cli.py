@@ -1,4 +1,4 @@
-"""Executable `controller_group` of package controller_manager (contract: ros_control.md section 2).
+"""Executable `controller_group` of package controller_manager (docs/contract/ros_control.md 2).
 
 The parameter `controller_groups` maps the names of groups to lists of controllers. Groups may share
 controllers; a controller that is in no group is left alone.

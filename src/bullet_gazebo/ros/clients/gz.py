@@ -1,5 +1,7 @@
 """Executable `gz`: Gazebo's command line tool, as far as it concerns the world.
 
+See docs/contract/gazebo_launch.md 5.1.
+
 ``gz world -p 1|0`` pauses and goes on, ``-s`` does one step, ``-m N`` does N, ``-r`` resets time and
 models, ``-t`` the time, ``-o`` the models.
 """

@@ -1,4 +1,4 @@
-"""Executable `controller_manager` of package controller_manager (contract: ros_control.md section 2)."""
+"""Executable `controller_manager` of package controller_manager (docs/contract/ros_control.md 2)."""
 
 import sys
 from collections.abc import Callable, Sequence

@@ -1,7 +1,7 @@
 """Finding controller managers and controllers: first half of `controller_manager_msgs.utils`.
 
 rqt's plugins are built on it. Its names and effects are those that ros_control documents; a
-namespace is the manager's own, such as `/my_robot/controller_manager` (ros_control.md section 1.1).
+namespace is the manager's own, such as `/my_robot/controller_manager` (docs/contract/ros_control.md 1.1).
 """
 
 from collections.abc import Iterable, Sequence

@@ -1,4 +1,4 @@
-"""Python module `controller_manager.controller_manager_interface` (contract: ros_control.md section 2).
+"""Python module `controller_manager.controller_manager_interface` (docs/contract/ros_control.md 2).
 
 The functions print what they did, in the words of the script `controller_manager`, and those that
 change something return whether the manager did it. They talk to the manager in the namespace of the

@@ -1,4 +1,4 @@
-"""Executable `spawn_model` of package gazebo_ros (contract: gazebo_api.md section 4.3)."""
+"""Executable `spawn_model` of package gazebo_ros (docs/contract/gazebo_launch.md 4.3)."""
 
 import argparse
 import contextlib

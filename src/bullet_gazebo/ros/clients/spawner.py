@@ -1,7 +1,6 @@
 """Executable `spawner` of package controller_manager: loads and starts controllers, and keeps them.
 
-It stays until it is shut down, and then stops and unloads its controllers (ros_control.md section
-2).
+It stays until it is shut down, and then stops and unloads its controllers (docs/contract/ros_control.md 2).
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """Executable `unspawner` of package controller_manager: keeps controllers stopped while it runs.
 
 It stops the named controllers, again whenever somebody starts them, and starts those that it has
-stopped when it is shut down (ros_control.md section 2).
+stopped when it is shut down (docs/contract/ros_control.md 2).
 """
 
 import argparse

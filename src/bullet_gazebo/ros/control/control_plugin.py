@@ -1,4 +1,4 @@
-"""libgazebo_ros_control.so: ros_control for a model (contract: gazebo_api.md sections 6.1 to 6.5)."""
+"""libgazebo_ros_control.so: ros_control for a model (docs/contract/gazebo_ros_control.md 6.1 to 6.5)."""
 
 import threading
 
@@ -128,7 +128,7 @@ class ControlPlugin:
         return period
 
     def _listen_to_emergency_stop(self, robot: Robot) -> None:
-        """`<eStopTopic>` (gazebo_api.md section 6.7)."""
+        """`<eStopTopic>` (docs/contract/gazebo_ros_control.md 6.7)."""
         topic = self._context.text("eStopTopic", "")
         if not topic:
             return

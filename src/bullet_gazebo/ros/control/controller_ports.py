@@ -1,4 +1,4 @@
-"""Topics of a loaded controller: they exist from load to unload (ros_control.md section 1.4)."""
+"""Topics of a loaded controller: they exist from load to unload (docs/contract/ros_control.md 1.4)."""
 
 import math
 import traceback
@@ -21,12 +21,16 @@ from bullet_gazebo.ros.wire.conversions import to_joint_controller_state, to_joi
 from bullet_gazebo.ros.wire.thinning import ThinnedTopic, Thinner
 from bullet_gazebo.simulator import Simulator
 
-OUTPUTS: dict[str, tuple[type, Callable, int]] = {  # kind: message, conversion, queue size
+OUTPUTS: dict[
+    str, tuple[type, Callable[[Any], Any], int]
+] = {  # kind: message, conversion, queue size
     "JointState": (JointState, to_joint_state, 4),
     "JointControllerState": (JointControllerState, to_joint_controller_state, 1),
     "TrajectorySample": (JointTrajectoryControllerState, to_controller_state, 1),
 }
-INPUTS: dict[str, tuple[type, Callable]] = {  # kind: message, what the controller gets of it
+INPUTS: dict[
+    str, tuple[type, Callable[[Any], Any]]
+] = {  # kind: message, what the controller gets of it
     "Float64": (Float64, lambda message: message.data),
     "Float64MultiArray": (Float64MultiArray, lambda message: message.data),
 }

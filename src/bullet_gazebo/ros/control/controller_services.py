@@ -1,8 +1,9 @@
-"""The six services of a controller manager (contract: ros_control.md sections 1.2 to 1.7)."""
+"""The six services of a controller manager (docs/contract/ros_control.md 1.2 to 1.7)."""
 
 import threading
 import traceback
 from collections.abc import Callable
+from typing import Any
 
 import rosgraph
 import rospy
@@ -66,7 +67,7 @@ class ControllerServices:
             self._gone = True
             self._close_all()
 
-    def _advertise(self, name: str, kind: type, handler: Callable) -> rospy.Service:
+    def _advertise(self, name: str, kind: type, handler: Callable[[Any], object]) -> rospy.Service:
         def handle(request: object) -> object:
             with self._one_at_a_time:
                 if self._gone:  # rospy keeps persistent connections to a service that is shut down
@@ -155,7 +156,7 @@ class ControllerServices:
 
 
 def _refused(error: ControlError) -> bool:
-    """A refused request is ok=false, and its reason stands in the log (ros_control.md section 1.3)."""
+    """A refused request is ok=false, and its reason stands in the log (docs/contract/ros_control.md 1.3)."""
     rospy.logerr("Controller manager: %s", error)
     return False
 

@@ -1,4 +1,4 @@
-"""A PID's gains at run time, and the topic that tells its state (contract: ros_control.md section 4)."""
+"""A PID's gains at run time, and the topic that tells its state (docs/contract/ros_control.md 4)."""
 
 import math
 

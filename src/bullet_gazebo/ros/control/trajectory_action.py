@@ -1,4 +1,4 @@
-"""The action follow_joint_trajectory of a trajectory controller (ros_control.md section 3.5)."""
+"""The action follow_joint_trajectory of a trajectory controller (docs/contract/ros_control.md 3.5)."""
 
 import threading
 import time

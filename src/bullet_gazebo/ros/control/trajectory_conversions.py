@@ -1,6 +1,7 @@
 """Between our records of trajectories and ROS messages."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from control_msgs.msg import (
     FollowJointTrajectoryFeedback,
@@ -49,7 +50,7 @@ def to_feedback(sample: TrajectorySample) -> FollowJointTrajectoryFeedback:
     return FollowJointTrajectoryFeedback(*_fields(sample))
 
 
-def _fields(sample: TrajectorySample) -> tuple:
+def _fields(sample: TrajectorySample) -> tuple[Any, ...]:
     """Header, names, desired, actual, error: the fields of both messages, in their order."""
     points = (_point(*values) for values in (sample.desired, sample.actual, sample.error))
     return Header(stamp=to_time(sample.stamp)), sample.names, *points

@@ -1,4 +1,4 @@
-"""What a trajectory controller offers beside its state (ros_control.md section 3.5)."""
+"""What a trajectory controller offers beside its state (docs/contract/ros_control.md 3.5)."""
 
 import rospy
 from control_msgs.srv import (

@@ -1,4 +1,4 @@
-"""gzserver's command line (contract: gazebo_api.md section 4.2). What is inert is accepted."""
+"""gzserver's command line (docs/contract/gazebo_launch.md 4.2). What is inert is accepted."""
 
 import argparse
 from collections.abc import Sequence

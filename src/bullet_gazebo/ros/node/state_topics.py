@@ -1,7 +1,8 @@
-"""/clock, model_states and link_states (contract: gazebo_api.md section 1.3)."""
+"""/clock, model_states and link_states (docs/contract/gazebo.md 1.3)."""
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import rospy
 import rospy.impl.simtime
@@ -15,6 +16,9 @@ from bullet_gazebo.simulator import Simulator
 QUEUE = 10
 
 
+Publish = Callable[[Any], None]
+
+
 class Audience(rospy.SubscribeListener):
     """Counts a topic's subscribers, so that nothing is made up for nobody."""
 
@@ -23,7 +27,7 @@ class Audience(rospy.SubscribeListener):
         self.size = 0
 
     def peer_subscribe(
-        self, topic_name: str, topic_publish: Callable, peer_publish: Callable
+        self, topic_name: str, topic_publish: Publish, peer_publish: Publish
     ) -> None:
         self.size += 1
 

@@ -3,7 +3,7 @@
 Every ROS node answers XML-RPC calls of master and tools at the address that the master knows
 (getPid, shutdown and so on). The simulator's node answers one more there, `gazeboWorld`: found
 through its node's name, from any machine, and neither a topic nor a service, of which Gazebo's own
-must be the only ones (gazebo_api.md section 7).
+must be the only ones (docs/contract/gazebo.md 7).
 """
 
 import traceback

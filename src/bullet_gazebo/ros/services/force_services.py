@@ -1,4 +1,4 @@
-"""apply_joint_effort, apply_body_wrench and what clears them (gazebo_api.md sections 2.18 and 2.19)."""
+"""apply_joint_effort, apply_body_wrench and what clears them (docs/contract/gazebo.md 2.18 and 2.19)."""
 
 import genpy
 import rospy

@@ -1,4 +1,4 @@
-"""Joint properties and set_model_configuration (contract: gazebo_api.md sections 2.10, 2.16 and 2.17)."""
+"""Joint properties and set_model_configuration (docs/contract/gazebo.md 2.10, 2.16 and 2.17)."""
 
 import math
 

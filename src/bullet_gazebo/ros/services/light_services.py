@@ -1,4 +1,4 @@
-"""get_light_properties, set_light_properties and delete_light (gazebo_api.md sections 2.6 and 2.21)."""
+"""get_light_properties, set_light_properties and delete_light (docs/contract/gazebo.md 2.6 and 2.21)."""
 
 import rospy
 from gazebo_msgs.srv import (

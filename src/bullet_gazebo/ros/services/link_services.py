@@ -1,4 +1,4 @@
-"""get_link_properties, set_link_properties and get_link_state (gazebo_api.md sections 2.11 to 2.13)."""
+"""get_link_properties, set_link_properties and get_link_state (docs/contract/gazebo.md 2.11 to 2.13)."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Where `model://NAME` is looked for (contract: gazebo_api.md section 4.2)."""
+"""Where `model://NAME` is looked for (docs/contract/gazebo_launch.md 4.2)."""
 
 import os
 from xml.etree import ElementTree

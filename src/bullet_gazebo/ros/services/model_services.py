@@ -1,4 +1,4 @@
-"""get_model_state, get_model_properties, get_world_properties (gazebo_api.md sections 2.7 to 2.9)."""
+"""get_model_state, get_model_properties, get_world_properties (docs/contract/gazebo.md 2.7 to 2.9)."""
 
 from collections import Counter
 

@@ -1,4 +1,4 @@
-"""set_model_state and set_link_state, services and topics (gazebo_api.md sections 2.14 and 2.15)."""
+"""set_model_state and set_link_state, services and topics (docs/contract/gazebo.md 2.14 and 2.15)."""
 
 import rospy
 from gazebo_msgs.msg import LinkState, ModelState

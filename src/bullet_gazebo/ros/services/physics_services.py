@@ -1,4 +1,4 @@
-"""get_physics_properties and set_physics_properties (contract: gazebo_api.md section 2.20)."""
+"""get_physics_properties and set_physics_properties (docs/contract/gazebo.md 2.20)."""
 
 import rospy
 from gazebo_msgs.msg import ODEPhysics

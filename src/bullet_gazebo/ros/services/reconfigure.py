@@ -1,4 +1,4 @@
-"""set_parameters, parameter_descriptions, parameter_updates (contract: gazebo_api.md section 1.5)."""
+"""set_parameters, parameter_descriptions, parameter_updates (docs/contract/gazebo.md 1.5)."""
 
 from typing import Any
 

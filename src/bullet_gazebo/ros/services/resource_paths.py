@@ -1,4 +1,4 @@
-"""Where model files, meshes and worlds are looked for (contract: gazebo_api.md sections 4.1 and 4.2)."""
+"""Where model files, meshes and worlds are looked for (docs/contract/gazebo_launch.md 4.1 and 4.2)."""
 
 import contextlib
 import functools

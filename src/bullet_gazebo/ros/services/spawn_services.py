@@ -1,4 +1,4 @@
-"""spawn_urdf_model, spawn_sdf_model and delete_model (contract: gazebo_api.md sections 2.3 to 2.5)."""
+"""spawn_urdf_model, spawn_sdf_model and delete_model (docs/contract/gazebo.md 2.3 to 2.5)."""
 
 import re
 import threading
@@ -42,7 +42,7 @@ class SpawnServices:
         self._sim = sim
         self._plugins = plugins
         # Spawning and deleting take several steps each, with plugins between them: one at a time, as
-        # Gazebo serialises all its services (gazebo_api.md section 1.1).
+        # Gazebo serialises all its services (docs/contract/gazebo.md 1.1).
         self._one_at_a_time = threading.Lock()
         self._services = [
             rospy.Service("~spawn_urdf_model", SpawnModel, self._spawn_urdf),

@@ -1,4 +1,4 @@
-"""Pause, unpause and the two resets (contract: gazebo_api.md sections 2.1 and 2.2)."""
+"""Pause, unpause and the two resets (docs/contract/gazebo.md 2.1 and 2.2)."""
 
 from collections.abc import Callable
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The controller manager's six services, case by case (ros_control.md sections 1.2 to 1.7).
+"""The controller manager's six services, case by case (docs/contract/ros_control.md 1.2 to 1.7).
 
 The world is paused, and no call may need it to run. switch_controller: controller_switch_node.py.
 """

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""switch_controller, case by case (ros_control.md section 1.6).
+"""switch_controller, case by case (docs/contract/ros_control.md 1.6).
 
 The world is paused, and no call may need it to run.
 """

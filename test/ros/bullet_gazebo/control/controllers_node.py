@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""Every type of controller through ROS: parameters, command topic, law, state (ros_control.md section 3)."""
+"""Every type of controller through ROS: parameters, command topic, law, state.
+
+See docs/contract/ros_control.md 3.
+"""
 
 import math
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Gains at run time: dynamic_reconfigure, write-back, PID state (ros_control.md section 4)."""
+"""Gains at run time: dynamic_reconfigure, write-back, PID state (docs/contract/ros_control.md 4)."""
 
 import math
 import subprocess

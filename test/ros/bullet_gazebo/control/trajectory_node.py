@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""JointTrajectoryController through ROS (ros_control.md section 3.5)."""
+"""JointTrajectoryController through ROS (docs/contract/ros_control.md 3.5)."""
 
 import math
 import unittest

@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""A world from a file, and SDF models spawned into it, as a client sees them (gazebo_api.md 2.3 to 2.5)."""
+"""A world from a file, and SDF models spawned into it, as a client sees them.
+
+See docs/contract/gazebo.md 2.3 to 2.5.
+"""
 
 import os
 import tempfile

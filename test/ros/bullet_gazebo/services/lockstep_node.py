@@ -59,7 +59,8 @@ class LockstepTest(unittest.TestCase):
     def test_a_command_acts_from_the_first_tick_on(self):
         answer = self.step(1, [CART], [0.02])
         self.assertEqual(answer.joint_states.name, ["cart_pole", "stand_cart"])
-        self.assertEqual(answer.joint_states.effort, (0.0, 30.0))  # the kick of section 4, clipped
+        # The kick of docs/contract/ros_control.md 4, clipped.
+        self.assertEqual(answer.joint_states.effort, (0.0, 30.0))
 
     def test_the_same_commands_give_the_same_bits(self):
         runs = []

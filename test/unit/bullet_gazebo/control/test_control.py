@@ -1,4 +1,4 @@
-"""Angles, limits, robot descriptions and the two controllers, as ros_control.md has them."""
+"""Angles, limits, robot descriptions and the two controllers, as docs/contract/ros_control.md has them."""
 
 import math
 from itertools import pairwise

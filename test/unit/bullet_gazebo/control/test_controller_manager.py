@@ -1,4 +1,4 @@
-"""The controller manager's table of cases (ros_control.md sections 1.3 to 1.7)."""
+"""The controller manager's table of cases (docs/contract/ros_control.md 1.3 to 1.7)."""
 
 import pytest
 from robots import cartpole_urdf

@@ -1,4 +1,7 @@
-"""JointTrajectoryController, tick by tick: parameters, law, time, joints (ros_control.md section 3.5)."""
+"""JointTrajectoryController, tick by tick: parameters, law, time, joints.
+
+See docs/contract/ros_control.md 3.5.
+"""
 
 import math
 

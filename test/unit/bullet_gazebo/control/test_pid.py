@@ -1,4 +1,4 @@
-"""The PID against the contract's check vectors (ros_control.md section 4), and what it refuses."""
+"""The PID against the contract's check vectors (docs/contract/ros_control.md 4), and what it refuses."""
 
 import math
 
@@ -42,7 +42,7 @@ def test_without_antiwindup_the_integral_winds_behind_its_clamp():
 
 
 def test_a_set_point_step_kicks_for_one_tick():
-    """Gains 100/0.01/10, a step of 0.05 at 1 ms: 505 for a tick, then 5 (section 4)."""
+    """Gains 100/0.01/10, a step of 0.05 at 1 ms: 505 for a tick, then 5 (docs/contract/ros_control.md 4)."""
     assert outputs(Gains(100, 0.01, 10), [0.05, 0.05], 0.001) == pytest.approx([505.0, 5.0])
 
 

@@ -1,4 +1,4 @@
-"""Splines, tracks and plans against closed forms (ros_control.md section 3.5)."""
+"""Splines, tracks and plans against closed forms (docs/contract/ros_control.md 3.5)."""
 
 import math
 

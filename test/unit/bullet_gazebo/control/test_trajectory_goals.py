@@ -1,4 +1,4 @@
-"""Goals of a JointTrajectoryController, tick by tick (ros_control.md section 3.5)."""
+"""Goals of a JointTrajectoryController, tick by tick (docs/contract/ros_control.md 3.5)."""
 
 import math
 

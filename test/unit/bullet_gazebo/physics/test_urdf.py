@@ -329,7 +329,7 @@ def test_a_lumped_caster_keeps_its_own_friction(new_engine):
     world.spawn("ground_plane", ground_plane(), Pose())
     model = world.spawn("r", parse_urdf(text), Pose((0.0, 0.0, 0.15)))
     assert model.link_names == ["base"]
-    assert model.geom_names == [
+    assert list(model.collisions("base")) == [
         "base_collision", "base_fixed_joint_lump__caster_collision_1",
         "base_fixed_joint_lump__runner_collision_2",
     ]  # fmt: skip

@@ -64,6 +64,7 @@ def test_every_suite_of_the_package_has_options_that_exist() -> None:
         assert suite.variants and suite.about
 
 
+@pytest.mark.slow
 def test_a_suite_gives_tables_with_every_seed_and_every_failure(
     suites: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -88,6 +89,7 @@ def test_a_suite_gives_tables_with_every_seed_and_every_failure(
         assert (out / name).read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_an_interrupted_benchmark_goes_on_where_it_was(tmp_path: Path) -> None:
     out = tmp_path / "out"
     params = [f"{key}={value}" for key, value in QUICK.items() if key != "hidden_sizes"]
