@@ -1,9 +1,10 @@
 """The command dqn_train.py: errors in one line, exit codes."""
 
 import sys
-from typing import Any
 
-from cartpole.envs import ros_node
+import gymnasium
+
+from cartpole.ros_options import ros_options
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.dqn.settings import Choice, choose
 from rl_workbench.training.run import folder as run_folder
@@ -17,26 +18,14 @@ def main(argv: list[str] | None = None) -> int:
     argv = sys.argv[1:] if argv is None else argv
     interrupt = Interrupt().install()
     try:
-        flags = ros_node.plain_arguments(argv)
-        own = ros_node.command_line_parameters(argv)
-        choose(flags, own)  # wrong flags and --help need no master
-        return run(choose(flags, _parameters(argv) | own), interrupt)
-    except WorkbenchError as error:
+        flags, parameters, _ = ros_options(argv, NODE)
+        return run(choose(flags, parameters), interrupt)
+    except (WorkbenchError, gymnasium.error.Error) as error:
         print(f"{NODE}: {error}", file=sys.stderr, flush=True)
         return interrupt.exit_code or 1
     except KeyboardInterrupt:
         print(f"{NODE}: interrupted before the training began", file=sys.stderr)
         return interrupt.exit_code or 130
-
-
-def _parameters(argv: list[str]) -> dict[str, Any]:
-    """Private rosparams; only roslaunch's nodes need a master for them."""
-    try:
-        return ros_node.private_parameters(ros_node.full_name(argv, NODE))
-    except WorkbenchError:
-        if any(argument.startswith("__name:=") for argument in argv):
-            raise
-        return {}
 
 
 def run(choice: Choice, interrupt: Interrupt) -> int:

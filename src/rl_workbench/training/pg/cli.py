@@ -6,7 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cartpole.envs import ros_node
+import gymnasium
+
+from cartpole.robot import CONTROL_PERIOD, ROBOT
+from cartpole.ros_options import ros_options
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.pg.settings import Choice, Settings, choose
 from rl_workbench.training.run import folder as run_folder
@@ -23,15 +26,9 @@ def main(argv: list[str] | None = None) -> int:
     argv = sys.argv[1:] if argv is None else argv
     interrupt = Interrupt().install()
     try:
-        flags = ros_node.plain_arguments(argv)
-        own = ros_node.command_line_parameters(argv)
-        choice = choose(flags, own)  # wrong flags and --help need no master
-        name = ros_node.full_name(argv, NODE)
-        is_launched = any(argument.startswith("__name:=") for argument in argv)
-        if choice.run.over_ros or is_launched:  # without ROS there may be no master to ask
-            choice = choose(flags, ros_node.private_parameters(name) | own)
-        return run(choice, name, argv, interrupt)
-    except WorkbenchError as error:
+        flags, parameters, name = ros_options(argv, NODE)
+        return run(choose(flags, parameters), name, argv, interrupt)
+    except (WorkbenchError, gymnasium.error.Error) as error:
         return _failed(error, interrupt)
     except KeyboardInterrupt:
         print(f"{NODE}: interrupted before the training began", file=sys.stderr)
@@ -63,7 +60,7 @@ def run(choice: Choice, name: str, argv: list[str], interrupt: Interrupt) -> int
             training = Training(choice, folder, stage, interrupt)
             interrupt.defer()
             training.run()
-        except WorkbenchError as error:
+        except (WorkbenchError, gymnasium.error.Error) as error:
             return _failed(error, interrupt)  # before the closing: a hung simulator takes its time
         finally:
             interrupt.defer()
@@ -90,18 +87,20 @@ def _stage(
         closing.callback(stage.close)
         return stage
     if run.over_ros:
-        from cartpole.envs.ros_session import RosSession
+        from robot_envs.backends.session import RosSession
 
-        session = RosSession(name, argv, run.realtime, run.gui, run.seed)
+        session = RosSession(ROBOT, name, argv, run.realtime, run.gui, run.seed, height=0.0)
         closing.callback(session.close)
-        return robot_stage(session.start(say), run.start_noise)
-    from cartpole.envs.local_session import LocalSession
+        session.start(say)
+        robot = session.connect(None if run.realtime else CONTROL_PERIOD)
+    else:
+        from robot_envs.backends.in_process import InProcessRobot
 
-    local = LocalSession()
-    closing.callback(local.close)
-    return robot_stage(local.start(say), run.start_noise)
+        robot = InProcessRobot(ROBOT, CONTROL_PERIOD)
+    closing.callback(robot.close)
+    return robot_stage(robot, run.start_noise)
 
 
-def _failed(error: WorkbenchError, interrupt: Interrupt) -> int:
+def _failed(error: Exception, interrupt: Interrupt) -> int:
     print(f"{NODE}: {error}", file=sys.stderr, flush=True)
     return interrupt.exit_code or 1

@@ -6,6 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import torch
 
 from rl_workbench.errors import WorkbenchError
@@ -82,10 +83,10 @@ class Training:
         Raises:
             WorkbenchError: if the simulator, the disk or the arithmetic fails.
         """
-        failure: WorkbenchError | None = None
+        failure: Exception | None = None
         try:
             self._train()
-        except WorkbenchError as error:
+        except (WorkbenchError, gymnasium.error.Error) as error:
             failure = error
         except OSError as error:
             failure = self._not_written(error)
@@ -143,7 +144,7 @@ class Training:
                 run.stop_at,
             )
             keeper.rewind()
-        except WorkbenchError:
+        except (WorkbenchError, gymnasium.error.Error):
             keeper.rewind()
             with contextlib.suppress(OSError):  # the failure is what the user has to hear of
                 keeper.save()
@@ -154,7 +155,7 @@ class Training:
     def _is_complete(self) -> bool:
         return is_complete(self._history, self._run.episodes, self._run.stop_at)
 
-    def _finish(self, failure: WorkbenchError | None) -> None:
+    def _finish(self, failure: Exception | None) -> None:
         """Saves, draws, tells; then passes a failure on, unless the user had stopped anyway."""
         try:
             self._saver.save()
@@ -186,7 +187,7 @@ class Training:
                 f"{what}, seed {self._run.seed}",
             )
 
-    def _summary(self, failure: WorkbenchError | None) -> dict[str, Any]:
+    def _summary(self, failure: Exception | None) -> dict[str, Any]:
         history = self._history
         return {
             **config(self._choice, self._hyperparameters),

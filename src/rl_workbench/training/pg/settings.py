@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cartpole.task import MAX_STEPS
+from cartpole.tasks import MAX_STEPS
 from rl_workbench.agents.pg.settings import ReinforceSettings
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import check_options, option

@@ -4,12 +4,12 @@ from typing import Any, NamedTuple
 
 import gymnasium
 
-from cartpole.envs.cartpole_env import CartPoleEnv
-from cartpole.envs.plant import Plant
-from cartpole.task import BalanceTask
+from cartpole.environment import CartPoleEnv
+from cartpole.tasks import BalanceTask, CartPoleState
 from rl_workbench.training.pg.settings import ROBOT
 from rl_workbench.training.run.environments import FiniteNumbers, make_environment, shares_robot
 from rl_workbench.training.run.evaluation import NOISE
+from robot_envs.backends.backend import RobotBackend
 
 OTHER_SEED = 1_000_000  # added to the training's: other episodes than those learned from
 
@@ -27,14 +27,14 @@ class Stage(NamedTuple):
         self.judge.close()
 
 
-def robot_stage(plant: Plant, start_noise: float) -> Stage:
+def robot_stage(backend: RobotBackend[CartPoleState], start_noise: float) -> Stage:
     """The robot's task. One robot does for both: every episode begins with a reset, to the bit.
 
     Args:
         start_noise: of the episodes that are learned from [m, rad].
     """
-    env = CartPoleEnv(plant, BalanceTask(noise=start_noise))
-    judge = CartPoleEnv(plant, BalanceTask(noise=NOISE))
+    env = CartPoleEnv(backend, BalanceTask(noise=start_noise))
+    judge = CartPoleEnv(backend, BalanceTask(noise=NOISE))
     # In the training the losses tell of what isn't finite, without a look at each step.
     return Stage(env, FiniteNumbers(judge, ROBOT), 0)
 

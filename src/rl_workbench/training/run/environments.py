@@ -60,9 +60,13 @@ class FiniteNumbers(gymnasium.Wrapper[Any, Any, Any, Any]):
         """As the environment's.
 
         Raises:
-            WorkbenchError: if the observation isn't finite in single precision.
+            WorkbenchError: if the observation isn't finite in single precision, or the environment
+                fails in a way that its user can mend.
         """
-        observation, info = self.env.reset(seed=seed, options=options)
+        try:
+            observation, info = self.env.reset(seed=seed, options=options)
+        except gymnasium.error.Error as error:
+            raise WorkbenchError(str(error)) from error
         self._check(observation)
         return observation, info
 
@@ -70,9 +74,13 @@ class FiniteNumbers(gymnasium.Wrapper[Any, Any, Any, Any]):
         """As the environment's.
 
         Raises:
-            WorkbenchError: if the observation or the reward isn't finite in single precision.
+            WorkbenchError: if the observation or the reward isn't finite in single precision, or the
+                environment fails in a way that its user can mend.
         """
-        observation, reward, terminated, truncated, info = self.env.step(action)
+        try:
+            observation, reward, terminated, truncated, info = self.env.step(action)
+        except gymnasium.error.Error as error:
+            raise WorkbenchError(str(error)) from error
         self._check(observation)
         if not abs(float(reward)) <= LARGEST:  # so that NaN is refused too
             raise self._error("reward", reward)
