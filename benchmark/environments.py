@@ -67,14 +67,14 @@ def several(worlds: int, **options: Any) -> Callable[[], int]:
     return batch
 
 
-def plant_alone() -> Callable[[], int]:
+def robot_alone() -> Callable[[], int]:
     """What of a step is the simulator's."""
     env: Any = gymnasium.make(VECTOR).unwrapped
     env.reset(seed=0)
 
     def batch() -> int:
         for index in range(BATCH):
-            env.plant.act(0.02 * (index % 2))
+            env.backend.act((0.02 * (index % 2),))
         return BATCH
 
     return batch
@@ -84,7 +84,7 @@ def subjects(worlds: int) -> dict[str, Callable[[], int]]:
     """What is measured."""
     noisy = {"sensor_noise": 0.01, "sensor_delay": 2}
     return {
-        "the plant alone": plant_alone(),
+        "the robot alone": robot_alone(),
         **{identifier: single(identifier) for identifier in IDS},
         "with a noisy, late sensor": single(VECTOR, **noisy),
         "with random masses and friction": single(

@@ -21,8 +21,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
 
-from cartpole.envs.cartpole_env import CartPoleEnv
-from cartpole.envs.ros_plants import LockstepPlant
+from cartpole.environment import CartPoleEnv
+from cartpole.robot import ROBOT
+from robot_envs.backends.lockstep import LockstepRobot
 from ros_utils.simulation import Simulation
 from ros_utils.step_client import StepClient
 
@@ -63,7 +64,7 @@ def environment_rate(count: int, rounds: int) -> float:
     """Environment steps a second, resets included."""
     with Simulation(lockstep=True) as simulation, simulation.active():
         add_cartpole()
-        env = CartPoleEnv(LockstepPlant())
+        env = CartPoleEnv(LockstepRobot(ROBOT, TICKS))
         env.reset(seed=0)
 
         def step(index: int) -> None:

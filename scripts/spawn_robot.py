@@ -3,7 +3,8 @@
 
 import sys
 
-from cartpole.envs.ros_robot import main
+from cartpole.robot import ROBOT
+from robot_envs.backends.bring_up import spawn_command
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(spawn_command(ROBOT, sys.argv[1:]))

@@ -4,6 +4,7 @@ import gymnasium
 
 NAMESPACE = "cartpole"
 VERSION = 0
+ENTRY_POINT = "cartpole.making:make_environment"
 IDS = {"Balance": "balance", "Classic": "classic", "SwingUp": "swing-up"}  # name: task
 # Of 500 steps, as for CartPole-v1; and of 1250, of which swinging up takes 200 and more.
 SOLVED = {"classic": 475.0, "swing-up": 1000.0}
@@ -17,8 +18,8 @@ def register_environments() -> None:
             continue
         gymnasium.register(
             identifier,
-            entry_point="cartpole.envs.making:make_environment",
-            vector_entry_point="cartpole.envs.vector_env:CartPoleVectorEnv",
+            entry_point=ENTRY_POINT,
+            vector_entry_point="cartpole.vector:CartPoleVectorEnv",
             reward_threshold=SOLVED.get(task),
             kwargs={"task": task},
         )

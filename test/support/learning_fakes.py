@@ -1,4 +1,4 @@
-"""Small plants and environments to learn on in unit tests: quick, and all but one deterministic."""
+"""Small robots and environments to learn on in unit tests: quick, and all but one deterministic."""
 
 import random
 
@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from cartpole.envs.variation import Variation
-from cartpole.errors import SimulatorError
-from cartpole.task import CartPoleState
+from cartpole.tasks import CartPoleState
+from robot_envs.errors import SimulatorError
+from robot_envs.variation import Variation
 
 DT = 0.008  # [s]
 
@@ -68,7 +68,7 @@ class FakePlant:
         fail_after: number of actions after which the simulator "dies"; None: never.
     """
 
-    deterministic = True
+    deterministic, shared = True, False
 
     def __init__(self, fail_after: int | None = None) -> None:
         self.closed = 0
@@ -81,7 +81,8 @@ class FakePlant:
         self._state = state._replace(cart_velocity=0.0, pole_velocity=0.0)
         return self._state
 
-    def act(self, set_point: float) -> CartPoleState:
+    def act(self, command: tuple[float, ...]) -> CartPoleState:
+        (set_point,) = command
         self.actions += 1
         if self._fail_after is not None and self.actions > self._fail_after:
             raise SimulatorError("the connection broke; the simulator has ended")

@@ -7,7 +7,6 @@ import torch
 from dqn_runs import assert_same, points, rows
 from learning_fakes import FakePlant
 
-from cartpole.envs.plant import Plant
 from rl_workbench.training.pg.run import Training
 from rl_workbench.training.pg.settings import choose
 from rl_workbench.training.pg.stage import gymnasium_stage, robot_stage
@@ -32,7 +31,7 @@ CARTPOLE = {  # options of a training that is quick and uses everything there is
 def train(
     folder: Path,
     interrupt: Interrupt | None = None,
-    plant: Plant | None = None,
+    plant: FakePlant | None = None,
     **options: Any,
 ) -> Path:
     """Trains a robot that is a fake unless told otherwise, or in another environment."""
@@ -45,14 +44,14 @@ def train(
 def resume(
     folder: Path,
     interrupt: Interrupt | None = None,
-    plant: Plant | None = None,
+    plant: FakePlant | None = None,
     **options: Any,
 ) -> Path:
     _run(choose([], {"resume": str(folder), **options}), folder, interrupt, plant)
     return folder
 
 
-def _run(choice: Any, folder: Path, interrupt: Interrupt | None, plant: Plant | None) -> None:
+def _run(choice: Any, folder: Path, interrupt: Interrupt | None, plant: FakePlant | None) -> None:
     run = choice.run
     if run.is_robot:
         stage = robot_stage(plant or FakePlant(), run.start_noise)

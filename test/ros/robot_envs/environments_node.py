@@ -24,8 +24,8 @@ from environment_conformance import IDS, RICH, EnvironmentConformance, rollout
 from gymnasium.utils.env_checker import data_equivalence as same
 
 import cartpole  # noqa: F401 - registers the environments
-from cartpole.envs import ros_plants
-from cartpole.errors import CartpoleError, SimulatorError
+from robot_envs.backends import realtime
+from robot_envs.errors import RobotEnvError, SimulatorError
 from ros_utils import ros_gazebo
 
 BACKEND = next((argument for argument in sys.argv if argument in ("ros", "ros-realtime")), "ros")
@@ -113,7 +113,7 @@ class Lockstep(unittest.TestCase):
 
     def test_a_simulator_of_the_other_kind_is_refused(self):
         gymnasium.make("cartpole/Balance-v0", backend="ros").close()
-        with self.assertRaisesRegex(CartpoleError, "moves in lock-step"):
+        with self.assertRaisesRegex(RobotEnvError, "moves in lock-step"):
             gymnasium.make("cartpole/Balance-v0", backend="ros-realtime")
 
 
@@ -144,11 +144,11 @@ class Realtime(unittest.TestCase):
     def test_a_control_period_longer_than_the_patience_is_waited_for(self):
         env = gymnasium.make("cartpole/Balance-v0", backend="ros-realtime", control_period=0.5)
         env.reset(seed=0)
-        plant = env.unwrapped.plant
-        plant.act(0.0)
+        backend = env.unwrapped.backend
+        backend.act((0.0,))
         begin = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
-        with mock.patch.object(ros_plants, "STATE_TIMEOUT", 0.1):  # joint states come every 20 ms
-            plant.act(0.0)
+        with mock.patch.object(realtime, "STATE_TIMEOUT", 0.1):  # joint states come every 20 ms
+            backend.act((0.0,))
         end = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
         self.assertGreaterEqual(end - begin, 0.45)
         env.close()

@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cartpole.envs.display import hindrance
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.commands.shared import add_policy_flags, env_options, number
 from rl_workbench.tools.pictures.films import GIF_RATE, MP4_RATE, check_format, film, write_film
@@ -16,6 +15,7 @@ from rl_workbench.tools.runs.players import Player, load_player
 from rl_workbench.tools.runs.runs import Run, open_run, threshold
 from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.results import check_writable, write_json
+from robot_envs.display import hindrance
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:

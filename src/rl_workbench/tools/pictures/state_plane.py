@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from cartpole.task import ANGLE_LIMIT
+from cartpole.tasks import ANGLE_LIMIT
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.players import Player
 from rl_workbench.tools.runs.runs import Run

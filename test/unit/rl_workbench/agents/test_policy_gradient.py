@@ -8,7 +8,7 @@ import torch
 from learning_fakes import FakePlant
 from torch import nn
 
-from cartpole.envs.cartpole_env import CartPoleEnv
+from cartpole.environment import CartPoleEnv
 from rl_workbench.agents.pg.document import (
     Episode,
     PolicyGradientAgent,

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from learning_fakes import FakePlant
 
-from cartpole.envs.cartpole_env import CartPoleEnv
-from cartpole.task import BalanceTask
+from cartpole.environment import CartPoleEnv
+from cartpole.tasks import BalanceTask
 from rl_workbench.agents.pg.document import Episode
 from rl_workbench.agents.pg.reinforce import ReinforceAgent, generalised_advantages
 from rl_workbench.agents.pg.settings import ReinforceSettings

@@ -31,7 +31,7 @@ from learning_fakes import Dicing, register_with
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tensorboard.plugins.hparams import plugin_data_pb2
 
-from cartpole.envs.cartpole_env import CartPoleEnv
+from cartpole.environment import CartPoleEnv
 from rl_workbench.agents.dqn.agent import DQNAgent
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.dqn import cli as dqn_cli
@@ -309,7 +309,7 @@ def test_where_the_robot_cannot_be_brought_back_the_episode_is_given_up(
     tmp_path: Path, monkeypatch, capsys
 ) -> None:
     monkeypatch.setattr(CartPoleEnv, "shares_robot", True)
-    monkeypatch.setattr("cartpole.envs.bullet_plant.BulletPlant.deterministic", False)
+    monkeypatch.setattr("robot_envs.backends.in_process.InProcessRobot.deterministic", False)
     run = train(tmp_path / "run", env_id="cartpole/Classic-v0", total_timesteps=60,
                 eval_frequency=25)  # fmt: skip
     assert "the episode under way is given up" in capsys.readouterr().err

@@ -14,8 +14,9 @@ from dqn_runs import InterruptAfter, flags, without_doubles
 from learning_fakes import Dicing, FakePlant, OnlyOne, register_with
 from pg_runs import CARTPOLE, assert_same_run, checkpoint, resume, train
 
-from cartpole.envs.bullet_plant import BulletPlant
+from cartpole import robot
 from rl_workbench.errors import WorkbenchError
+from robot_envs.backends.in_process import InProcessRobot
 
 ROBOT = {"episodes": 18, "start_noise": 0.05, "save_every": 10, "seed": 2, "eval_episodes": 3,
          "checkpoint_frequency": 7}  # fmt: skip
@@ -167,7 +168,7 @@ def test_a_checkpoint_loads_safely_and_has_it_all(whole: dict[str, Path]) -> Non
 def test_the_robot_in_process_resumes_exactly(tmp_path: Path) -> None:
     options = {"episodes": 12, "seed": 5, "algorithm": "gae", "eval_episodes": 1}
     options |= {"checkpoint_frequency": 5, "start_noise": 0.02}
-    plants = [BulletPlant() for _ in range(3)]
+    plants = [InProcessRobot(robot.ROBOT, robot.CONTROL_PERIOD) for _ in range(3)]
     first = train(tmp_path / "first", plant=plants[0], **options)
     second = train(tmp_path / "second", InterruptAfter(307), plants[1], **options)
     resume(second, plant=plants[2])
@@ -217,7 +218,7 @@ def test_killed_at_random_moments(root: Path, tmp_path: Path, options: dict, see
     options = options | {"checkpoint_frequency": 2}
     run, moments = tmp_path / "run", random.Random(seed)
     process, killed = start(root, *flags(options), f"--run-dir={run}"), 0
-    plant = BulletPlant()
+    plant = InProcessRobot(robot.ROBOT, robot.CONTROL_PERIOD)
     whole = train(tmp_path / "whole", plant=plant, **options)
     plant.close()
     for _ in range(2):

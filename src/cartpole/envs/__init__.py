@@ -1,1 +1,0 @@
-"""Gymnasium environments of the cart-pole: one task, several plants that carry it out."""

@@ -1,0 +1,53 @@
+"""What an environment needs of a robot, be it simulated here, over ROS, or real."""
+
+from typing import Protocol
+
+from robot_envs.robot import State
+from robot_envs.task import Command
+from robot_envs.variation import Variation
+
+PHYSICS_STEP = 0.001  # [s]; Gazebo's, and of a world in this process
+DEFAULT_ENGINE = "bullet"
+
+
+class RobotBackend(Protocol[State]):
+    """Moves a robot whose controllers follow commands."""
+
+    deterministic: bool  # whether the same commands give the same states
+    shared: bool  # whether all backends of its kind in a process move the same robot
+
+    def reset(self, state: State) -> State:
+        """Puts the joints where the state says; returns the state reached.
+
+        A backend that can't set velocities puts them at rest, and says so in what it returns.
+        """
+        ...
+
+    def act(self, command: Command) -> State:
+        """Commands the controllers; returns the state one control period later."""
+        ...
+
+    def vary(self, variation: Variation) -> None:
+        """Gives the robot other masses, lengths and friction; to be called before a reset."""
+        ...
+
+    def close(self) -> None:
+        """Gives back what the backend holds; may be called twice."""
+        ...
+
+
+def ticks_per_action(control_period: float | None, physics_step: float) -> int:
+    """How many physics steps make one control period, both in [s].
+
+    Raises:
+        ValueError: if the period is None, or isn't a whole number of steps.
+    """
+    if control_period is None:
+        raise ValueError("a control period is needed; only a world in real time goes without one")
+    ratio = control_period / physics_step
+    ticks = round(ratio) if 0.0 < ratio < 1e6 else 0  # also for NaN
+    if ticks < 1 or abs(ticks * physics_step - control_period) > 1e-9:
+        raise ValueError(
+            f"control period {control_period} s is no multiple of the physics step {physics_step} s"
+        )
+    return ticks

@@ -1,0 +1,64 @@
+"""A robot in a simulator over ROS that moves in lock-step."""
+
+from typing import Generic
+
+import genpy
+from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+
+from robot_envs.backends.bring_up import STEP_SERVICE
+from robot_envs.backends.joint_states import read_state
+from robot_envs.backends.ros_variation import RosVariation
+from robot_envs.backends.service import ServiceClient
+from robot_envs.errors import SimulatorError
+from robot_envs.robot import Robot, State
+from robot_envs.task import Command
+from robot_envs.variation import Variation
+from ros_utils.step_client import time_of
+
+
+class LockstepRobot(Generic[State]):
+    """One service call for each action: command, advance, read; time stands still between.
+
+    Args:
+        robot: the robot; it is there, and its controllers run.
+        ticks: physics steps of one action.
+    """
+
+    deterministic = shared = True
+
+    def __init__(self, robot: Robot[State], ticks: int) -> None:
+        self._robot = robot
+        self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True)
+        self._begin = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=list(robot.joints))
+        self._advance = StepWorldRequest(ticks=ticks, controllers=list(robot.commanded))
+        self._step.timeout += time_of(ticks)
+        self._variation = RosVariation(robot)
+
+    def reset(self, state: State) -> State:
+        """See `RobotBackend.reset`; the state asked for is the state reached, exactly."""
+        self._begin.positions, self._begin.velocities = state[::2], state[1::2]
+        return self._call(self._begin)
+
+    def act(self, command: Command) -> State:
+        """See `RobotBackend.act`.
+
+        Raises:
+            SimulatorError: if the step is refused or the simulator doesn't answer.
+        """
+        self._advance.commands = command
+        return self._call(self._advance)
+
+    def _call(self, request: genpy.Message) -> State:
+        answer = self._step(request)
+        if not answer.success:
+            raise SimulatorError(f"{STEP_SERVICE}: {answer.status_message}")
+        return read_state(self._robot, answer.joint_states)
+
+    def vary(self, variation: Variation) -> None:
+        """See `RobotBackend.vary`."""
+        self._variation(variation)
+
+    def close(self) -> None:
+        """Closes the connection to the simulator; the robot is as it was found."""
+        self._step.close()
+        self._variation.undo()

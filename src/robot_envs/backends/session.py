@@ -1,0 +1,193 @@
+"""Everything that environments over ROS need to be running: used where it runs, started where not."""
+
+import atexit
+import contextlib
+import os
+from functools import lru_cache
+from typing import Any, Generic
+
+import rospy
+
+from robot_envs.backends import bring_up, node
+from robot_envs.backends.backend import RobotBackend, ticks_per_action
+from robot_envs.backends.bring_up import STEP_SERVICE, Say, Undo
+from robot_envs.errors import RobotEnvError
+from robot_envs.robot import Robot, State
+from ros_utils import ros_gazebo
+
+START_TIMEOUT = 60.0  # [s] for the simulator to come up
+
+
+class RosSession(Generic[State]):
+    """Brings up master, simulator, robot and controllers; `close()` ends just what it started.
+
+    Once started it is the process's session: environments of this robot that are made with the
+    backend "ros" ("ros-realtime" if `realtime`) use it and start nothing else.
+
+    Args:
+        robot: the robot.
+        name: this process's node name, with namespace.
+        argv: the process's arguments, with roslaunch's remappings.
+        realtime: let the world run by itself, instead of in lock-step.
+        gui: ask a simulator that is started here for its window.
+        seed: for a simulator that is started here.
+        height: above the ground, where a robot that is spawned here stands [m]; the robot's own by
+            default, so that it can do each of its tasks.
+    """
+
+    def __init__(
+        self,
+        robot: Robot[State],
+        name: str,
+        argv: list[str],
+        realtime: bool,
+        gui: bool,
+        seed: int,
+        height: float | None = None,
+    ) -> None:
+        self._robot = robot
+        self._name = name
+        self._argv = argv
+        self._realtime = realtime
+        self._gui = gui
+        self._seed = seed
+        self._height = robot.height if height is None else height
+        self._undo = contextlib.ExitStack()
+
+    def start(self, say: Say) -> None:
+        """Starts what is missing, and makes this the process's session.
+
+        Args:
+            say: is told what is started.
+
+        Raises:
+            RobotEnvError: if something can't be started, or what runs doesn't fit; what was
+                started before that is for `close()` to end.
+        """
+        own_simulator = not (node.master_is_up() and bring_up.simulator_answers())
+        if own_simulator:
+            say("starting the simulator")
+            self._start_simulator()
+        self._join()
+        self._check_mode()
+        changes = bring_up.bring_up(self._robot, say, self._height)
+        if not own_simulator:  # one of ours ends with all that is in it
+            for undo in changes:
+                self._undo.callback(_at_living_simulator, undo)
+        _started().append(self)
+        self._undo.callback(_started().remove, self)
+
+    def serves(self, robot: Robot[State], realtime: bool) -> bool:
+        """Whether it is this robot's, and moves as asked."""
+        return self._robot == robot and self._realtime == realtime
+
+    def connect(self, control_period: float | None, height: float = 0.0) -> RobotBackend[State]:
+        """A connection of its own to the robot; whoever asks for it closes it.
+
+        Args:
+            control_period: simulated time [s] of one action; in real time None takes the newest
+                joint state without waiting for another one.
+            height: the least that the robot must be above the ground [m].
+
+        Raises:
+            ValueError: if the period isn't a whole number of physics steps.
+            RobotEnvError: if the simulator doesn't answer, or the robot stands too low.
+        """
+        bring_up.check_height(self._robot, height)
+        if self._realtime:
+            from robot_envs.backends.realtime import RealtimeRobot
+
+            if control_period is not None:
+                ticks_per_action(control_period, _physics_step())
+            return RealtimeRobot(self._robot, control_period)
+        from robot_envs.backends.lockstep import LockstepRobot
+
+        return LockstepRobot(self._robot, ticks_per_action(control_period, _physics_step()))
+
+    def _start_simulator(self) -> None:
+        started = ros_gazebo.launch_Gazebo(
+            paused=True,
+            gui=self._gui,
+            output="log",
+            launch_new_term=False,
+            lockstep=not self._realtime,
+            seed=self._seed,
+            timeout=START_TIMEOUT,
+        )
+        if not started:
+            raise RobotEnvError("the simulator didn't start; see the messages above")
+        self._undo.callback(ros_gazebo.close_Gazebo)
+
+    def _join(self) -> None:
+        """Becomes a node, unless the process is one; the training handles signals itself."""
+        if rospy.core.is_initialized():
+            return
+        node.refuse_twin(self._name)
+        rospy.init_node(os.path.basename(self._name), argv=["", *self._argv], disable_signals=True)
+        self._undo.callback(rospy.signal_shutdown, "training ended")
+
+    def _check_mode(self) -> None:
+        lockstep = node.service_is_registered(STEP_SERVICE)
+        if self._realtime and lockstep:
+            raise RobotEnvError(
+                f"the running simulator moves in lock-step (it has {STEP_SERVICE}): its time would stand "
+                "still; train without --realtime, or start it with lockstep:=false"
+            )
+        if not self._realtime and not lockstep:
+            raise RobotEnvError(
+                f"the running simulator has no {STEP_SERVICE}: start it with lockstep:=true "
+                "(roslaunch gazebo_ros empty_world.launch takes it), or train with --realtime"
+            )
+
+    def close(self) -> None:
+        """Ends what `start()` started, newest first; may be called twice."""
+        self._undo.close()
+
+
+def _at_living_simulator(undo: Undo) -> None:
+    """Cleans up at a simulator that may have died meanwhile."""
+    with contextlib.suppress(RobotEnvError, rospy.ServiceException, rospy.ROSException, OSError):
+        if bring_up.simulator_answers():
+            undo()
+
+
+def running_session(robot: Robot[State], realtime: bool) -> RosSession[State]:
+    """The process's session, started if there is none; that one runs until the process ends.
+
+    Where its simulator has died, another one is started.
+
+    Raises:
+        RobotEnvError: if something can't be started, or what runs doesn't fit.
+    """
+    for session in reversed(_started()):
+        if session.serves(robot, realtime):
+            if bring_up.simulator_answers():
+                return session
+            break
+    name = f"/{robot.model}_env_{os.getpid()}"
+    session = RosSession(robot, name, [], realtime=realtime, gui=False, seed=0)
+    try:
+        session.start(rospy.loginfo)
+    except BaseException:  # Ctrl-C, too: nothing that was started may stay behind
+        session.close()
+        raise
+    atexit.register(session.close)
+    return session
+
+
+@lru_cache(maxsize=1)
+def _started() -> list[RosSession[Any]]:
+    """The process's sessions, oldest first: a process can become a ROS node only once."""
+    return []
+
+
+def _physics_step() -> float:
+    """The simulator's [s].
+
+    Raises:
+        RobotEnvError: if it doesn't tell.
+    """
+    step = ros_gazebo.gazebo_get_time_step()
+    if not step > 0.0:
+        raise RobotEnvError("the simulator doesn't tell its time step; see the messages above")
+    return step

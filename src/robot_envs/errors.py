@@ -1,0 +1,15 @@
+"""Errors whose text is meant for the user: shown as one line, never as a traceback."""
+
+import gymnasium
+
+
+class RobotEnvError(gymnasium.error.Error):
+    """Something the user can mend; the text says what is wrong and what to do."""
+
+
+class SimulatorError(RobotEnvError):
+    """The simulator doesn't answer, or answers something that can't be used."""
+
+
+class SimulatorHangs(SimulatorError):
+    """The simulator is there but doesn't answer in time."""

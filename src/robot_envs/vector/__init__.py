@@ -1,0 +1,1 @@
+"""Many environments at once, each in a world of its own, stepped together."""

@@ -1,0 +1,122 @@
+"""The conformance suite over all tasks, in-process; and what only registration can get wrong."""
+
+import importlib.util
+import subprocess
+import sys
+from typing import Any, ClassVar
+
+import gymnasium
+import pytest
+from environment_conformance import EnvironmentConformance
+
+import cartpole  # noqa: F401 - registers the environments
+from robot_envs.backends.in_process import InProcessRobot
+from robot_envs.errors import RobotEnvError
+
+
+class TestBalance(EnvironmentConformance):
+    identifier = "cartpole/Balance-v0"
+
+
+class TestClassic(EnvironmentConformance):
+    identifier = "cartpole/Classic-v0"
+
+
+class TestSwingUp(EnvironmentConformance):
+    identifier = "cartpole/SwingUp-v0"
+
+
+@pytest.mark.extras("stable_baselines3")
+@pytest.mark.parametrize("case", [TestBalance, TestClassic, TestSwingUp])
+def test_stable_baselines3s_checker_has_nothing_to_say(case):
+    case().stable_baselines3_agrees()
+
+
+def test_importing_the_package_loads_no_engine_no_ros_and_no_torch():
+    script = (
+        "import sys, cartpole, gymnasium; assert 'cartpole/Balance-v0' in gymnasium.registry;"
+        "print([m for m in ('pybullet', 'rospy', 'torch', 'xacro', 'robot_envs') if m in sys.modules])"
+    )
+    shown = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert shown.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (
+            {"backend": "gazebo"},
+            "there is no backend 'gazebo'; there are bullet, ros, ros-realtime",
+        ),
+        ({"engine": "havok"}, "physics engine 'havok' is not known"),
+        ({"engine": "mujoco", "backend": "ros"}, "start it with physics:=mujoco"),
+        ({"noise": 0.5}, "noise must lie in"),
+        ({"max_steps": 0}, "max_steps must be at least 1"),
+        ({"sensor_noise": -1.0}, "sensor noise must be"),
+        ({"sensor_delay": -1}, "sensor delay must lie in"),
+        (
+            {"randomisation": {"mass": 2.0}},
+            r"randomisation of mass must lie in \[0, 0.9\], not 2.0",
+        ),
+        ({"randomisation": {"length": float("nan")}}, "randomisation of length"),
+        ({"control_period": None}, "a control period is needed"),
+        ({"control_period": None, "backend": "ros"}, "a control period is needed"),
+        ({"control_period": 0.0, "backend": "ros"}, "control period 0.0 s is no multiple"),
+        ({"control_period": 0.0}, "control period 0.0 s is no multiple"),
+        ({"control_period": float("nan")}, "control period nan s is no multiple"),
+        ({"render_mode": "ansi"}, "render_mode is"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options, text):
+    with pytest.raises(ValueError, match=text):
+        gymnasium.make("cartpole/Balance-v0", **options).close()
+
+
+@pytest.mark.parametrize("display", [None, ":77"])
+def test_a_window_without_a_display_is_an_error_that_says_what_to_do(monkeypatch, display):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    if display:
+        monkeypatch.setenv("DISPLAY", display)
+    with pytest.raises(RobotEnvError, match="needs a display .*rgb_array"):
+        gymnasium.make("cartpole/Balance-v0", render_mode="human")
+
+
+def test_a_backend_that_got_no_environment_is_closed(monkeypatch):
+    closed, close = [], InProcessRobot.close
+
+    def watched(backend):
+        closed.append(backend)
+        close(backend)
+
+    monkeypatch.setattr(InProcessRobot, "close", watched)
+    with pytest.raises(ValueError, match="render_mode"):
+        gymnasium.make("cartpole/Balance-v0", render_mode="ansi")
+    assert len(closed) == 1
+
+
+def test_an_engine_that_is_not_installed_is_named_with_the_command_that_installs_it(monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(ValueError, match="'mujoco' is not installed; './ws extras'"):
+        gymnasium.make("cartpole/Balance-v0", engine="mujoco")
+
+
+@pytest.mark.extras("mujoco")
+class TestMujoco(EnvironmentConformance):
+    identifier = "cartpole/Classic-v0"
+    options: ClassVar[dict[str, Any]] = {"engine": "mujoco"}
+
+
+def test_the_control_period_is_that_of_the_physics():
+    slow, quick = (
+        gymnasium.make("cartpole/Balance-v0", control_period=period).unwrapped
+        for period in (0.016, 0.008)
+    )
+    for env in (slow, quick):
+        env.reset(seed=0)
+    state = slow.backend.act((0.02,))
+    quick.backend.act((0.02,))
+    assert quick.backend.act((0.02,)) == state
+    slow.close()
+    quick.close()

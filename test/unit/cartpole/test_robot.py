@@ -1,0 +1,175 @@
+"""The cart-pole in a world of this process: what it is made of, resets, variations."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from robots import CartPole
+
+from cartpole import robot
+from cartpole.robot import CONTROL_PERIOD, CONTROLLER, ROBOT
+from cartpole.tasks import CartPoleState
+from cartpole.variation import CartPoleVariation, Randomisation
+from robot_envs.backends.in_process import InProcessRobot
+from robot_envs.errors import RobotEnvError, SimulatorError
+
+UPRIGHT = CartPoleState(0.0, 0.0, 0.0, 0.0)
+MOVING = CartPoleState(0.1, -0.3, 0.2, 1.5)
+HEAVY = CartPoleVariation(1.2, 0.8, 1.1, 0.5, 0.001).of_robot()
+LIGHT = CartPoleVariation(0.9, 0.9, 1.0, 0.0, 0.0).of_robot()
+NOMINAL = CartPoleVariation().of_robot()
+
+
+def cartpole(**options):
+    return InProcessRobot(ROBOT, CONTROL_PERIOD, **options)
+
+
+@pytest.fixture
+def backend():
+    made = cartpole()
+    yield made
+    made.close()
+
+
+def run(backend, start=MOVING, steps=100):
+    return [
+        backend.reset(start),
+        *(backend.act((0.1 + 0.02 * (step % 7),)) for step in range(steps)),
+    ]
+
+
+def test_an_episode_starts_where_it_should_positions_and_velocities(backend):
+    assert backend.reset(MOVING) == MOVING
+
+
+def test_an_episode_starts_without_a_kick(backend):
+    run(backend)
+    backend.reset(UPRIGHT._replace(cart_position=0.1))
+    state = backend.act((0.1,))
+    assert state == UPRIGHT._replace(cart_position=0.1)
+
+
+def test_a_free_fall_is_that_of_the_equations(backend):
+    """The pole alone: the controller holds the cart against it, so only the pole's first moment counts."""
+    figures, angle = CartPole(), 1e-3
+    backend.reset(UPRIGHT._replace(pole_angle=angle))
+    state = backend.act((0.0,))
+    first = figures.derivative(np.array([0.0, 0.0, angle, 0.0]))[3]
+    assert state.pole_velocity == pytest.approx(first * 0.008, rel=0.2)
+
+
+@pytest.mark.parametrize("before", [0, 1, 77])
+def test_an_episode_knows_nothing_of_those_before(before):
+    fresh, used = cartpole(), cartpole()
+    run(used, UPRIGHT, before)
+    assert run(used) == run(fresh)
+
+
+def test_not_even_of_the_stops_that_it_hit():
+    fresh, used = cartpole(), cartpole()
+    used.reset(MOVING)
+    states = [used.act((2.0,)) for _ in range(300)]
+    assert max(state.cart_position for state in states) > 0.49
+    assert run(used) == run(fresh)
+
+
+def test_the_height_of_the_stand_does_not_matter():
+    assert run(cartpole(height=0.5)) == run(cartpole())
+
+
+@pytest.mark.extras("mujoco")
+def test_on_mujoco_it_moves_the_same_but_not_to_the_bit():
+    runs = [np.array(run(cartpole(engine=name))) for name in ("bullet", "mujoco")]
+    assert 0.0 < np.abs(runs[0] - runs[1]).max() < 1e-9
+
+
+def test_a_variation_is_felt_and_leaves_no_trace(backend):
+    nominal = run(backend)
+    backend.vary(HEAVY)
+    heavy = run(backend)
+    backend.vary(LIGHT)
+    light = run(backend)
+    assert nominal != heavy != light != nominal
+    other = cartpole()
+    other.vary(LIGHT)
+    assert run(other) == light
+    other.vary(HEAVY)
+    assert run(other) == heavy
+    other.vary(NOMINAL)
+    assert run(other) == nominal
+
+
+def test_a_longer_pole_falls_slower(backend):
+    angles = []
+    for length in (0.8, 1.0, 1.25):
+        backend.vary(CartPoleVariation(pole_length=length).of_robot())
+        angles.append(run(backend, UPRIGHT._replace(pole_angle=0.05), 20)[-1].pole_angle)
+    assert angles == sorted(angles, reverse=True)
+
+
+def test_friction_brakes(backend):
+    backend.vary(CartPoleVariation(pole_friction=0.05).of_robot())
+    backend.reset(UPRIGHT._replace(pole_angle=math.pi, pole_velocity=1.0))
+    assert abs([backend.act((0.0,)) for _ in range(500)][-1].pole_velocity) < 0.05
+
+
+def test_friction_of_the_rail_slows_the_cart(backend):
+    free = run(backend, UPRIGHT, 5)
+    backend.vary(CartPoleVariation(cart_friction=10.0).of_robot())
+    braked = run(backend, UPRIGHT, 5)
+    assert 0.0 < braked[-1].cart_position < free[-1].cart_position
+
+
+def test_draws_fill_their_ranges():
+    rng = np.random.default_rng(0)
+    drawn = np.array([Randomisation(0.2, 0.1, 2.0, 0.01).draw(rng)[1] for _ in range(1000)])
+    assert drawn.min(axis=0) == pytest.approx([0.8, 0.8, 0.9, 0.0, 0.0], abs=0.01)
+    assert drawn.max(axis=0) == pytest.approx([1.2, 1.2, 1.1, 2.0, 0.01], abs=0.01)
+
+
+def test_a_world_that_blew_up_is_an_error_and_can_be_reset(backend):
+    backend.reset(UPRIGHT._replace(pole_velocity=1e308))
+    with pytest.raises(SimulatorError, match="isn't finite"):
+        for _ in range(100):
+            backend.act((0.0,))
+    assert run(backend) == run(cartpole())
+
+
+def test_what_is_drawn_is_what_is_told_of_it():
+    variation, told = Randomisation(0.2, 0.1, 2.0, 0.01).draw(np.random.default_rng(0))
+    assert CartPoleVariation(*told).of_robot() == variation
+    assert not variation.is_nominal
+    assert Randomisation().draw(np.random.default_rng(0))[0].is_nominal
+
+
+def test_the_robot_is_found_from_anywhere_without_ros(tmp_path, root: Path):
+    script = (
+        "import cartpole, gymnasium; gymnasium.make('cartpole/Balance-v0').reset(); print('made')"
+    )
+    environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(root / "src")}
+    shown = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "made" in shown.stdout, shown.stderr
+
+
+def test_files_that_are_nowhere_are_an_error_that_says_where_they_were_sought(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(robot, "TREE", tmp_path)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    with pytest.raises(RobotEnvError, match="source the workspace"):
+        ROBOT.parameters(CONTROLLER)
+
+
+def test_parameters_of_an_unknown_controller_are_an_error():
+    with pytest.raises(RobotEnvError, match="has no controller 'elbow'"):
+        ROBOT.parameters("elbow")
