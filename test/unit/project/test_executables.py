@@ -11,14 +11,13 @@ import pytest
 pytestmark = pytest.mark.slow
 
 BOUND = 15.0  # [s]
-MAIN = "import sys; from bullet_gazebo.ros.{0}.{1} import main; sys.exit(main())"
-ROOMS = {"gazebo": "node", "gzserver": "node"}  # all others are clients
-PROGRAMS = {  # name: arguments, exit code after Ctrl-C
-    "spawner": (["a_controller"], 0),
-    "unspawner": (["a_controller"], 0),
-    "spawn_model": (["-urdf", "-file", "/dev/null", "-model", "m", "-b"], 1),
-    "gzclient": ([], 0),
-    "gazebo": ([], 130),
+MAIN = "import sys; from bullet_gazebo.ros.{} import main; sys.exit(main())"
+PROGRAMS = {  # module: arguments, exit code after Ctrl-C
+    "clients.spawner": (["a_controller"], 0),
+    "clients.unspawner": (["a_controller"], 0),
+    "clients.spawn_model": (["-urdf", "-file", "/dev/null", "-model", "m", "-b"], 1),
+    "clients.gzclient": ([], 0),
+    "node.gazebo": ([], 130),
 }
 
 
