@@ -2,10 +2,9 @@
 
 import sys
 
-from robot_envs.errors import RobotEnvError
-
 from cartpole.ros_options import ros_options
 from rl_workbench.training import cli
+from robot_envs.errors import RobotEnvError
 
 NODE = "dqn_train"
 

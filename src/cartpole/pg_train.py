@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from robot_envs.errors import RobotEnvError
-
 from cartpole.registration import NAMESPACE
 from cartpole.ros_options import ros_options
 from rl_workbench.errors import WorkbenchError
@@ -19,6 +17,7 @@ from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell
+from robot_envs.errors import RobotEnvError
 
 NODE = "pg_train"
 PROG = f"{NODE}.py"
@@ -161,9 +160,8 @@ def session(options: TrainingOptions, name: str, argv: list[str], gui: bool) -> 
     if backend == "bullet" or not options.run.env_id.startswith(f"{NAMESPACE}/"):
         yield
         return
-    from robot_envs.backends.session import RosSession
-
     from cartpole.robot import ROBOT
+    from robot_envs.backends.session import RosSession
 
     height = None if "SwingUp" in options.run.env_id else 0.0
     opened = RosSession(ROBOT, name, argv, backend == "ros-realtime", gui, options.run.seed, height)

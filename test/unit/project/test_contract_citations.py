@@ -21,7 +21,9 @@ LINK = re.compile(rf"\]\((\w+\.md)\)(?: ({NUMBERS}))?")  # from one page of the 
 OWN = re.compile(rf"\((\d+\.\d+(?:(?:, | and | to ){NUMBER})*)\)")  # within a page
 HEADING = re.compile(rf"^#{{2,3}} ({NUMBER}) \S", re.MULTILINE)
 # What the citations were before the contract was part of the repository.
-OLD = re.compile(r"gazebo_api\.md|reference/|\.md,? sections? \d|\(sections? \d|[Cc]ontract: \w+\.md")
+OLD = re.compile(
+    r"gazebo_api\.md|reference/|\.md,? sections? \d|\(sections? \d|[Cc]ontract: \w+\.md"
+)
 OLD_IN_CODE = re.compile(r"(?<![\w/])(?:ros_control|ros_utils)\.md")
 
 

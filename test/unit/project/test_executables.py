@@ -34,7 +34,7 @@ def start(tmp_path):
             "ROS_LOG_DIR": str(tmp_path),
         }
         program = subprocess.Popen(
-            [sys.executable, "-c", MAIN.format(ROOMS.get(name, "clients"), name), *arguments],
+            [sys.executable, "-c", MAIN.format(name), *arguments],
             env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
         programs.append(program)

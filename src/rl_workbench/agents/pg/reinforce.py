@@ -1,10 +1,10 @@
 """REINFORCE with a learned baseline: generalised advantages, one step of the policy a batch of episodes.
 
-Against the algorithm of the ROS policy-gradient document (document.py) it differs in four things, each of which takes variance
-out of the gradient: advantages are weighted sums of temporal differences (Schulman et al. 2016, λ = 0.95)
-instead of whole returns; they are normalised over the batch; the baseline is fitted to each batch, not
-nudged towards it once; and observations come scaled, so that one learning rate suits all weights. A
-truncated episode bootstraps from the baseline, a terminated one doesn't.
+Against the algorithm of the ROS policy-gradient document (document.py) it differs in four things, each
+of which takes variance out of the gradient: advantages are weighted sums of temporal differences (Schulman
+et al. 2016, λ = 0.95) instead of whole returns; they are normalised over the batch; the baseline is fitted
+to each batch, not nudged towards it once; and observations come scaled, so that one learning rate suits all
+weights. A truncated episode bootstraps from the baseline, a terminated one doesn't.
 """
 
 from collections.abc import Sequence
