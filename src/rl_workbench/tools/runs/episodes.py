@@ -7,7 +7,7 @@ import numpy as np
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.players import Player
-from rl_workbench.training.run.evaluation import Evaluation, run_greedily
+from rl_workbench.training.run.evaluator import Evaluation, run_greedily
 
 TEST_SEED = 5_000_000  # other episodes than those of any training or of its evaluations
 
