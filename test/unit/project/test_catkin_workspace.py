@@ -11,7 +11,7 @@ import pytest
 
 CATKIN_MAKE = ["/usr/bin/catkin_make", "-DPYTHON_EXECUTABLE=/usr/bin/python3"]
 MODULES = (
-    "import bullet_gazebo_msgs.srv, cartpole.task, gazebo_msgs.srv, ros_utils, bullet_gazebo.control,"
+    "import bullet_gazebo_msgs.srv, cartpole.tasks, gazebo_msgs.srv, ros_utils, bullet_gazebo.control,"
     " controller_manager.controller_manager_interface, controller_manager_msgs.utils"
 )
 
