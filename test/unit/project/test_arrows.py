@@ -12,18 +12,18 @@ GENERATED = ("bullet_gazebo_msgs.srv", "cartpole.msg")  # message types, in no r
 
 # A folder, and what nothing in it may import.
 FORBIDDEN = [
-    ("bullet_gazebo", ("cartpole", "ros_utils")),
+    ("bullet_gazebo", ("cartpole", "rl_workbench", "robot_envs", "ros_utils")),
     ("bullet_gazebo/physics", ("bullet_gazebo.control", "bullet_gazebo.ros", "bullet_gazebo.simulator")),
     ("bullet_gazebo/control", ("bullet_gazebo.physics", "bullet_gazebo.ros", "bullet_gazebo.simulator",
                                "pybullet")),
-    ("ros_utils", ("bullet_gazebo", "cartpole", "pybullet", "torch")),
-    ("cartpole/agents", ("gymnasium", "cartpole.envs", "rl_workbench.training", "rl_workbench",
-                         "ros_utils")),
-    ("cartpole/envs", ("torch", "rl_workbench.agents", "rl_workbench.training", "rl_workbench")),
-    ("cartpole/training", ("rl_workbench", "stable_baselines3", "optuna")),
-    ("cartpole/task.py", ("cartpole.envs", "rl_workbench.agents", "rl_workbench.training", "torch")),
+    ("ros_utils", ("bullet_gazebo", "cartpole", "pybullet", "rl_workbench", "robot_envs", "torch")),
+    ("robot_envs", ("bullet_gazebo.ros", "cartpole", "rl_workbench", "torch")),
+    ("cartpole", ("pybullet", "torch")),
+    ("rl_workbench/agents", ("cartpole", "gymnasium", "rl_workbench.tools", "rl_workbench.training",
+                             "robot_envs", "ros_utils")),
+    ("rl_workbench/training", ("rl_workbench.tools", "ros_utils")),
 ]  # fmt: skip
-ROS_ROOMS = ("bullet_gazebo/ros", "ros_utils", "cartpole/envs")
+ROS_ROOMS = ("bullet_gazebo/ros", "ros_utils", "robot_envs/backends")
 
 
 def imports(path):

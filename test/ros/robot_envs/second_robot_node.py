@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+"""The pendulum over ROS, by a session that its user starts and ends: in lock-step, or in real time."""
+
+import os
+import shutil
+import sys
+import tempfile
+import unittest
+import xmlrpc.client
+from pathlib import Path
+
+import numpy as np
+import rosgraph
+import rostest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+
+from environment_conformance import rollout
+from gymnasium.utils.env_checker import data_equivalence as same
+from pendulum import FILES, PACKAGE, PENDULUM, PendulumState, make_pendulum
+
+from robot_envs.backends.session import RosSession
+from ros_utils import ros_gazebo
+
+BACKEND = next((argument for argument in sys.argv if argument in ("ros", "ros-realtime")), "ros")
+REALTIME = BACKEND == "ros-realtime"
+MANIFEST = """<package format="3"><name>{name}</name><version>1.0.0</version><description>A robot.
+</description><maintainer email="a@example.com">a</maintainer><license>BSD</license></package>"""
+
+
+def make_package(folder: Path) -> None:
+    """A ROS package with the robot's files, where ROS looks for packages."""
+    for name, place in (("pendulum.urdf", "urdf"), ("pendulum.yaml", "config")):
+        (folder / PACKAGE / place).mkdir(parents=True)
+        shutil.copy(FILES / name, folder / PACKAGE / place)
+    (folder / PACKAGE / "package.xml").write_text(MANIFEST.format(name=PACKAGE))
+    os.environ["ROS_PACKAGE_PATH"] = f"{folder}:{os.environ['ROS_PACKAGE_PATH']}"
+
+
+def simulator() -> int | None:
+    """Its process id; None if there is none."""
+    try:
+        address = rosgraph.Master("/second_robot").lookupNode("/gazebo")
+        return int(xmlrpc.client.ServerProxy(address).getPid("/second_robot")[2])
+    except (rosgraph.MasterException, OSError):
+        return None
+
+
+class SecondRobot(unittest.TestCase):
+    """One session, since a process becomes a ROS node once."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="second_robot_")
+        cls.addClassCleanup(folder.cleanup)
+        make_package(Path(folder.name))
+        cls.said = []
+        cls.session = RosSession(
+            PENDULUM, "/learner", [], realtime=REALTIME, gui=False, seed=0, height=0.3
+        )
+        cls.addClassCleanup(cls.session.close)
+        cls.session.start(cls.said.append)
+        cls.simulator = simulator()
+
+    def test_what_was_missing_was_started_and_told(self):
+        controllers = "starting joint_state_controller, hinge_effort_controller"
+        self.assertEqual(self.said, ["starting the simulator", "spawning the robot", controllers])
+        pose = ros_gazebo.gazebo_get_model_state("pendulum")[1]
+        self.assertAlmostEqual(pose.position.z, 0.3)
+
+    def test_environments_made_afterwards_use_it_and_start_nothing(self):
+        first, second = (make_pendulum(BACKEND) for _ in range(2))
+        self.assertTrue(first.shares_robot)
+        for env in (first, second, first):
+            env.reset(seed=1)
+            self.assertTrue(np.isfinite(env.step(np.ones(1, np.float32))[0]).all())
+        first.close()
+        second.reset(seed=1)
+        second.step(np.ones(1, np.float32))
+        second.close()
+        self.assertEqual(simulator(), self.simulator)
+
+    def test_z_closing_ends_the_simulator(self):
+        """The last one by its name."""
+        self.session.close()
+        self.assertIsNone(simulator())
+
+
+@unittest.skipIf(REALTIME, "time runs by itself")
+class Lockstep(SecondRobot):
+    def test_the_bits_are_those_of_the_robot_in_process(self):
+        for options in ({}, {"varied": True, "noise": [0.01, 0.1], "delay": 2}):
+            runs = []
+            for backend in ("ros", "bullet"):
+                env = make_pendulum(backend, **options)
+                runs.append(rollout(env, 500, seed=8))
+                env.close()
+            with self.subTest(options):
+                self.assertTrue(all(same(a, b, exact=True) for a, b in zip(*runs, strict=True)))
+
+    def test_it_is_given_back_with_its_own_friction(self):
+        def spun_down():
+            robot = self.session.connect(0.01)
+            robot.reset(PendulumState(0.0, 10.0))
+            state = robot.act((0.0,))
+            robot.close()
+            return state
+
+        before = spun_down()
+        env = make_pendulum("ros", varied=True)
+        env.reset(seed=0)
+        env.close()
+        self.assertEqual(spun_down(), before)
+
+
+@unittest.skipUnless(REALTIME, "time moves when asked to")
+class Realtime(SecondRobot):
+    def test_without_a_control_period_it_takes_the_newest_state_and_never_repeats_itself(self):
+        env = make_pendulum("ros-realtime", control_period=None)
+        self.assertFalse(env.backend.deterministic)
+        env.reset(seed=2)
+        for _ in range(20):
+            observation = env.step(np.zeros(1, np.float32))[0]
+            self.assertTrue(np.isfinite(observation).all())
+        env.close()
+
+    def test_a_motor_turns_it(self):
+        robot = self.session.connect(0.05)
+        robot.reset(PendulumState(0.0, 0.0))
+        states = [robot.act((0.5,)) for _ in range(4)]
+        robot.close()
+        self.assertGreater(states[-1].angle, 0.1)
+        self.assertGreater(states[-1].rate, 0.5)
+
+
+del SecondRobot  # a base of the two, and no test by itself
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "second_robot", "__main__")
