@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 from bullet_gazebo.physics.description import ModelDescription, Shape
 from bullet_gazebo.physics.engine import Body, Twist
-from bullet_gazebo.physics.lumping import WORLD
-from bullet_gazebo.physics.mass_matrix import effective_inertias
+from bullet_gazebo.physics.mechanics.lumping import WORLD
+from bullet_gazebo.physics.mechanics.mass_matrix import effective_inertias
 from bullet_gazebo.physics.pose import ZERO, Pose
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit

@@ -1,55 +1,131 @@
-"""The arrows of the architecture: who may import whom (docs/architecture.md)."""
+"""The arrows of the architecture: who may import whom (docs/architecture.md), and no circles."""
 
 import ast
+import subprocess
+import sys
+from collections import defaultdict
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 SRC = Path(__file__).resolve().parents[3] / "src"
+ROOT = SRC.parent
 MODULES = sorted(SRC.rglob("*.py"))
-ROS = ("rospy", "rosgraph", "rosnode", "roslib", "rosparam", "roslaunch")
-GENERATED = ("bullet_gazebo_msgs.srv", "cartpole.msg")  # message types, in no room of the house
+FOLDERS = sorted({path.parent for path in MODULES} | {SRC})
+OURS = {"bullet_gazebo", "cartpole", "rl_workbench", "robot_envs", "ros_calls", "ros_utils"}
+ROS = ("rospy", "rosgraph", "rosnode", "roslib", "rosparam", "roslaunch", "rosservice")
+ROS_ROOMS = ("bullet_gazebo/ros", "ros_calls", "ros_utils", "robot_envs/backends")
 
-# A folder, and what nothing in it may import.
+# A library, and which of ours it may import.
+ALLOWED = {
+    "bullet_gazebo": {"ros_calls"},
+    "ros_calls": set(),
+    "ros_utils": {"ros_calls"},
+    "robot_envs": {"bullet_gazebo", "ros_calls", "ros_utils"},
+    "rl_workbench": set(),
+    "cartpole": {"rl_workbench", "robot_envs"},
+}
+# A folder, and what nothing in it may import beside that.
 FORBIDDEN = [
-    ("bullet_gazebo", ("cartpole", "rl_workbench", "robot_envs", "ros_utils")),
     ("bullet_gazebo/physics", ("bullet_gazebo.control", "bullet_gazebo.ros", "bullet_gazebo.simulator")),
     ("bullet_gazebo/control", ("bullet_gazebo.physics", "bullet_gazebo.ros", "bullet_gazebo.simulator",
                                "pybullet")),
-    ("ros_utils", ("bullet_gazebo", "cartpole", "pybullet", "rl_workbench", "robot_envs", "torch")),
-    ("robot_envs", ("bullet_gazebo.ros", "cartpole", "rl_workbench", "torch")),
+    ("bullet_gazebo", ("gymnasium", "torch")),
+    ("ros_utils", ("pybullet", "torch")),
+    ("robot_envs", ("bullet_gazebo.ros", "torch")),
     ("cartpole", ("pybullet", "torch")),
-    ("rl_workbench/agents", ("cartpole", "gymnasium", "rl_workbench.tools", "rl_workbench.training",
-                             "robot_envs", "ros_utils")),
-    ("rl_workbench/training", ("rl_workbench.tools", "ros_utils")),
+    ("rl_workbench/agents", ("gymnasium", "rl_workbench.tools", "rl_workbench.training")),
+    ("rl_workbench/training", ("rl_workbench.tools",)),
+    ("rl_workbench/training/options", tuple(f"rl_workbench.training.{each}" for each in
+                                            ("run", "dqn", "pg", "sb3"))),
+    *((f"rl_workbench/training/{room}", tuple(f"rl_workbench.training.{each}" for each in
+                                              ("dqn", "pg", "sb3") if each != room))
+      for room in ("run", "dqn", "pg", "sb3")),
 ]  # fmt: skip
-ROS_ROOMS = ("bullet_gazebo/ros", "ros_utils", "robot_envs/backends")
+WITHOUT_ROS = (
+    "bullet_gazebo.physics.world",
+    "bullet_gazebo.control.manager",
+    "bullet_gazebo.simulator",
+    "cartpole.pg_train",
+    "cartpole.workbench",
+    "rl_workbench.cli",
+    "rl_workbench.training.run.training",
+    "robot_envs.backends.in_process",
+    "robot_envs.environment",
+)
 
 
-def imports(path):
-    names = set()
+def imports(path: Path) -> Iterator[str]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            names |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return {name for name in names if not any(below(name, package) for package in GENERATED)}
+            assert node.level == 0, f"{path}: imports are absolute"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def below(name, package):
+def below(name: str, package: str) -> bool:
     return name == package or name.startswith(f"{package}.")
 
 
-def inside(path, room):
-    return path.is_relative_to(SRC / room)
-
-
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SRC)))
-def test_nothing_imports_against_the_arrows(path):
-    forbidden = {
-        package for room, packages in FORBIDDEN if inside(path, room) for package in packages
-    }
-    if not any(inside(path, room) for room in ROS_ROOMS):
+def test_nothing_imports_against_the_arrows(path: Path) -> None:
+    library = path.relative_to(SRC).parts[0]
+    forbidden = OURS - {library} - ALLOWED[library]
+    for room, packages in FORBIDDEN:
+        if path.is_relative_to(SRC / room):
+            forbidden |= set(packages)
+    if not any(path.is_relative_to(SRC / room) for room in ROS_ROOMS):
         forbidden |= set(ROS)
     against = {name for name in imports(path) for package in forbidden if below(name, package)}
     assert not against
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda path: str(path.relative_to(SRC)))
+def test_what_lies_in_a_folder_imports_in_no_circle(folder: Path) -> None:
+    """Modules and folders in it, each folder as one."""
+    own = folder.relative_to(SRC).parts
+    children: dict[str, set[str]] = defaultdict(set)
+    for path in (path for path in MODULES if path.is_relative_to(folder)):
+        child = path.relative_to(folder).parts[0].removesuffix(".py")
+        for name in imports(path):
+            parts = tuple(name.split("."))
+            if parts[: len(own)] == own and len(parts) > len(own):
+                other = parts[len(own)]
+                exists = (folder / other).is_dir() or (folder / f"{other}.py").is_file()
+                if exists and other != child:
+                    children[child].add(other)
+    try:
+        TopologicalSorter(children).prepare()
+    except CycleError as error:
+        pytest.fail(f"{folder.relative_to(SRC)}: {' -> '.join(error.args[1])}")
+
+
+def test_only_the_rooms_for_it_ask_for_ros() -> None:
+    """What is made for this process alone works where no ROS is installed."""
+    script = f"""
+import sys
+class NoRos:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {(*ROS, "genpy", "rospkg", "std_msgs", "gazebo_msgs")!r}:
+            raise ModuleNotFoundError(f"no ROS here: {{name}}", name=name)
+sys.meta_path.insert(0, NoRos())
+for name in {WITHOUT_ROS!r}:
+    __import__(name)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], env={"PYTHONPATH": str(SRC), "PATH": "/usr/bin:/bin"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+def test_folders_are_small_enough_to_be_seen_at_a_glance() -> None:
+    crowds = {
+        str(folder.relative_to(SRC)): len(entries)
+        for folder in FOLDERS
+        if len(entries := [each for each in folder.iterdir() if each.name[:2] != "__"]) > 15
+    }
+    assert not crowds

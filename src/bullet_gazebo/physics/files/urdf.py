@@ -16,10 +16,10 @@ from bullet_gazebo.physics.description import (
 )
 from bullet_gazebo.physics.elements import finite, named, numbers, parse_xml, positive
 from bullet_gazebo.physics.files.urdf_extensions import apply_extensions
-from bullet_gazebo.physics.lumping import lump_fixed_joints
+from bullet_gazebo.physics.mechanics.lumping import lump_fixed_joints
+from bullet_gazebo.physics.mechanics.tree import find_roots, unique
 from bullet_gazebo.physics.meshes.mesh_files import MeshFinder, Resources
 from bullet_gazebo.physics.pose import Pose, from_rpy
-from bullet_gazebo.physics.tree import find_roots, unique
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 WORLD = "world"

@@ -8,7 +8,7 @@ from robots import CartPole, cartpole_urdf
 
 from bullet_gazebo.physics.description import Inertia
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.mass_matrix import effective_inertias
+from bullet_gazebo.physics.mechanics.mass_matrix import effective_inertias
 from bullet_gazebo.physics.model import AT_REST
 from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.projection import place_link

@@ -5,12 +5,12 @@ from itertools import count
 
 import mujoco
 
-from bullet_gazebo.physics.bounds import check_bounds
 from bullet_gazebo.physics.description import ModelDescription
 from bullet_gazebo.physics.engine import Body, Engine
 from bullet_gazebo.physics.engines.mujoco.body import MujocoBody
 from bullet_gazebo.physics.engines.mujoco.model import Elements, ModelWriter, compile_spec
 from bullet_gazebo.physics.engines.mujoco.state import MujocoState
+from bullet_gazebo.physics.mechanics.bounds import check_bounds
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector
 
 MOST_ITERATIONS = 1000  # of the solver in a step; more would only hold the world

@@ -16,7 +16,7 @@ from bullet_gazebo.physics.description import (
     ModelDescription,
     Shape,
 )
-from bullet_gazebo.physics.inertia import tensor_in
+from bullet_gazebo.physics.mechanics.inertia import tensor_in
 from bullet_gazebo.physics.meshes.points import mesh_points
 from bullet_gazebo.physics.pose import IDENTITY, Pose, Quaternion, Vector, rotate
 

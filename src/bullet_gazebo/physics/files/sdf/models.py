@@ -23,10 +23,10 @@ from bullet_gazebo.physics.files.sdf.geometry import ShapeReader, read_inertia
 from bullet_gazebo.physics.files.sdf.include import Origin, open_include
 from bullet_gazebo.physics.files.sdf.joints import WORLD, JointReader, ends
 from bullet_gazebo.physics.files.urdf_extensions import name_sensor, read_plugin
-from bullet_gazebo.physics.lumping import detach_from_world
+from bullet_gazebo.physics.mechanics.lumping import detach_from_world
+from bullet_gazebo.physics.mechanics.tree import find_roots, unique
 from bullet_gazebo.physics.meshes.mesh_files import MeshFinder, Resources
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.tree import find_roots, unique
 
 MAX_NESTING = 10
 VERSION = re.compile(r"1\.(\d+)(\.\d+)?")

@@ -13,7 +13,7 @@ from bullet_gazebo.physics.description import (
     ModelDescription,
     Shape,
 )
-from bullet_gazebo.physics.inertia import combine
+from bullet_gazebo.physics.mechanics.inertia import combine
 from bullet_gazebo.physics.pose import Pose
 
 WORLD = "world"

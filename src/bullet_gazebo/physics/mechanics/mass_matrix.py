@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from bullet_gazebo.physics.description import Joint, ModelDescription
-from bullet_gazebo.physics.inertia import tensor_in
+from bullet_gazebo.physics.mechanics.inertia import tensor_in
 from bullet_gazebo.physics.pose import Pose, rotate
 
 

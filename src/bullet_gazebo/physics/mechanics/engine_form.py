@@ -3,8 +3,8 @@
 from collections import defaultdict
 from dataclasses import replace
 
-from bullet_gazebo.physics.bounds import MOST_JOINTS, check_bounds
 from bullet_gazebo.physics.description import Joint, Link, ModelDescription, Shape
+from bullet_gazebo.physics.mechanics.bounds import MOST_JOINTS, check_bounds
 from bullet_gazebo.physics.pose import Pose
 
 

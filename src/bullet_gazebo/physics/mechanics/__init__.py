@@ -1,0 +1,1 @@
+"""What follows from a description by mechanics alone: lumping, inertias, frames, bounds."""
