@@ -10,7 +10,7 @@ import unittest
 import rostest
 from pg_train_runs import NETWORKS, Place, Process
 
-ENDLESS = "--episodes=100000"
+ENDLESS = ("--episodes=100000", "--stop-at-length=0")
 
 
 class PgTrainFaults(unittest.TestCase):
@@ -20,8 +20,8 @@ class PgTrainFaults(unittest.TestCase):
         return place
 
     def training(self, place: Place, *flags: str) -> Process:
-        training = place.train(ENDLESS, *flags)
-        training.wait_for("episode    20/")
+        training = place.train(*ENDLESS, *flags)
+        training.wait_for("Episode   20 |")
         return training
 
     def assert_saved(self, place: Place) -> dict:
@@ -35,7 +35,7 @@ class PgTrainFaults(unittest.TestCase):
         self.assertEqual(training.end(60), 1, training.output)
         self.assertLess(time.monotonic() - started, seconds)
         self.assertNotIn("Traceback", training.output)
-        complaints = [line for line in training.output.splitlines() if "pg_train:" in line]
+        complaints = [line for line in training.output.splitlines() if "pg_train.py:" in line]
         self.assertEqual(len(complaints), 1, training.output)
         self.assertIn("what was learned is saved", complaints[0])
         self.assertIsNotNone(self.assert_saved(place)["failure"])
@@ -63,7 +63,7 @@ class PgTrainFaults(unittest.TestCase):
 
     def test_ctrl_c_while_starting(self):
         place = self.place()
-        training = place.train(ENDLESS)
+        training = place.train(*ENDLESS)
         training.wait_for("starting the simulator")
         time.sleep(0.3)
         training.interrupt()

@@ -63,7 +63,7 @@ class PgTrain(unittest.TestCase):
 
     def test_in_this_process_the_weights_are_those_over_ros(self):
         over_ros, inside = self.place(), self.place()
-        flags = ("--episodes=8", "--seed=4", "--algorithm=gae", "--start-noise=0.05")
+        flags = ("--episodes=8", "--seed=4", "--start-noise=0.05")
         self.trained(over_ros, *flags)
         self.trained(inside, *flags, "--backend=bullet")
         for name in NETWORKS:
@@ -75,19 +75,19 @@ class PgTrain(unittest.TestCase):
         self.assertEqual(inside.processes(), {})
 
     def test_killed_and_resumed_the_weights_are_those_of_one_go(self):
-        flags = ("--algorithm=gae", "--start-noise=0.05", "--episodes=40", "--eval-episodes=1",
-                 "--checkpoint-frequency=5")  # fmt: skip
+        flags = ("--start-noise=0.05", "--episodes=40", "--eval-episodes=1",
+                 "--checkpoint-frequency=60")  # fmt: skip
         whole, killed = self.place(), self.place()
         self.trained(whole, *flags, "--backend=bullet")
         training = killed.train(*flags)
-        training.wait_for("episode    20/")
+        training.wait_for("Episode   20 |")
         for pid in killed.processes():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
         training.end()
         resumed = killed.start("rosrun", "cartpole", "pg_train.py", f"--resume={killed.run}")
         self.assertEqual(resumed.end(90), 0, resumed.output)
-        self.assertIn("going on after episode", resumed.output)
+        self.assertIn("going on at step", resumed.output)
         self.assertTrue(torch.equal(self.weights(whole), self.weights(killed)))
         self.assertEqual(killed.left_after(5), {})
 
@@ -143,13 +143,13 @@ class PgTrain(unittest.TestCase):
         place = self.place()
         training = place.start(
             "roslaunch", "cartpole", "pg_train.launch", "episodes:=3", "seed:=2",
-            f"run_dir:={place.run}", "algorithm:=gae", "params:=batch_episodes=2",
+            f"run_dir:={place.run}", "algo:=reinforce", "params:=batch_episodes=2",
         )  # fmt: skip
         training.end(90)
         self.assertEqual(place.left_after(5), {}, training.output)
         record = json.loads((place.run / "config.json").read_text())
         self.assertEqual((record["run"]["episodes"], record["run"]["seed"]), (3, 2))
-        self.assertEqual(record["pg"]["batch_episodes"], 2)
+        self.assertEqual(record["hyperparameters"]["batch_episodes"], 2)
 
     def wait_for_service(self, place: Place, name: str) -> None:
         script = f"import rospy; rospy.wait_for_service('{name}', 30)"
