@@ -1,8 +1,7 @@
-"""The folder of one run: its name, and its summary as JSON."""
+"""The folder of one run: its name, who holds it, and the versions that write in it."""
 
 import contextlib
 import fcntl
-import json
 import os
 import platform
 import re
@@ -15,7 +14,7 @@ from typing import Any
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.record import CONFIG_RECORD, read_record
-from rl_workbench.training.run.files import write_atomically
+from rl_workbench.training.run.files import as_json, write_atomically
 
 LIBRARIES = ("python", "numpy", "torch", "gymnasium")  # a training's bits depend on them
 
@@ -109,16 +108,6 @@ def _fresh(wanted: Path) -> Path:
             folder, number = wanted.with_name(f"{wanted.name}_{number}"), number + 1
 
 
-def write_summary(path: Path, content: dict[str, Any]) -> None:
-    """Writes a JSON file, whole or not at all.
-
-    Raises:
-        OSError: if the disk refuses.
-    """
-    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
-    write_atomically(path, lambda stream: stream.write(text.encode()))
-
-
 def other_versions(before: Mapping[str, str]) -> str:
     """Where those that a training began with aren't those of now; empty if they are the same.
 
@@ -156,4 +145,4 @@ def write_record(folder: Path, config: dict[str, Any], resumed: bool) -> None:
     record: dict[str, Any] = {"versions": versions(), "began": time.time()}
     if resumed:
         record = read_record(folder)
-    write_summary(folder / CONFIG_RECORD, {**record, **config})
+    write_atomically(folder / CONFIG_RECORD, as_json({**record, **config}))

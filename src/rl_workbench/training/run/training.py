@@ -1,11 +1,8 @@
 """The frame of every training: open or resume a folder, learn, evaluate, keep the best, save, tell."""
 
 import contextlib
-import os
-import shlex
 import time
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +17,10 @@ from rl_workbench.training.run.checkpoints import Checkpoints, candidates, read_
 from rl_workbench.training.run.evaluator import Evaluation, Evaluator
 from rl_workbench.training.run.history import History
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.learning_curve import learning_curve
+from rl_workbench.training.run.outcome import WINDOW, Outcome
 from rl_workbench.training.run.progress import Progress, tell
 from rl_workbench.training.run.random_states import random_states, restore_random_states, seed_all
 from rl_workbench.training.run.scalar_log import ScalarLog
-
-WINDOW = 20  # [episodes] over which a mean length counts
-LAST = 100  # [episodes] over which the summary reports a mean return
 
 
 class Training:
@@ -287,76 +281,21 @@ class Training:
 
     def _finish(self, failure: WorkbenchError | None) -> None:
         """Draws and tells; then passes a failure on, unless the user had stopped anyway."""
+        outcome = Outcome(
+            self._options, self.folder, self._history, self._algorithm.steps, self._is_complete(),
+            self._interrupt.requested(), self._evaluation,
+        )  # fmt: skip
         try:
             self._algorithm.export(self.folder)
-            self._draw()
-            run_folder.write_summary(self.folder / "summary.json", self._summary(failure))
+            outcome.write(str(failure) if failure else None)
         except OSError as error:
             problem = self._not_written(error)
             failure = problem if self._interrupt.requested() else failure or problem
-        self._tell()
+        outcome.tell()
         # A simulator dies of the same Ctrl-C; what couldn't be written has to be told all the same.
         if failure and not (self._interrupt.requested() and self._is_written):
-            raise WorkbenchError(f"{failure}; {self._what_is_left()}")
+            raise WorkbenchError(f"{failure}; {outcome.what_is_left(self._is_written)}")
 
     def _not_written(self, error: OSError) -> WorkbenchError:
         self._is_written = False
         return WorkbenchError(f"can't write {error.filename or self.folder}: {error.strerror}")
-
-    def _what_is_left(self) -> str:
-        text = f"stopped after {self._algorithm.steps} steps, {len(self._history.returns)} episodes"
-        if self._is_written:
-            text += f", what was learned is saved in {self.folder}"
-        return text + self._how_to_go_on()
-
-    def _how_to_go_on(self) -> str:
-        if not candidates(self.folder):
-            return ""
-        return f"; --resume {shlex.quote(str(self.folder))} goes on from the last checkpoint"
-
-    def _draw(self) -> None:
-        history, run = self._history, self._run
-        if history.returns:
-            title = f"{self._options.kind.name}, {run.env_id}, seed {run.seed}"
-            path = self.folder / "learning_curve.png"
-            learning_curve(path, history.lengths, history.returns, title)
-
-    def _summary(self, failure: WorkbenchError | None) -> dict[str, Any]:
-        history = self._history
-        return {
-            **self._options.record(),
-            "versions": run_folder.versions(),
-            "failure": str(failure) if failure else None,
-            "complete": self._is_complete(),
-            "interrupted": self._interrupt.requested(),
-            "episodes": len(history.returns),
-            "steps": self._algorithm.steps,
-            "seconds": round(history.seconds, 3),
-            f"mean_return_last_{LAST}": _mean(history.returns[-LAST:]),
-            f"mean_length_last_{WINDOW}": _mean(history.lengths[-WINDOW:]),
-            "best": history.best,
-            "evaluations": history.evaluations,
-            "evaluation": asdict(self._evaluation) if self._evaluation else None,
-            "lengths": history.lengths,
-            "returns": history.returns,
-        }
-
-    def _tell(self) -> None:
-        history, evaluation = self._history, self._evaluation
-        line = f"trained {len(history.returns)} episodes, {self._algorithm.steps} steps in "
-        line += f"{history.seconds:.1f} s"
-        if history.best:
-            line += f"; best evaluation {history.best[1]:.1f} at step {history.best[0]}"
-        if evaluation:
-            line += f"; the last one over {len(evaluation.lengths)} greedy episodes: length "
-            line += f"{evaluation.mean_length:.1f}, return {evaluation.mean_return:.1f}"
-        tell(line)
-        stopped = self._how_to_go_on() if self._interrupt.requested() else ""
-        tell(f"everything lies in {self.folder}{stopped}")
-        workspace = os.environ.get("CARTPOLE_WS")  # outside of it there is no tensorboard on PATH
-        command = f"{shlex.quote(workspace)} tensorboard" if workspace else "tensorboard"
-        tell(f"watch: {command} --logdir {shlex.quote(str(self.folder))}")
-
-
-def _mean(values: list[float] | list[int]) -> float | None:
-    return sum(values) / len(values) if values else None
