@@ -12,8 +12,9 @@ from collections.abc import Sequence
 
 from controller_manager_msgs.srv import ListControllerTypes, SwitchController
 
+from ros_calls.service import ServiceFailed
+from ros_calls.waiting import TIMEOUT, wait_and_call
 from ros_utils._internal import log as _log
-from ros_utils._internal import services as _services
 from ros_utils._internal.controller_calls import names, service_name, states, until_ok
 from ros_utils._internal.controller_loading import (
     load_controller_list_srv,
@@ -47,7 +48,7 @@ def switch_controllers_srv(
     timeout: float = 3.0,
     max_retries: int = 5,
     *,
-    service_timeout: float = _services.TIMEOUT,
+    service_timeout: float = TIMEOUT,
 ) -> bool:
     """Start and stop controllers in one step, with up to `max_retries` attempts.
 
@@ -77,7 +78,7 @@ def start_controllers_srv(
     start_asap: bool = False,
     timeout: float = 3.0,
     *,
-    service_timeout: float = _services.TIMEOUT,
+    service_timeout: float = TIMEOUT,
 ) -> bool:
     """Start loaded controllers. See `switch_controllers_srv`."""
     return switch_controllers_srv(
@@ -92,7 +93,7 @@ def stop_controllers_srv(
     start_asap: bool = False,
     timeout: float = 3.0,
     *,
-    service_timeout: float = _services.TIMEOUT,
+    service_timeout: float = TIMEOUT,
 ) -> bool:
     """Stop running controllers. See `switch_controllers_srv`."""
     return switch_controllers_srv(
@@ -108,7 +109,7 @@ def reset_controllers_srv(
     start_asap: bool = False,
     timeout: float = 3.0,
     *,
-    service_timeout: float = _services.TIMEOUT,
+    service_timeout: float = TIMEOUT,
 ) -> bool:
     """Stop controllers, with up to `max_retries` attempts, and start them again: set-points and PID
     state begin anew.
@@ -140,7 +141,7 @@ def spawn_controllers_srv(
     start_asap: bool = False,
     timeout: float = 3.0,
     *,
-    service_timeout: float = _services.TIMEOUT,
+    service_timeout: float = TIMEOUT,
 ) -> bool:
     """Load the controllers that aren't loaded yet, then start all that are.
 
@@ -173,7 +174,7 @@ def kill_controllers_srv(
     start_asap: bool = False,
     timeout: float = 3.0,
     *,
-    service_timeout: float = _services.TIMEOUT,
+    service_timeout: float = TIMEOUT,
 ) -> bool:
     """Stop controllers and, if that succeeded, unload them.
 
@@ -186,7 +187,7 @@ def kill_controllers_srv(
 
 
 def list_controllers_srv(
-    ns: str | None = None, *, service_timeout: float = _services.TIMEOUT
+    ns: str | None = None, *, service_timeout: float = TIMEOUT
 ) -> dict[str, str] | None:
     """Name and state (initialized, running, stopped) of the loaded controllers, or None, with an
     error in the log, if the manager doesn't tell."""
@@ -194,13 +195,13 @@ def list_controllers_srv(
 
 
 def list_controller_types_srv(
-    ns: str | None = None, *, service_timeout: float = _services.TIMEOUT
+    ns: str | None = None, *, service_timeout: float = TIMEOUT
 ) -> list[str] | None:
     """The types of controllers that can be loaded, or None. See `list_controllers_srv`."""
     name = service_name(ns, "list_controller_types")
     try:
-        answer = _services.call(name, ListControllerTypes, timeout=service_timeout)
-    except _services.ServiceError as fault:
+        answer = wait_and_call(name, ListControllerTypes, timeout=service_timeout)
+    except ServiceFailed as fault:
         _log.error(str(fault))
         return None
     return list(answer.types)

@@ -10,16 +10,13 @@ import roslib.packages
 import rospkg
 import rospy
 
+from ros_calls import master as _master
 from ros_utils._internal import log as _log
-from ros_utils._internal import master as _master
 from ros_utils._internal import packages as _packages
-from ros_utils._internal import target as _target
-from ros_utils._internal import waiting as _waiting
 from ros_utils._internal.processes import nodes as _nodes
 from ros_utils._internal.processes import processes as _processes
+from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
 from ros_utils._internal.processes.started import Started
-from ros_utils._internal.waiting import Outcome
-from ros_utils.ros_launch import check_master_possible
 
 
 def ros_node_from_pkg(
@@ -65,7 +62,7 @@ def ros_node_from_pkg(
         is ended then).
     """
     label = f"node {pkg_name}/{node_name}"
-    with _target.using(master_uri):
+    with _master.using(master_uri):
         try:
             command = [_executable(pkg_name, node_name), *_arguments(args), *_remappings(name, ns)]
             if (
@@ -96,8 +93,10 @@ def ros_node_from_pkg(
         if not wait:
             return Started(handle)
         full_name = rosgraph.names.ns_join(_global(ns), name) if name else None
-        outcome = _waiting.until(lambda: _is_registered(handle, full_name, before), handle, timeout)
-        return _report(handle, outcome, timeout)
+        readiness = wait_until_ready(
+            lambda: _is_registered(handle, full_name, before), handle, timeout
+        )
+        return _report(handle, readiness, timeout)
 
 
 def ros_kill_node(node_name: str) -> bool:
@@ -211,13 +210,13 @@ def _remappings(name: str | None, ns: str | None) -> list[str]:
 
 def _start_master(window: bool, timeout: float) -> bool:
     """Start a master at ROS_MASTER_URI."""
-    check_master_possible()
+    _master.is_up_or_startable()
     port = str(_master.host_and_port()[1])
     handle = _processes.start(["roscore", "-p", port], "master", "roscore", window=window)
-    outcome = _waiting.until(
+    readiness = wait_until_ready(
         lambda: _master.is_up() and "/rosout" in _nodes.node_names(), handle, timeout
     )
-    if outcome is Outcome.READY:
+    if readiness is Readiness.READY:
         return True
     _log.error(f"roscore: not up after {timeout:g} s: {handle.reason()}{handle.where()}")
     _processes.end([handle.entry])
@@ -232,16 +231,16 @@ def _is_registered(handle: _processes.Handle, name: str | None, before: set[str]
     return any(handle.owns(_nodes.node_pid(address)) for address in new)
 
 
-def _report(handle: _processes.Handle, outcome: Outcome, timeout: float) -> Started | bool:
+def _report(handle: _processes.Handle, readiness: Readiness, timeout: float) -> Started | bool:
     label = handle.entry.label
-    if outcome is Outcome.LATE:
+    if readiness is Readiness.LATE:
         _log.error(
             f"{label}: not registered at {_master.uri()} after {timeout:g} s; ended it:"
             f" {handle.reason()}{handle.where()}. For a program that is no node: wait=False"
         )
         _processes.end([handle.entry])
         return False
-    code = handle.exit_code() if outcome is Outcome.ENDED else 0
+    code = handle.exit_code() if readiness is Readiness.ENDED else 0
     if code:
         _log.error(f"{label}: ended with exit code {code}: {handle.reason()}{handle.where()}")
     return False if code else Started(handle)

@@ -7,8 +7,8 @@ from typing import Any
 import rosparam
 import yaml
 
+from ros_calls import master as _master
 from ros_utils._internal import log as _log
-from ros_utils._internal import master as _master
 from ros_utils._internal import packages as _packages
 from ros_utils._internal import params as _params
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import rosgraph
 
+from ros_calls import master as _master
 from ros_utils import ros_controllers, ros_gazebo, ros_node, ros_params, ros_urdf
 from ros_utils._internal import log as _log
-from ros_utils._internal import master as _master
 from ros_utils._internal import params as _params
 
 

@@ -19,9 +19,8 @@ import socket
 from types import TracebackType
 from typing import Any
 
+from ros_calls import master as _master
 from ros_utils import ros_gazebo, ros_node
-from ros_utils._internal import master as _master
-from ros_utils._internal import target as _target
 from ros_utils._internal.processes.started import Started
 
 LOOPBACK = "127.0.0.1"
@@ -89,7 +88,7 @@ class Simulation:
 
     def active(self) -> contextlib.AbstractContextManager[None]:
         """A block in which the functions of this package go to this simulator."""
-        return _target.using(self.master_uri)
+        return _master.using(self.master_uri)
 
     def environment(self) -> dict[str, str]:
         """The environment for a process that is to talk to this simulator."""
@@ -128,5 +127,5 @@ class Simulation:
 
 
 def _is_up(master_uri: str) -> bool:
-    with _target.using(master_uri):
+    with _master.using(master_uri):
         return _master.is_up()

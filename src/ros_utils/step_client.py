@@ -8,13 +8,13 @@ state.joint_states.position, state.sim_time
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral
 from typing import Any
 
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
 
-from ros_utils.service_client import ServiceClient, ServiceFailed, ServiceGone
+from ros_calls.service import ServiceClient, ServiceFailed
 
 STEP_SERVICE = "/gazebo/step_world"
 TIMEOUT = 10.0  # [s] of wall time
@@ -55,7 +55,7 @@ class StepClient:
             model_states: ask for the models' poses and twists, too.
         """
         request = _request(ticks, commands or {}, joint_commands or {}, model_states)
-        return self._answer(request)
+        return self._answer(request, self._call)
 
     def reset(
         self,
@@ -88,20 +88,17 @@ class StepClient:
         request.joints = list(positions)
         request.positions = list(positions.values())
         request.velocities = [(velocities or {}).get(name, 0.0) for name in positions]
-        return self._answer(request, again=True)
+        return self._answer(
+            request, self._call.call_idempotent
+        )  # the simulator may have been restarted
 
     def send(self, request: StepWorldRequest) -> StepWorldResponse:
         """Sends a request as it is: the fast way for whoever keeps one and changes its fields."""
-        return self._answer(request)
+        return self._answer(request, self._call)
 
-    def _answer(self, request: StepWorldRequest, again: bool = False) -> StepWorldResponse:
+    def _answer(self, request: StepWorldRequest, call: Callable[..., Any]) -> StepWorldResponse:
         self._call.timeout = self._timeout + time_of(request.ticks)
-        try:
-            response: Any = self._call(request)
-        except ServiceGone:
-            if not again:
-                raise
-            response = self._call(request)  # a reset may meet the connection to the last simulator
+        response: StepWorldResponse = call(request)
         if not response.success:
             raise StepRefused(response.status_message)
         return response

@@ -7,8 +7,9 @@ from typing import Any
 
 from controller_manager_msgs.srv import ListControllers
 
+from ros_calls.service import ServiceFailed
+from ros_calls.waiting import wait_and_call
 from ros_utils._internal import log as _log
-from ros_utils._internal import services as _services
 
 
 class ListResult(int):
@@ -37,10 +38,10 @@ def service_name(ns: str | None, service: str) -> str:
 def states(ns: str | None, timeout: float) -> dict[str, str] | None:
     """Name and state of the loaded controllers, or None if the manager doesn't tell."""
     try:
-        answer = _services.call(
+        answer = wait_and_call(
             service_name(ns, "list_controllers"), ListControllers, timeout=timeout
         )
-    except _services.ServiceError as fault:
+    except ServiceFailed as fault:
         _log.error(str(fault))
         return None
     return {controller.name: controller.state for controller in answer.controller}
@@ -58,9 +59,9 @@ def until_ok(
     """Call a service until its answer is ok, at most `max_retries` times; a failed call ends it."""
     try:
         for _ in range(max_retries):
-            if _services.call(service_name(ns, service), kind, *request, timeout=timeout).ok:
+            if wait_and_call(service_name(ns, service), kind, *request, timeout=timeout).ok:
                 return True
-    except _services.ServiceError as fault:
+    except ServiceFailed as fault:
         _log.error(f"{service} ({what}): {fault}")
         return False
     _log.error(

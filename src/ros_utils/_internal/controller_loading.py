@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from controller_manager_msgs.srv import LoadController, UnloadController
 
-from ros_utils._internal import services as _services
+from ros_calls.waiting import TIMEOUT
 from ros_utils._internal.controller_calls import ListResult, until_ok
 
 
@@ -15,7 +15,7 @@ def load_controller_srv(
     ns: str | None = None,
     max_retries: int = 5,
     *,
-    service_timeout: float = _services.TIMEOUT,
+    service_timeout: float = TIMEOUT,
 ) -> bool:
     """Load a controller, with up to `max_retries` attempts.
 
@@ -39,7 +39,7 @@ def load_controller_list_srv(
     ns: str | None = None,
     max_retries: int = 5,
     *,
-    service_timeout: float = _services.TIMEOUT,
+    service_timeout: float = TIMEOUT,
 ) -> ListResult:
     """Load several controllers; all are tried.
 
@@ -60,7 +60,7 @@ def unload_controller_srv(
     ns: str | None = None,
     max_retries: int = 5,
     *,
-    service_timeout: float = _services.TIMEOUT,
+    service_timeout: float = TIMEOUT,
 ) -> bool:
     """Unload a controller that doesn't run, with up to `max_retries` attempts.
 
@@ -83,7 +83,7 @@ def unload_controller_list_srv(
     ns: str | None = None,
     max_retries: int = 5,
     *,
-    service_timeout: float = _services.TIMEOUT,
+    service_timeout: float = TIMEOUT,
 ) -> ListResult:
     """Unload several controllers; all are tried.
 

@@ -10,7 +10,8 @@ from typing import Any
 import rosgraph
 import rospy
 
-from ros_utils._internal import master as _master
+from ros_calls import master as _master
+from ros_calls.xmlrpc import NoAnswer, Refused
 
 
 def get(name: str) -> Any:
@@ -23,10 +24,10 @@ def get(name: str) -> Any:
     _master.require()
     resolved = rospy.resolve_name(name)
     try:
-        return _master.call(_master.uri(), "getParam", resolved)
-    except _master.Refused as fault:
+        return _master.call("getParam", resolved)
+    except Refused as fault:
         raise KeyError(resolved) from fault
-    except _master.NoAnswer as fault:
+    except NoAnswer as fault:
         raise _master.MasterDown(f"parameter {resolved}: {fault}") from fault
 
 
@@ -42,6 +43,6 @@ def put(name: str, value: Any) -> None:
     for key, each in values:
         full = rosgraph.names.ns_join(resolved, str(key)) if key != "" else resolved
         try:
-            _master.call(_master.uri(), "setParam", full, each)
-        except (_master.NoAnswer, _master.Refused, OverflowError) as fault:
+            _master.call("setParam", full, each)
+        except (NoAnswer, Refused, OverflowError) as fault:
             raise _master.MasterDown(f"parameter {full}: {fault}") from fault

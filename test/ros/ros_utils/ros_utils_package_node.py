@@ -10,6 +10,7 @@ from pathlib import Path
 import rospy
 import rostest
 
+from ros_calls import master
 from ros_utils import (
     ros_controllers,
     ros_gazebo,
@@ -19,7 +20,6 @@ from ros_utils import (
     ros_spawn,
     ros_urdf,
 )
-from ros_utils._internal import target as _target
 from ros_utils.simulation import Simulation, reserved_port
 
 PACKAGE = """<package format="2"><name>my_robot</name><version>0.0.1</version>
@@ -187,7 +187,7 @@ class Package(unittest.TestCase):
 
     def test_a_master_of_its_own(self):
         uri = f"http://127.0.0.1:{reserved_port()}"
-        with _target.using(uri):
+        with master.using(uri):
             self.assertFalse(ros_node.ros_node_from_pkg("gazebo_ros", "gzclient"))
             self.assertTrue(
                 ros_node.ros_node_from_pkg("gazebo_ros", "gzclient", launch_master=True)

@@ -10,6 +10,7 @@ import socket
 
 import pytest
 
+from ros_calls import master
 from ros_utils import (
     ros_controllers,
     ros_gazebo,
@@ -20,7 +21,6 @@ from ros_utils import (
     ros_urdf,
     simulation,
 )
-from ros_utils._internal import target as _target
 from ros_utils._internal.gazebo import calls as _gazebo_calls
 
 POSE = "pos_x=0.0, pos_y=0.0, pos_z=0.0, ori_x=0.0, ori_y=0.0, ori_z=0.0, ori_w=1.0"
@@ -174,6 +174,6 @@ def test_reserved_ports_differ_and_can_be_taken_by_a_master():
 
 def test_another_master_is_for_the_block_only(monkeypatch):
     monkeypatch.setenv("ROS_MASTER_URI", "http://here:1")
-    with _target.using("http://there:2"):
-        assert _target.uri() == "http://there:2"
-    assert _target.uri() == "http://here:1"
+    with master.using("http://there:2"):
+        assert master.uri() == "http://there:2"
+    assert master.uri() == "http://here:1"

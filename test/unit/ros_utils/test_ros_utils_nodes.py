@@ -5,8 +5,7 @@ import sys
 
 import pytest
 
-from ros_utils._internal import master as _master
-from ros_utils._internal import target as _target
+from ros_calls import master as ros_master
 from ros_utils._internal.processes import nodes as _nodes
 
 OURS, THEIRS = "http://localhost:45678", "http://localhost:45679"
@@ -45,7 +44,7 @@ def start():
 @pytest.mark.parametrize("kind", ["rospy", "roscpp"])
 def test_a_node_of_the_master_is_asked(start, kind):
     program, address = start(kind, master=OURS.replace("localhost", "127.0.0.1") + "/")
-    with _target.using(OURS):
+    with ros_master.using(OURS):
         assert _nodes.ask_to_shut_down(address)
     assert program.stdout.readline() == "shutdown\n"
 
@@ -56,14 +55,14 @@ def test_a_node_of_the_master_is_asked(start, kind):
 )
 def test_a_node_of_another_master_on_a_reused_port_is_left_alone(start, kind, arguments, master):
     program, address = start(kind, *arguments, master=master)
-    with _target.using(OURS):
+    with ros_master.using(OURS):
         assert not _nodes.ask_to_shut_down(address)
     program.kill()
     assert program.stdout.read() == ""
 
 
 def test_nobody_there():
-    with _target.using(OURS):
+    with ros_master.using(OURS):
         assert not _nodes.ask_to_shut_down("http://127.0.0.1:9")
 
 
@@ -78,5 +77,5 @@ def test_nobody_there():
     ],
 )
 def test_one_master_has_many_names(address, same):
-    with _target.using(OURS):
-        assert _master.is_at(address) is same
+    with ros_master.using(OURS):
+        assert ros_master.is_at(address) is same

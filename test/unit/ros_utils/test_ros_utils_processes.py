@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from ros_utils import ros_launch, ros_node
-from ros_utils._internal import waiting as _waiting
 from ros_utils._internal.processes import endings as _endings
 from ros_utils._internal.processes import processes as _processes
 from ros_utils._internal.processes import procfs as _procfs
 from ros_utils._internal.processes import registry as _registry
+from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
 
 SLEEP = ["sleep", "1000"]
 BOUND = 10.0  # [s] for anything that a test waits for
@@ -227,7 +227,7 @@ def test_starts_at_the_same_time_are_all_remembered():
 def test_output_goes_to_a_log_and_its_error_is_the_reason():
     code = "echo one; echo 'ValueError: two'; echo three; exit 3"
     handle = _processes.start(["sh", "-c", code], "node", "talker")
-    assert _waiting.until(lambda: False, handle, BOUND) is _waiting.Outcome.ENDED
+    assert wait_until_ready(lambda: False, handle, BOUND) is Readiness.ENDED
     assert handle.exit_code() == 3
     assert handle.reason() == "ValueError: two"
     assert handle.lines("t") == ["ValueError: two", "three"]
@@ -235,8 +235,8 @@ def test_output_goes_to_a_log_and_its_error_is_the_reason():
 
 def test_a_wait_has_a_bound():
     handle = _processes.start(SLEEP, "node", "sleeper")
-    assert _waiting.until(lambda: False, handle, 0.1) is _waiting.Outcome.LATE
-    assert _waiting.until(lambda: True, handle, 0.1) is _waiting.Outcome.READY
+    assert wait_until_ready(lambda: False, handle, 0.1) is Readiness.LATE
+    assert wait_until_ready(lambda: True, handle, 0.1) is Readiness.READY
 
 
 def test_a_missing_program_is_refused():
@@ -252,7 +252,7 @@ def test_in_a_window_the_programs_exit_code_is_known(place, monkeypatch, code):
     monkeypatch.setenv("PATH", f"{place}:{os.environ['PATH']}")
     monkeypatch.setenv("DISPLAY", ":0")
     handle = _processes.start(["sh", "-c", f"exit {code}"], "node", "a 'quoted' name", window=True)
-    assert _waiting.until(lambda: False, handle, BOUND) is _waiting.Outcome.ENDED
+    assert wait_until_ready(lambda: False, handle, BOUND) is Readiness.ENDED
     assert handle.exit_code() == code
 
 

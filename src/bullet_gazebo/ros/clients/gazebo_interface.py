@@ -7,6 +7,8 @@ import rospy
 from gazebo_msgs.srv import SetModelConfiguration, SpawnModel
 from geometry_msgs.msg import Pose
 
+from ros_calls.waiting import service_comes_up
+
 REMIND = 10.0  # [s of wall time]
 
 
@@ -59,14 +61,8 @@ def wait_for_service(name: str) -> None:
     Raises:
         rospy.ROSInterruptException: the node was shut down meanwhile.
     """
-    while True:
-        try:
-            rospy.wait_for_service(name, REMIND)
-            return
-        except rospy.ROSInterruptException:
-            raise
-        except rospy.ROSException:
-            rospy.logwarn("Still waiting for service %s: is the simulator running?", name)
+    while not service_comes_up(name, REMIND):
+        rospy.logwarn("Still waiting for service %s: is the simulator running?", name)
 
 
 def _spawn(name: str, request: tuple[Any, ...]) -> bool | None:

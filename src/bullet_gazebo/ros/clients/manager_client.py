@@ -1,6 +1,6 @@
 """What spawner and unspawner need of a controller manager, with a time limit on each call."""
 
-import time
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,12 +13,11 @@ from controller_manager_msgs.srv import (
     UnloadController,
 )
 
-from bullet_gazebo.ros.wire.limited_call import call_limited
+from ros_calls.service import ServiceClient
+from ros_calls.waiting import service_comes_up
 
 BEST_EFFORT = SwitchControllerRequest.BEST_EFFORT
 STRICT = SwitchControllerRequest.STRICT
-
-POLL = 0.1  # [s] between two looks for a service
 
 
 class ManagerClient:
@@ -31,29 +30,27 @@ class ManagerClient:
             f"{namespace.rstrip('/')}/controller_manager" if namespace else "controller_manager"
         )
 
-    def wait(self, services: Sequence[str], timeout: float | None) -> str | None:
+    def wait(self, services: Sequence[str], timeout: float) -> str | None:
         """Waits until all of the services are offered.
 
         Args:
             services: names without the manager's.
-            timeout: bound for each of them [wall-clock s]; None for none.
+            timeout: bound for each of them [wall-clock s], or infinity.
 
         Returns:
             The name of the first one that didn't come up in time; None if all did.
         """
         for service in services:
-            name = rospy.resolve_name(f"{self._prefix}/{service}")
+            name = str(rospy.resolve_name(f"{self._prefix}/{service}"))
             rospy.loginfo("%s: Waiting for service %s/%s", self._user, self._prefix, service)
-            deadline = None if timeout is None else time.monotonic() + timeout
-            while not _is_offered(name):
-                if deadline is not None and time.monotonic() > deadline:
-                    return name
+            if not service_comes_up(name, timeout):
+                return name
         return None
 
-    def load(self, name: str, timeout: float | None = None) -> bool:
+    def load(self, name: str, timeout: float = math.inf) -> bool:
         return bool(self._call("load_controller", LoadController, name, timeout=timeout).ok)
 
-    def unload(self, name: str, timeout: float | None = None) -> bool:
+    def unload(self, name: str, timeout: float = math.inf) -> bool:
         return bool(self._call("unload_controller", UnloadController, name, timeout=timeout).ok)
 
     def switch(
@@ -61,26 +58,16 @@ class ManagerClient:
         start: Sequence[str],
         stop: Sequence[str],
         strictness: int,
-        timeout: float | None = None,
+        timeout: float = math.inf,
     ) -> bool:
         """Starts and stops controllers in one step; no time limit for the manager itself."""
         request = (list(start), list(stop), strictness, False, 0.0)
         return bool(self._call("switch_controller", SwitchController, *request, timeout=timeout).ok)
 
-    def running(self, timeout: float | None = None) -> list[str]:
+    def running(self, timeout: float = math.inf) -> list[str]:
         """Returns the names of the running controllers."""
         answer = self._call("list_controllers", ListControllers, timeout=timeout)
         return [each.name for each in answer.controller if each.state == "running"]
 
-    def _call(self, service: str, kind: Any, *request: Any, timeout: float | None) -> Any:
-        return call_limited(f"{self._prefix}/{service}", kind, *request, timeout=timeout)
-
-
-def _is_offered(name: str) -> bool:
-    try:
-        rospy.wait_for_service(name, POLL)
-    except rospy.ROSInterruptException:
-        raise
-    except rospy.ROSException:
-        return False
-    return True
+    def _call(self, service: str, kind: Any, *request: Any, timeout: float) -> Any:
+        return ServiceClient(f"{self._prefix}/{service}", kind, timeout=timeout)(*request)

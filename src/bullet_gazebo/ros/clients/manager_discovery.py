@@ -18,7 +18,8 @@ from controller_manager_msgs.srv import (
     SwitchController,
     UnloadController,
 )
-from rospy.exceptions import TransportException
+
+from ros_calls.service import ServiceClient, ServiceFailed
 
 LIST = "list_controllers"
 SERVICES = {
@@ -79,27 +80,14 @@ class ControllerLister:
     """
 
     def __init__(self, namespace: str = "/controller_manager") -> None:
-        self._service = rospy.names.ns_join(namespace, LIST)
-        self._proxy: rospy.ServiceProxy | None = None
+        service = rospy.names.ns_join(namespace, LIST)
+        self._client = ServiceClient(service, ListControllers, persistent=True)
 
     def __call__(self) -> list[ControllerState]:
-        # A kept connection may be to a manager that is gone; a new one tells.
-        attempts = 1 if self._proxy is None else 2
-        for _ in range(attempts):
-            answer = self._ask()
-            if answer is not None:
-                return answer
-        return []
-
-    def _ask(self) -> list[ControllerState] | None:
-        if self._proxy is None:
-            self._proxy = rospy.ServiceProxy(self._service, ListControllers, persistent=True)
         try:
-            return list(self._proxy().controller)
-        except (rospy.ServiceException, TransportException, OSError):
-            self._proxy.close()
-            self._proxy = None
-            return None
+            return list(self._client.call_idempotent().controller)
+        except ServiceFailed:
+            return []
 
 
 def get_rosparam_controller_names(namespace: str = "/") -> list[str]:

@@ -1,11 +1,12 @@
 """Whether there is a controller manager to talk to, for scripts that must not wait for ever."""
 
-import os
 import sys
 from collections.abc import Iterable
 
-import rosgraph
 import rospy
+
+from ros_calls import master
+from ros_calls.waiting import service_comes_up
 
 PATIENCE = 30.0  # [s] for each service; launch files start scripts before there is a manager
 NOTICE = 2.0  # [s] until the user is told what is waited for
@@ -24,23 +25,15 @@ def require(services: Iterable[str]) -> None:
     Raises:
         NoManager: one of them isn't there in time.
     """
-    if not rosgraph.is_master_online():
-        raise NoManager(f"there is no ROS master at {os.environ.get('ROS_MASTER_URI')}")
+    if not master.is_up():
+        raise NoManager(f"there is no ROS master at {master.uri()}")
     for service in services:
-        name = rospy.resolve_name(f"controller_manager/{service}")
-        if _is_offered(name, NOTICE):
+        name = str(rospy.resolve_name(f"controller_manager/{service}"))
+        if service_comes_up(name, NOTICE):
             continue
         print(f"waiting up to {PATIENCE:g} s for the service {name}", file=sys.stderr)
-        if not _is_offered(name, PATIENCE - NOTICE):
+        if not service_comes_up(name, PATIENCE - NOTICE):
             raise NoManager(
                 f"there is no controller manager: nobody offers the service {name}. Is the robot"
                 " spawned, and is its manager in this namespace? (Another one: __ns:=/NAMESPACE)"
             )
-
-
-def _is_offered(name: str, timeout: float) -> bool:
-    try:
-        rospy.wait_for_service(name, timeout)
-    except rospy.ROSException:
-        return False
-    return True

@@ -15,10 +15,10 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import Empty
 
 from bullet_gazebo.ros.clients import gazebo_interface
-from bullet_gazebo.ros.wire.limited_call import CallFailed, call_limited
 from bullet_gazebo.ros.wire.signals import Ending, init_node
+from ros_calls.service import ServiceClient, ServiceFailed
+from ros_calls.waiting import wait_until
 
-POLL = 0.1  # [s of wall time]
 REMIND = 10.0  # [s of wall time]
 FAREWELL = 3.0  # [s] for what has to be done during shutdown
 INTERRUPTED = -1
@@ -155,8 +155,8 @@ class _Bond:
         if not self._over.wait(FAREWELL) or not self._spawned:
             return
         try:
-            call_limited(self._service, DeleteModel, self._model, timeout=FAREWELL)
-        except CallFailed as fault:
+            ServiceClient(self._service, DeleteModel, timeout=FAREWELL)(self._model)
+        except ServiceFailed as fault:
             print(f"spawn_model: '{self._model}' was not deleted: {fault}", file=sys.stderr)
 
 
@@ -175,22 +175,19 @@ def _wait_for_model(gazebo: str, name: str) -> None:
     service = f"{gazebo}/get_world_properties"
     gazebo_interface.wait_for_service(service)
     rospy.loginfo("spawn_model: waiting for model '%s'", name)
-    waited = 0.0
-    while name not in _call(service, GetWorldProperties).model_names:
-        if rospy.is_shutdown():
-            raise rospy.ROSInterruptException("shut down")
-        rospy.rostime.wallsleep(POLL)
-        waited += POLL
-        if waited >= REMIND:
-            waited = 0.0
-            rospy.logwarn("spawn_model: still waiting for model '%s'", name)
+
+    def is_there() -> bool:
+        return name in _call(service, GetWorldProperties).model_names
+
+    while not wait_until(is_there, REMIND, f"model '{name}'"):
+        rospy.logwarn("spawn_model: still waiting for model '%s'", name)
 
 
 def _call(service: str, kind: type) -> Any:
     try:
-        return rospy.ServiceProxy(service, kind)()
-    except rospy.ServiceException as fault:
-        raise CannotSpawn(f"{service}: {fault}") from fault
+        return ServiceClient(service, kind, timeout=math.inf)()
+    except ServiceFailed as fault:
+        raise CannotSpawn(str(fault)) from fault
 
 
 def _read(options: argparse.Namespace, piped: str) -> str:

@@ -5,6 +5,7 @@ It stays until it is shut down, and then stops and unloads its controllers (docs
 
 import argparse
 import functools
+import math
 import os
 import sys
 import threading
@@ -16,8 +17,9 @@ import yaml
 from std_msgs.msg import Bool
 
 from bullet_gazebo.ros.clients.manager_client import STRICT, ManagerClient
-from bullet_gazebo.ros.wire.limited_call import CallFailed
 from bullet_gazebo.ros.wire.signals import Ending, init_node
+from ros_calls.service import ServiceFailed
+from ros_calls.waiting import wait_until
 
 SERVICES = ("load_controller", "switch_controller", "unload_controller")
 FAREWELL = 3.0  # [s] for each call during shutdown; the simulator may have gone before us
@@ -59,7 +61,7 @@ def _work(manager: ManagerClient, options: argparse.Namespace) -> int:
     return 0
 
 
-def _find(manager: ManagerClient, timeout: float | None) -> str | None:
+def _find(manager: ManagerClient, timeout: float) -> str | None:
     """Waits for the manager; returns the service that is missing after the time limit.
 
     While simulated time stands at zero the simulator isn't ready yet, and the wait begins anew.
@@ -84,11 +86,11 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("controllers", nargs="+", help="names, or YAML files of controllers")
     options = parser.parse_intermixed_args(arguments)
     if options.no_timeout or options.timeout <= 0:
-        options.timeout = None
+        options.timeout = math.inf
     return options
 
 
-def _wait_for_topic(topic: str, timeout: float | None) -> None:
+def _wait_for_topic(topic: str, timeout: float) -> None:
     """Waits for `true`; goes on without it after the time limit."""
     arrived = threading.Event()
 
@@ -98,14 +100,8 @@ def _wait_for_topic(topic: str, timeout: float | None) -> None:
 
     rospy.loginfo("Controller Spawner: Waiting for true on %s", topic)
     listener = rospy.Subscriber(topic, Bool, hear)
-    waited = 0.0
-    while not arrived.wait(0.1):
-        waited += 0.1
-        if rospy.is_shutdown():
-            raise rospy.ROSInterruptException("shut down")
-        if timeout is not None and waited > timeout:
-            rospy.logwarn("Controller Spawner: no true on %s in %g s; going on", topic, timeout)
-            break
+    if not wait_until(arrived.is_set, timeout, f"true on {topic}"):
+        rospy.logwarn("Controller Spawner: no true on %s in %g s; going on", topic, timeout)
     listener.unregister()
 
 
@@ -164,7 +160,7 @@ class _Spawner:
                 self._loaded.append(name)
             else:
                 rospy.logerr("Failed to load %s", name)
-        except CallFailed as fault:
+        except ServiceFailed as fault:
             rospy.logerr("Failed to load %s: %s", name, fault)
 
     def _start(self) -> None:
@@ -174,7 +170,7 @@ class _Spawner:
                 rospy.loginfo("Started controllers: %s", names)
             else:
                 rospy.logerr("Failed to start controllers: %s", names)
-        except CallFailed as fault:
+        except ServiceFailed as fault:
             rospy.logerr("Failed to start controllers: %s: %s", names, fault)
 
     def _leave(self) -> None:
@@ -191,7 +187,7 @@ class _Spawner:
             rospy.loginfo("Unloading all loaded controllers...")
             for name in reversed(self._loaded):
                 self._unload(name)
-        except CallFailed as fault:
+        except ServiceFailed as fault:
             rospy.logwarn("Controller Spawner error while taking down controllers: %s", fault)
 
     def _stop(self) -> None:

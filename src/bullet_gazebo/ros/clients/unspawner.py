@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import rospy
 
 from bullet_gazebo.ros.clients.manager_client import BEST_EFFORT, ManagerClient
-from bullet_gazebo.ros.wire.limited_call import CallFailed
 from bullet_gazebo.ros.wire.signals import Ending, init_node
+from ros_calls.service import ServiceFailed
 
 PERIOD = 3.0  # [s], wall-clock: a simulated time that jumps back must not silence it
 PATIENCE = 30.0  # [s] for the services to come up
@@ -77,7 +77,7 @@ def _stop_running(manager: ManagerClient, controllers: Sequence[str]) -> list[st
         if running and manager.switch([], running, BEST_EFFORT, ANSWER):
             rospy.loginfo("Stopped controllers: %s", ", ".join(running))
             return running
-    except CallFailed as fault:
+    except ServiceFailed as fault:
         rospy.logwarn_throttle(30, f"Unspawner: {fault}")
     return []
 
@@ -88,5 +88,5 @@ def _release(manager: ManagerClient, stopped: Sequence[str]) -> None:
     try:
         manager.switch(stopped, [], BEST_EFFORT, FAREWELL)
         rospy.loginfo("Started controllers: %s", ", ".join(stopped))
-    except CallFailed as fault:
+    except ServiceFailed as fault:
         rospy.loginfo("Unspawner: left as they are: %s", fault)

@@ -1,25 +1,14 @@
 """The client's side of world_control.py. Imports no rospy, so that `gz` starts at once."""
 
-import xmlrpc.client
-from typing import Any
+from ros_calls import xmlrpc
 
 METHOD = "gazeboWorld"
 CHUNK = 1000  # steps in one call, so that each call is short and an interrupted client stops it
 TIMEOUT = 60.0  # [s] for one call
-CALLER = "/gz"
 
 
 class ControlFailed(Exception):
     """The simulator can't be reached, or refuses; the text says which."""
-
-
-class _Transport(xmlrpc.client.Transport):
-    """XML-RPC with a time limit."""
-
-    def make_connection(self, host: Any) -> Any:
-        connection = super().make_connection(host)
-        connection.timeout = TIMEOUT
-        return connection
 
 
 class RemoteWorld:
@@ -28,43 +17,41 @@ class RemoteWorld:
     def __init__(self, node: str, master_uri: str) -> None:
         """`node` is the simulator's full name, usually /gazebo.
 
-        Errors: ControlFailed if there is no master, or no such node.
+        Raises:
+            ControlFailed: there is no master, or no such node.
         """
         self._node = node
         try:
-            code, _, address = _proxy(master_uri).lookupNode(CALLER, node)
-        except (OSError, xmlrpc.client.Error) as error:
-            raise ControlFailed(f"no ROS master at {master_uri}: {error}") from error
-        if code != 1:
+            self._address = str(xmlrpc.call(master_uri, "lookupNode", node))
+        except xmlrpc.NoAnswer as fault:
+            raise ControlFailed(f"no ROS master at {master_uri}: {fault}") from fault
+        except xmlrpc.Refused as fault:
             raise ControlFailed(
                 f"no node {node} at the master {master_uri}: is a simulator running?"
-            )
-        self._address = str(address)
+            ) from fault
 
     def command(self, name: str, count: int = 1) -> None:
         """Has the simulator carry out one command.
 
-        Errors: ControlFailed if it doesn't answer, or refuses.
+        Raises:
+            ControlFailed: it doesn't answer, or refuses.
         """
         try:
-            code, text, _ = getattr(_proxy(self._address), METHOD)(CALLER, name, count)
-        except OSError as error:
-            raise ControlFailed(f"{self._node} doesn't answer: {error}") from error
-        except xmlrpc.client.Error as error:
-            raise ControlFailed(f"{self._node} doesn't know {METHOD}: {error}") from error
-        if code != 1:
-            raise ControlFailed(f"{self._node}: {text}")
+            xmlrpc.call(self._address, METHOD, name, count, timeout=TIMEOUT)
+        except xmlrpc.Refused as fault:
+            raise ControlFailed(f"{self._node}: {fault}") from fault
+        except xmlrpc.BadAnswer as fault:
+            raise ControlFailed(f"{self._node} doesn't know {METHOD}: {fault}") from fault
+        except xmlrpc.NoAnswer as fault:
+            raise ControlFailed(f"{self._node} doesn't answer: {fault}") from fault
 
     def step(self, ticks: int) -> None:
         """Pauses the world, moves it by `ticks` steps, and returns when they are done.
 
-        Errors: ControlFailed.
+        Raises:
+            ControlFailed: as `command`.
         """
         while ticks > 0:
             count = min(ticks, CHUNK)
             self.command("step", count)
             ticks -= count
-
-
-def _proxy(uri: str) -> Any:
-    return xmlrpc.client.ServerProxy(uri, transport=_Transport())

@@ -4,20 +4,19 @@ Those shut the node down from within the handler, in the middle of whatever the 
 it advertises a service it holds a lock that the shutdown needs too, and the process hangs for ever.
 """
 
+import math
 import queue
 import signal
 import sys
 import threading
-import time
-import xmlrpc.client
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from http.client import HTTPException
 from types import FrameType
-from xml.parsers.expat import ExpatError
 
-import rosgraph
 import rospy
+
+from ros_calls import master
+from ros_calls.waiting import wait_until
 
 DONE = "done"
 POLL = 0.1  # [s] between two looks whether the node was shut down otherwise
@@ -96,22 +95,11 @@ def init_node(name: str, command_line: Sequence[str], anonymous: bool = True) ->
     Raises:
         rospy.ROSInterruptException: a signal came while there was none.
     """
-    told = False
-    while not _master_answers(name):
-        if rospy.is_shutdown():
-            raise rospy.ROSInterruptException("shut down while waiting for a master")
-        if not told:
-            print(f"{name}: no ROS master at {rosgraph.get_master_uri()} yet; waiting for it",
-                  file=sys.stderr, flush=True)  # fmt: skip
-        told = True
-        time.sleep(POLL)
+    if not master.is_up():
+        print(
+            f"{name}: no ROS master at {master.uri()} yet; waiting for it",
+            file=sys.stderr,
+            flush=True,
+        )
+        wait_until(master.is_up, math.inf, "a master")
     rospy.init_node(name, anonymous=anonymous, argv=list(command_line), disable_signals=True)
-
-
-def _master_answers(name: str) -> bool:
-    """rosgraph's own function for this also takes a Ctrl-C for no answer."""
-    try:
-        rosgraph.Master(f"/{name}").getPid()
-    except (OSError, HTTPException, xmlrpc.client.Error, ExpatError, rosgraph.MasterException):
-        return False
-    return True

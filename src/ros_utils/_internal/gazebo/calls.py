@@ -8,11 +8,12 @@ from typing import Any
 import std_srvs.srv
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 
+from ros_calls import waiting
+from ros_calls.service import ServiceFailed, ServiceHangs, ServiceMissing
 from ros_utils._internal import log as _log
-from ros_utils._internal import services as _services
 
-TIMEOUT = _services.TIMEOUT
 GAZEBO = "/gazebo"
+TIMEOUT = waiting.TIMEOUT
 
 
 class BadNumber(ValueError):
@@ -23,8 +24,8 @@ def call(service: str, kind: Any, *request: Any, timeout: float, gazebo_ns: str)
     """The answer of a service of the simulator, or None; whatever went wrong is logged."""
     name = f"{gazebo_ns.rstrip('/')}/{service}"
     try:
-        answer = _services.call(name, kind, *request, timeout=timeout)
-    except _services.ServiceError as fault:
+        answer = waiting.wait_and_call(name, kind, *request, timeout=timeout)
+    except ServiceFailed as fault:
         _log.error(str(fault))
         return None
     if not getattr(answer, "success", True):
@@ -42,12 +43,12 @@ def empty_call(service: str, retries: int, timeout: float, gazebo_ns: str) -> bo
     name = f"{gazebo_ns.rstrip('/')}/{service}"
     for attempt in range(1, retries + 1):
         try:
-            _services.call(name, std_srvs.srv.Empty, timeout=timeout)
+            waiting.wait_and_call(name, std_srvs.srv.Empty, timeout=timeout)
             return True
-        except _services.Missing as fault:  # waited for already
+        except (ServiceMissing, ServiceHangs) as fault:  # waited for already
             _log.error(str(fault))
             return False
-        except _services.ServiceError as fault:
+        except ServiceFailed as fault:
             _log.error(f"{fault} (attempt {attempt} of {retries})")
     return False
 

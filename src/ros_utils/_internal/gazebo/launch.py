@@ -5,17 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 
+from ros_calls import master as _master
+from ros_calls.waiting import service_answers
 from ros_utils._internal import log as _log
-from ros_utils._internal import master as _master
 from ros_utils._internal import packages as _packages
-from ros_utils._internal import services as _services
-from ros_utils._internal import target as _target
-from ros_utils._internal import waiting as _waiting
 from ros_utils._internal.processes import nodes as _nodes
 from ros_utils._internal.processes import processes as _processes
+from ros_utils._internal.processes import roslaunch as _roslaunch
+from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
 from ros_utils._internal.processes.started import Started
-from ros_utils._internal.waiting import Outcome
-from ros_utils.ros_launch import start_roslaunch
 
 LABEL = "Gazebo"
 NODES = ("/gazebo", "/gazebo_gui")
@@ -107,9 +105,9 @@ def launch_Gazebo(
         "seed": seed,
         "extra_gazebo_args": extra_gazebo_args or None,
     }
-    with _target.using(master_uri):
+    with _master.using(master_uri):
         ready = f"{gazebo_ns.rstrip('/')}/{READY}"
-        if _services.answers(ready):
+        if service_answers(ready):
             _log.warn(
                 f"{LABEL} runs already under {_master.uri()}: using it as it is"
                 " (ros_kill_all_processes ends it)"
@@ -122,12 +120,12 @@ def launch_Gazebo(
             _packages.file("gazebo_ros", "launch", "empty_world.launch")
             command = ["gazebo_ros", "empty_world.launch", *arguments]
             screen = output == "screen" and not launch_new_term
-            handle = start_roslaunch(command, LABEL, launch_new_term, screen, log_file, env)
+            handle = _roslaunch.start(command, LABEL, launch_new_term, screen, log_file, env)
         except (_packages.NotFound, _processes.CannotStart, _master.MasterDown) as fault:
             _log.error(f"launch_Gazebo: {fault}")
             return False
-        outcome = _waiting.until(lambda: _services.answers(ready), handle, timeout)
-        return _report(handle, outcome, ready, timeout)
+        readiness = wait_until_ready(lambda: service_answers(ready), handle, timeout)
+        return _report(handle, readiness, ready, timeout)
 
 
 def close_Gazebo(*, master_uri: str | None = None) -> bool:
@@ -142,7 +140,7 @@ def close_Gazebo(*, master_uri: str | None = None) -> bool:
     Returns:
         True if none of it is left.
     """
-    with _target.using(master_uri):
+    with _master.using(master_uri):
         nodes = {name: address for name in NODES if (address := _nodes.node_uri(name))}
         gone = _processes.end([entry for entry in _processes.started() if entry.label == LABEL])
         left = _nodes.shut_down_nodes(nodes)
@@ -176,11 +174,11 @@ def _world(path: str | None, package: str | None, name: str | None) -> str | Non
 
 
 def _report(
-    handle: _processes.Handle, outcome: Outcome, ready: str, timeout: float
+    handle: _processes.Handle, readiness: Readiness, ready: str, timeout: float
 ) -> Started | bool:
-    if outcome is Outcome.READY:
+    if readiness is Readiness.READY:
         return Started(handle)
-    if outcome is Outcome.ENDED:
+    if readiness is Readiness.ENDED:
         what = f"ended with exit code {handle.exit_code()} before it answered"
     else:
         what = f"service {ready} doesn't answer after {timeout:g} s; ended it"

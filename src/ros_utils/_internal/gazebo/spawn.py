@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import time
 from typing import NamedTuple
 
 import rosgraph
 from gazebo_msgs import srv
 
+from ros_calls import master as _master
+from ros_calls.service import ServiceFailed
+from ros_calls.waiting import wait_and_call, wait_until
 from ros_utils._internal import log as _log
-from ros_utils._internal import master as _master
 from ros_utils._internal import params as _params
-from ros_utils._internal import services as _services
 from ros_utils._internal.gazebo.calls import (
     GAZEBO,
     TIMEOUT,
@@ -46,8 +46,8 @@ def spawn(kind: str, xml: str, target: Target) -> tuple[bool, str]:
         check_finite(f"spawn {target.name}: its pose", *target.pose)
         pose = make_pose(*target.pose)
         request = (target.name, xml, target.namespace, pose, target.frame)
-        answer = _services.call(name, srv.SpawnModel, *request, timeout=target.timeout)
-    except (_services.ServiceError, BadNumber) as fault:
+        answer = wait_and_call(name, srv.SpawnModel, *request, timeout=target.timeout)
+    except (ServiceFailed, BadNumber) as fault:
         return _failed(str(fault))
     if not answer.success:
         return _failed(str(answer.status_message))
@@ -94,18 +94,16 @@ def gazebo_delete_model(
 
 
 def _appears(name: str, wanted: bool, timeout: float, gazebo_ns: str) -> bool:
-    """Wait until a model is in the world, or is not; False if that doesn't come in time."""
-    deadline = time.monotonic() + timeout
-    while time.monotonic() < deadline:
-        answer = call(
-            "get_world_properties", srv.GetWorldProperties, timeout=timeout, gazebo_ns=gazebo_ns
-        )
+    """Waits until a model is in the world, or is not; False if that doesn't come in time."""
+
+    def look() -> str | None:
+        kind = srv.GetWorldProperties
+        answer = call("get_world_properties", kind, timeout=timeout, gazebo_ns=gazebo_ns)
         if answer is None:
-            return False
-        if (name in answer.model_names) is wanted:
-            return True
-        time.sleep(_master.POLL)
-    return False
+            return "no answer"
+        return "as wanted" if (name in answer.model_names) is wanted else None
+
+    return wait_until(look, timeout, f"model {name}") == "as wanted"
 
 
 def _failed(text: str) -> tuple[bool, str]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ros_utils import ros_urdf
 from ros_utils._internal.gazebo.calls import GAZEBO, TIMEOUT
 from ros_utils._internal.gazebo.spawn import Target, spawn, spawn_param
+from ros_utils._internal.urdf import urdf_parse_from_path, urdf_parse_from_pkg
 
 
 def gazebo_spawn_urdf_path(
@@ -28,7 +28,7 @@ def gazebo_spawn_urdf_path(
     verify: bool = False,
 ) -> tuple[bool, str]:
     """Spawn a URDF or xacro file, given by its path. See `gazebo_spawn_urdf_string`."""
-    xml = ros_urdf.urdf_parse_from_path(model_path, args_xacro)
+    xml = urdf_parse_from_path(model_path, args_xacro)
     if xml is None:
         return False, f"{model_path}: can't be read or expanded"
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
@@ -58,7 +58,7 @@ def gazebo_spawn_urdf_pkg(
 ) -> tuple[bool, str]:
     """Spawn a package's URDF or xacro file, ``<pkg_name><file_folder>/<file_name>``. See
     `gazebo_spawn_urdf_string`."""
-    xml = ros_urdf.urdf_parse_from_pkg(pkg_name, file_name, file_folder, args_xacro)
+    xml = urdf_parse_from_pkg(pkg_name, file_name, file_folder, args_xacro)
     if xml is None:
         return False, f"{file_name} in package {pkg_name}: can't be found, read or expanded"
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)

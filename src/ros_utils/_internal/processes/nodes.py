@@ -8,16 +8,9 @@ from urllib.parse import urlsplit
 
 import rospy
 
-from ros_utils._internal.master import (
-    POLL,
-    NoAnswer,
-    Refused,
-    call,
-    call_plain,
-    host_is_local,
-    is_at,
-    uri,
-)
+from ros_calls import master as _master
+from ros_calls.waiting import POLL
+from ros_calls.xmlrpc import NoAnswer, NobodyListens, Refused, call, call_plain
 from ros_utils._internal.processes import procfs as _procfs
 
 CORE_NODES = ("/rosout",)  # lives and dies with the master
@@ -26,7 +19,7 @@ CORE_NODES = ("/rosout",)  # lives and dies with the master
 def node_names() -> list[str]:
     """Names of all registered nodes, sorted; empty without a master."""
     try:
-        state = call(uri(), "getSystemState")
+        state = _master.call("getSystemState")
     except (NoAnswer, Refused):
         return []
     return sorted({node for kind in state for _, nodes in kind for node in nodes})
@@ -35,7 +28,7 @@ def node_names() -> list[str]:
 def node_uri(name: str) -> str | None:
     """The XML-RPC address of a node, or None if the master doesn't know it (or is down)."""
     try:
-        return str(call(uri(), "lookupNode", name))
+        return str(_master.call("lookupNode", name))
     except (NoAnswer, Refused):
         return None
 
@@ -69,7 +62,7 @@ def _master_of(address: str) -> str | None:
     except (NoAnswer, Refused):
         pass
     host = urlsplit(address).hostname
-    pid = node_pid(address) if host and host_is_local(host) else None
+    pid = node_pid(address) if host and _master.host_is_local(host) else None
     return _procfs.master_uri(pid) if pid else None
 
 
@@ -81,16 +74,14 @@ def ask_to_shut_down(address: str) -> bool:
         may have been given to a node of somebody else's.
     """
     theirs = _master_of(address)
-    if theirs is not None and not is_at(theirs):
+    if theirs is not None and not _master.is_at(theirs):
         return False
     try:
         call(address, "shutdown", "asked by ros_utils")
-    except NoAnswer as fault:
-        # A node may close the connection before it has answered: only an address without listener
-        # is a failure.
-        return not isinstance(fault.__cause__, ConnectionRefusedError)
-    except Refused:
+    except (NobodyListens, Refused):
         return False
+    except NoAnswer:
+        pass  # a node may close the connection before it has answered
     return True
 
 
@@ -114,6 +105,7 @@ def shut_down_nodes(nodes: dict[str, str], timeout: float = 5.0) -> list[str]:
     for address in asked.values():
         ask_to_shut_down(address)
     deadline = time.monotonic() + timeout
+    # Also once the caller's own node is shut down, which ends wait_until().
     while asked and time.monotonic() < deadline:
         for name, address in list(asked.items()):
             if _is_dead(address):
@@ -129,9 +121,9 @@ def _is_dead(address: str) -> bool:
     """True if nobody listens at a node's XML-RPC address any more."""
     try:
         call(address, "getPid", timeout=1.0)
-    except NoAnswer as fault:
-        return isinstance(fault.__cause__, ConnectionRefusedError)
-    except Refused:
+    except NobodyListens:
+        return True
+    except (NoAnswer, Refused):
         pass
     return False
 
@@ -142,11 +134,11 @@ def _unregister(name: str, address: str) -> None:
     A rospy node that is asked to shut down often exits before it has taken its leave of the master.
     """
     with contextlib.suppress(NoAnswer, Refused):
-        publishers, subscribers, services = call(uri(), "getSystemState")
+        publishers, subscribers, services = _master.call("getSystemState")
         kinds = (("unregisterPublisher", publishers), ("unregisterSubscriber", subscribers))
         for method, topics in kinds:
             for topic in (topic for topic, nodes in topics if name in nodes):
-                call_plain(uri(), method, name, topic, address)
+                call_plain(_master.uri(), method, name, topic, address)
         for service in (service for service, nodes in services if name in nodes):
-            location = call(uri(), "lookupService", service)
-            call_plain(uri(), "unregisterService", name, service, location)
+            location = _master.call("lookupService", service)
+            call_plain(_master.uri(), "unregisterService", name, service, location)

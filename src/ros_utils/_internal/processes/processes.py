@@ -25,8 +25,8 @@ from types import FrameType
 
 import rospkg
 
+from ros_calls import master as _master
 from ros_utils._internal import log as _log
-from ros_utils._internal import target as _target
 from ros_utils._internal.processes import endings as _endings
 from ros_utils._internal.processes import procfs as _procfs
 from ros_utils._internal.processes import registry as _registry
@@ -184,7 +184,7 @@ def _environment(token: str) -> dict[str, str]:
         _procfs.MARK: mark,
         "PATH": path,
         "PYTHONUNBUFFERED": "1",
-        "ROS_MASTER_URI": _target.uri(),
+        "ROS_MASTER_URI": _master.uri(),
     }
 
 

@@ -17,8 +17,8 @@ from dataclasses import asdict, dataclass
 
 import rospkg
 
+from ros_calls import master as _master
 from ros_utils._internal import log as _log
-from ros_utils._internal import master as _master
 from ros_utils._internal.processes import procfs as _procfs
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import TracebackType
 
-from ros_utils._internal import target as _target
+from ros_calls import master as _master
 from ros_utils._internal.processes import processes as _processes
 
 
@@ -21,7 +21,7 @@ class Started(int):
         """Without a handle: something that ran already, and that `close` leaves alone."""
         self = super().__new__(cls, 1)
         self._handle = handle
-        self.master_uri = _target.uri()
+        self.master_uri = _master.uri()
         return self
 
     @property
@@ -51,7 +51,7 @@ class Started(int):
         """
         if self._handle is None:
             return True
-        with _target.using(self.master_uri):
+        with _master.using(self.master_uri):
             return _processes.end([self._handle.entry])
 
     def __enter__(self) -> Started:

@@ -1,4 +1,4 @@
-"""Service calls over ROS's TCP protocol, each with a time limit, under any master.
+"""Service calls on the wire: TCPROS, each with a time limit, under any master.
 
 rospy's proxies have no time limit, keep a dead connection, and ask the process's own master even if they
 know the address.
@@ -7,19 +7,22 @@ know the address.
 from __future__ import annotations
 
 import io
+import math
+import select
 import socket
 import struct
+import time
 from typing import Any
 
 import genpy
 import rosgraph
 import rospy
 
-from ros_utils._internal import master as _master
-
 CHUNK = 65536  # [bytes]
 HEAD = struct.Struct("<BI")  # of an answer: whether the call succeeded, and its length
 LENGTH = struct.Struct("<I")
+CONNECTING = 10.0  # [s]; how long a call without a time limit may take to connect or to send
+LOOK = 0.1  # [s]; how often such a call looks whether the node has been shut down
 
 
 class CallFailed(Exception):
@@ -31,23 +34,27 @@ class ConnectionEnded(CallFailed):
 
 
 class Connection:
-    """A lasting connection to one service. Not thread-safe."""
+    """A lasting connection to one service. Not thread-safe.
+
+    Time limits are wall time [s]; infinity means: until the caller's node is shut down.
+    """
 
     def __init__(self, address: str, name: str, kind: Any, timeout: float) -> None:
-        """Connects to the service at a ``rosrpc://`` address; no wait is longer than `timeout` [s].
+        """Connects to the service at a ``rosrpc://`` address.
 
         Raises:
             CallFailed: no connection, or another type of service.
             TimeoutError: no answer in time.
         """
         self._kind = kind
-        self._timeout = 0.0  # [s] of the blocking socket; not set yet
+        self._kernels_timeout = 0.0  # [s]; none is set yet
+        deadline = time.monotonic() + timeout
         try:
             host, port = rospy.core.parse_rosrpc_uri(address)
-            self._socket = socket.create_connection((host, port), timeout)
+            self._socket = socket.create_connection((host, port), _finite(timeout))
             try:
                 self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                self._shake_hands(name)
+                self._shake_hands(name, deadline)
             except BaseException:
                 self._socket.close()
                 raise
@@ -56,34 +63,39 @@ class Connection:
         except (OSError, rosgraph.network.ROSHandshakeException, rospy.ROSException) as fault:
             raise ConnectionEnded(str(fault)) from fault
 
-    def _shake_hands(self, name: str) -> None:
+    def _shake_hands(self, name: str, deadline: float) -> None:
         header = {
-            "callerid": rospy.get_caller_id() or _master.CALLER,
+            "callerid": rospy.get_caller_id(),
             "service": name,
             "md5sum": self._kind._md5sum,
             "type": self._kind._type,
             "persistent": "1",
         }
         rosgraph.network.write_ros_handshake_header(self._socket, header)
+        self._await_data(deadline)
         answer = rosgraph.network.read_ros_handshake_header(self._socket, io.BytesIO(), CHUNK)
         if "error" in answer:
             raise CallFailed(answer["error"])
 
     def call(self, message: genpy.Message, timeout: float) -> Any:
-        """Sends a request and returns the response; no wait is longer than `timeout` [s].
+        """Sends a request and returns the response.
 
         Raises:
             CallFailed: the service failed; ConnectionEnded: there is no connection any more.
             TimeoutError: no answer in time; the connection is of no use afterwards.
         """
         payload = _serialized(message)
+        deadline = time.monotonic() + timeout
         try:
-            if timeout != self._timeout:
-                self._set_timeout(timeout)
+            self._set_timeout(_finite(timeout))
             self._socket.sendall(payload)
-            ok, answer = self._receive()
+            if timeout == math.inf:
+                self._await_data(deadline)
+            ok, answer = self._receive(deadline)
         except BlockingIOError as fault:
             raise TimeoutError from fault
+        except TimeoutError:
+            raise
         except OSError as fault:
             raise ConnectionEnded(str(fault)) from fault
         if not ok:
@@ -98,49 +110,52 @@ class Connection:
 
     def _set_timeout(self, timeout: float) -> None:
         """Lets the kernel see to the time limit: Python's own costs a system call more for each wait."""
+        if timeout == self._kernels_timeout:
+            return
         limit = struct.pack("@ll", int(timeout), int(timeout % 1.0 * 1e6))
         self._socket.settimeout(None)
         for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
             self._socket.setsockopt(socket.SOL_SOCKET, option, limit)
-        self._timeout = timeout
+        self._kernels_timeout = timeout
 
-    def _receive(self) -> tuple[bool, bytes]:
-        """Reads one answer; most come in one piece."""
-        data = self._more()
+    def _receive(self, deadline: float) -> tuple[bool, bytes]:
+        """Reads one answer; most come in one piece, for which the kernel's time limit is enough."""
+        data = self._part()
         while len(data) < HEAD.size:
-            data += self._more()
+            self._await_data(deadline)
+            data += self._part()
         ok, length = HEAD.unpack_from(data)
         if len(data) == HEAD.size + length:
             return bool(ok), data[HEAD.size :]
         whole = bytearray(data)
         while len(whole) < HEAD.size + length:
-            whole += self._more()
+            self._await_data(deadline)
+            whole += self._part()
         return bool(ok), bytes(whole[HEAD.size :])
 
-    def _more(self) -> bytes:
+    def _part(self) -> bytes:
         part = self._socket.recv(CHUNK)
         if not part:
             raise ConnectionError("the connection ended before the answer")
         return part
 
+    def _await_data(self, deadline: float) -> None:
+        """Returns once there is something to read, be it the end.
+
+        Raises:
+            TimeoutError: the deadline has passed, or it is infinity and the node is shut down.
+        """
+        poll = select.poll()
+        poll.register(self._socket, select.POLLIN)
+        left = deadline - time.monotonic()
+        while not poll.poll(1000.0 * max(0.0, min(left, LOOK))):
+            left = deadline - time.monotonic()
+            if left <= 0.0 or (left == math.inf and rospy.is_shutdown()):
+                raise TimeoutError
+
     def close(self) -> None:
         """Ends the connection."""
         self._socket.close()
-
-
-def call(address: str, name: str, kind: Any, request: tuple[Any, ...], timeout: float) -> Any:
-    """Call the service at a ``rosrpc://`` address and return its response.
-
-    Raises:
-        CallFailed: no connection, another type of service, or the service failed.
-        TimeoutError: an answer didn't come within `timeout` [s].
-    """
-    message = request_message(kind, request)
-    connection = Connection(address, name, kind, timeout)
-    try:
-        return connection.call(message, timeout)
-    finally:
-        connection.close()
 
 
 def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
@@ -153,6 +168,10 @@ def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
         return rospy.msg.args_kwds_to_message(kind._request_class, request, {})
     except TypeError as fault:
         raise CallFailed(f"the request can't be sent: {fault}") from fault
+
+
+def _finite(timeout: float) -> float:
+    return CONNECTING if timeout == math.inf else timeout
 
 
 def _serialized(message: genpy.Message) -> bytes:

@@ -1,0 +1,132 @@
+"""Waits with a bound, in wall time: simulated time may stand still, run fast or go back."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import rosgraph
+import rospy
+
+from ros_calls import master
+from ros_calls.service import ServiceClient, ServiceFailed, ServiceMissing
+from ros_calls.xmlrpc import CALLER, NoAnswer, Refused
+
+POLL = 0.05  # [s] between two looks at something that is being waited for
+TIMEOUT = 30.0  # [s] for a service to come up
+CONNECTING = 1.0  # [s] for a node to accept a connection
+
+Found = TypeVar("Found")
+
+
+def wait_until(look: Callable[[], Found], timeout: float, what: str) -> Found:
+    """Looks again and again until there is what is waited for.
+
+    Args:
+        look: returns something true once it is there; always asked at least once.
+        timeout: bound of the wait [s], or infinity. The last look may go beyond it.
+        what: for the text of an interrupt.
+
+    Returns:
+        What the last look returned; false if the time is over.
+
+    Raises:
+        rospy.ROSInterruptException: the node was shut down meanwhile.
+    """
+    deadline = time.monotonic() + timeout
+    while not (found := look()):
+        if rospy.is_shutdown():
+            raise rospy.ROSInterruptException(f"shut down while waiting for {what}")
+        if time.monotonic() > deadline:
+            break
+        time.sleep(POLL)
+    return found
+
+
+def service_answers(name: str) -> bool:
+    """True if the service of that full name is offered and its node accepts connections.
+
+    The service isn't called.
+    """
+    try:
+        address = rospy.core.parse_rosrpc_uri(master.call("lookupService", name))
+        with socket.create_connection(address, CONNECTING) as connection:
+            header = {"probe": "1", "md5sum": "*", "callerid": CALLER, "service": name}
+            rosgraph.network.write_ros_handshake_header(connection, header)
+    except (NoAnswer, Refused, rospy.ROSException, OSError):
+        return False
+    return True
+
+
+def service_comes_up(name: str, timeout: float) -> bool:
+    """Waits until a service answers, also while there is no master.
+
+    Args:
+        name: the service, global or relative to the node's namespace.
+        timeout: bound of the wait [s], or infinity.
+
+    Returns:
+        False if it doesn't in time.
+
+    Raises:
+        rospy.ROSInterruptException: the node was shut down meanwhile.
+    """
+    resolved = str(rospy.resolve_name(name))
+    return wait_until(lambda: service_answers(resolved), timeout, f"service {resolved}")
+
+
+def wait_for_service(name: str, timeout: float = TIMEOUT) -> str:
+    """Waits until a service can be called, but not for a master.
+
+    Args:
+        name: the service, global or relative to the node's namespace; doubled slashes do no harm.
+        timeout: bound of the wait [s].
+
+    Returns:
+        The resolved name.
+
+    Raises:
+        ServiceMissing: no master, or the service doesn't come in time.
+        rospy.ROSInterruptException: the node was shut down meanwhile.
+    """
+    resolved = str(rospy.resolve_name(name))
+
+    def look() -> bool:
+        if service_answers(resolved):
+            return True
+        master.require()
+        return False
+
+    try:
+        found = wait_until(look, timeout, f"service {resolved}")
+    except master.MasterDown as fault:
+        raise ServiceMissing(f"service {resolved}: {fault}") from fault
+    if not found:
+        raise ServiceMissing(
+            f"service {resolved} didn't come up within {timeout:g} s: does its node run?"
+        )
+    return resolved
+
+
+def wait_and_call(name: str, kind: Any, *request: Any, timeout: float = TIMEOUT) -> Any:
+    """Waits for a service and calls it.
+
+    Args:
+        name: the service.
+        kind: its generated class.
+        request: the request, or its fields in order.
+        timeout: bound of the wait for the service, and again of the call [s].
+
+    Raises:
+        ServiceFailed: not there in time (ServiceMissing), or the call failed. See `ServiceClient`.
+        rospy.ROSInterruptException: the node was shut down meanwhile.
+    """
+    resolved = wait_for_service(name, timeout)
+    try:
+        return ServiceClient(resolved, kind, timeout=timeout)(*request)
+    except ServiceFailed as fault:
+        if rospy.is_shutdown():
+            raise rospy.ROSInterruptException(f"shut down while calling {resolved}") from fault
+        raise

@@ -1,0 +1,104 @@
+"""What looks from outside like a ROS master, and like a node with one service; without ROS's servers."""
+
+import contextlib
+import io
+import socket
+import struct
+import threading
+from xmlrpc.server import SimpleXMLRPCServer
+
+import rosgraph
+from std_srvs.srv import SetBool, SetBoolResponse
+
+LOOPBACK = "127.0.0.1"
+
+
+class FakeMaster:
+    """Knows services by name and address."""
+
+    def __init__(self):
+        self.services = {}
+        self.params = {}
+        self.questions = []
+        self._server = SimpleXMLRPCServer((LOOPBACK, 0), logRequests=False)
+        self._server.register_function(lambda caller: [1, "", 1], "getPid")
+        self._server.register_function(self._lookup, "lookupService")
+        self._server.register_function(lambda caller, name: "nonsense", "nonsense")
+        self.uri = f"http://{LOOPBACK}:{self._server.server_address[1]}"
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.01,))
+        self._thread.start()
+
+    def _lookup(self, caller, name):
+        self.questions.append(name)
+        if name in self.services:
+            return [1, "", self.services[name]]
+        return [-1, "no provider", ""]
+
+    def close(self):
+        self._server.shutdown()
+        self._thread.join()
+        self._server.server_close()
+
+
+class FakeService:
+    """A std_srvs/SetBool; `answer(request)` gives the pieces that are sent, or None to say nothing."""
+
+    def __init__(self, answer=None, header=None):
+        self._answer = answer or (lambda request: [ok(request.data)])
+        self._header = header or {
+            "callerid": "/fake",
+            "md5sum": SetBool._md5sum,
+            "type": SetBool._type,
+        }
+        self._listener = socket.create_server((LOOPBACK, 0))
+        self.address = f"rosrpc://{LOOPBACK}:{self._listener.getsockname()[1]}"
+        self.connections = []
+        self.over = threading.Event()
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self):
+        with contextlib.suppress(OSError):  # closed
+            while True:
+                connection, _ = self._listener.accept()
+                self.connections.append(connection)
+                threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
+
+    def _serve(self, connection):
+        with contextlib.suppress(OSError, rosgraph.network.ROSHandshakeException):
+            rosgraph.network.read_ros_handshake_header(connection, io.BytesIO(), 4096)
+            if self._header == "silence":
+                return
+            rosgraph.network.write_ros_handshake_header(connection, self._header)
+            while length := connection.recv(4, socket.MSG_WAITALL):
+                data = connection.recv(struct.unpack("<I", length)[0], socket.MSG_WAITALL)
+                request = SetBool._request_class()
+                request.deserialize(data)
+                for piece in self._answer(request) or ():
+                    connection.sendall(piece)
+
+    def break_off(self):
+        """Ends all connections, as a node does that ends."""
+        for connection in self.connections:
+            with contextlib.suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+            connection.close()
+
+    def close(self):
+        self.over.set()
+        with contextlib.suppress(OSError):  # closed already
+            self._listener.shutdown(socket.SHUT_RDWR)
+        self._listener.close()
+        self.break_off()
+
+
+def ok(success, message=""):
+    """An answer on the wire."""
+    payload = io.BytesIO()
+    SetBoolResponse(success, message).serialize(payload)
+    return b"\x01" + struct.pack("<I", payload.tell()) + payload.getvalue()
+
+
+def failed(reason):
+    """The answer of a service that fails."""
+    data = reason.encode()
+    return b"\x00" + struct.pack("<I", len(data)) + data

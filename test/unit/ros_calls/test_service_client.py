@@ -1,0 +1,218 @@
+"""ServiceClient against services that hang, fail, end and come back, under another master."""
+
+import math
+import os
+import signal
+import threading
+import time
+
+import pytest
+import rospy
+from ros_fakes import FakeMaster, FakeService, failed, ok
+from std_srvs.srv import Empty, SetBool, SetBoolRequest
+
+from ros_calls import master as ros_master
+from ros_calls.service import (
+    ServiceClient,
+    ServiceFailed,
+    ServiceGone,
+    ServiceHangs,
+)
+from ros_calls.waiting import wait_and_call
+
+NAME = "/fake/set"
+LIMIT = 0.3  # [s]
+BOUND = 3.0  # [s]; on a busy machine
+
+
+@pytest.fixture
+def master(monkeypatch):
+    # The process's own is another one, so that a call that goes there finds nothing.
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    fake = FakeMaster()
+    with ros_master.using(fake.uri):
+        yield fake
+    fake.close()
+
+
+@pytest.fixture
+def offer(master):
+    services = []
+
+    def offer(*args, **kwargs):
+        service = FakeService(*args, **kwargs)
+        services.append(service)
+        master.services[NAME] = service.address
+        return service
+
+    yield offer
+    for service in services:
+        service.close()
+
+
+@pytest.fixture
+def client():
+    clients = []
+
+    def make(kind=SetBool, **kwargs):
+        made = ServiceClient(NAME, kind, **{"timeout": LIMIT} | kwargs)
+        clients.append(made)
+        return made
+
+    yield make
+    for made in clients:
+        made.close()
+
+
+def test_a_request_or_its_fields(offer, client):
+    offer()
+    call = client()
+    assert call(True).success
+    assert not call(SetBoolRequest(False)).success
+    with pytest.raises(ServiceFailed, match=r"/fake/set: the request can't be sent"):
+        call(True, "and more")
+
+
+def test_a_kept_connection_serves_all_calls(offer, client, master):
+    service = offer()
+    call = client(persistent=True)
+    for _ in range(3):
+        call(True)
+    assert len(service.connections) == len(master.questions) == 1
+    single = client()
+    for _ in range(2):
+        single(True)
+    assert len(service.connections) == 3
+
+
+def test_nobody_offers_it(master, client):
+    with pytest.raises(ServiceGone, match="/fake/set: nobody offers this service"):
+        client()(True)
+
+
+def test_there_is_no_master(client):
+    with (
+        ros_master.using("http://127.0.0.1:1"),
+        pytest.raises(ServiceGone, match="127.0.0.1:1: Conn"),
+    ):
+        client()(True)
+
+
+def test_a_node_that_has_ended_is_still_registered(offer, client):
+    offer().close()
+    with pytest.raises(ServiceGone, match="the connection broke; its node has ended"):
+        client()(True)
+
+
+def test_a_service_that_fails_says_why(offer, client):
+    offer(lambda request: [failed("out of order")])
+    with pytest.raises(ServiceFailed, match="/fake/set: it failed: out of order"):
+        client()(True)
+
+
+def test_a_service_of_another_type(offer, client):
+    offer(header={"error": "md5sums do not match"})
+    with pytest.raises(ServiceFailed, match="md5sums do not match"):
+        client(Empty)()
+
+
+def test_a_connection_that_broke_is_renewed_by_the_next_call(offer, client):
+    service = offer()
+    call = client(persistent=True)
+    call(True)
+    service.break_off()
+    with pytest.raises(ServiceGone):
+        call(True)
+    assert call(True).success
+
+
+def test_what_may_be_done_twice_is_called_again_at_once(offer, client):
+    service = offer()
+    call = client(persistent=True)
+    call(True)
+    service.close()
+    second = offer()
+    assert call.call_idempotent(True).success
+    second.close()
+    with pytest.raises(ServiceGone):
+        call.call_idempotent(True)
+
+
+@pytest.mark.parametrize("header", [None, "silence"], ids=["call", "greeting"])
+def test_a_service_that_hangs(offer, client, header):
+    service = offer(lambda request: service.over.wait() and None, header)
+    begin = time.monotonic()
+    with pytest.raises(ServiceHangs, match=r"/fake/set: no answer within 0.3 s"):
+        client()(True)
+    assert LIMIT <= time.monotonic() - begin < BOUND
+
+
+def test_an_answer_in_pieces(offer, client):
+    text = "x" * 200_000
+    answer = ok(True, text)
+
+    def pieces(request):
+        for begin, end in ((0, 3), (3, 9), (9, 100_000), (100_000, None)):
+            time.sleep(0.02)  # so that they arrive apart
+            yield answer[begin:end]
+
+    offer(pieces)
+    assert client(timeout=5.0)(True).message == text
+
+
+def test_an_answer_that_trickles_in_has_the_same_limit(offer, client):
+    def trickle(request):
+        for byte in ok(True, "x" * 1000):
+            time.sleep(LIMIT / 5)
+            yield bytes([byte])
+
+    offer(trickle)
+    begin = time.monotonic()
+    with pytest.raises(ServiceHangs):
+        client()(True)
+    assert time.monotonic() - begin < BOUND
+
+
+def test_without_a_limit_it_waits_until_the_shutdown(offer, client, monkeypatch):
+    service = offer(lambda request: service.over.wait() and None)
+    down = threading.Event()
+    monkeypatch.setattr(rospy, "is_shutdown", down.is_set)
+    threading.Timer(3 * LIMIT, down.set).start()
+    begin = time.monotonic()
+    with pytest.raises(ServiceHangs, match="no answer before the shutdown"):
+        client(timeout=math.inf)(True)
+    assert time.monotonic() - begin > 2 * LIMIT
+
+
+def test_without_a_limit_an_answer_may_come_late(offer, client):
+    def late(request):
+        time.sleep(2 * LIMIT)
+        return [ok(True)]
+
+    offer(late)
+    assert client(timeout=math.inf)(True).success
+
+
+def test_ctrl_c_ends_a_call_and_the_connection(offer, client):
+    service = offer(lambda request: service.over.wait() and None)
+    call = client(persistent=True, timeout=BOUND)
+    threading.Timer(LIMIT, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        call(True)
+    service.close()
+    offer()
+    assert call(True).success, "the answer to the first call isn't taken for the second one's"
+
+
+def test_it_is_called_during_a_shutdown(offer, client, monkeypatch):
+    offer()
+    monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
+    assert client()(True).success
+
+
+def test_a_failure_because_of_a_shutdown_is_an_interrupt(offer, monkeypatch):
+    down = threading.Event()
+    offer(lambda request: down.set() or [failed("too late")])
+    monkeypatch.setattr(rospy, "is_shutdown", down.is_set)
+    with pytest.raises(rospy.ROSInterruptException, match="shut down while calling /fake/set"):
+        wait_and_call(NAME, SetBool, True, timeout=LIMIT)
