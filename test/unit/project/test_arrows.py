@@ -16,6 +16,7 @@ FORBIDDEN = [
     ("bullet_gazebo/physics", ("bullet_gazebo.control", "bullet_gazebo.ros", "bullet_gazebo.simulator")),
     ("bullet_gazebo/control", ("bullet_gazebo.physics", "bullet_gazebo.ros", "bullet_gazebo.simulator",
                                "pybullet")),
+    ("ros_calls", ("bullet_gazebo", "cartpole", "rl_workbench", "robot_envs", "ros_utils")),
     ("ros_utils", ("bullet_gazebo", "cartpole", "pybullet", "torch")),
     ("cartpole/agents", ("gymnasium", "cartpole.envs", "rl_workbench.training", "rl_workbench",
                          "ros_utils")),
@@ -23,7 +24,7 @@ FORBIDDEN = [
     ("cartpole/training", ("rl_workbench", "stable_baselines3", "optuna")),
     ("cartpole/task.py", ("cartpole.envs", "rl_workbench.agents", "rl_workbench.training", "torch")),
 ]  # fmt: skip
-ROS_ROOMS = ("bullet_gazebo/ros", "ros_utils", "cartpole/envs")
+ROS_ROOMS = ("bullet_gazebo/ros", "ros_calls", "ros_utils", "cartpole/envs")
 
 
 def imports(path):
