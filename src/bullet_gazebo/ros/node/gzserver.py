@@ -23,7 +23,7 @@ from bullet_gazebo.ros.plugins import PluginRegistry
 from bullet_gazebo.ros.services.spawn_services import SpawnServices
 from bullet_gazebo.ros.services.step_service import StepService
 from bullet_gazebo.ros.services.world_services import advertise_world_services
-from bullet_gazebo.ros.wire.connections import guard_connections
+from bullet_gazebo.ros.wire.rospy_patches import greet_clients_apart, hang_up_on_nonsense
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.ros.wire.signals import Ending, init_node
 from bullet_gazebo.ros.wire.thinning import Thinner
@@ -50,7 +50,8 @@ class GazeboNode:
 
     def _advertise(self, network: bool) -> None:
         WorldControl(self.sim).offer()
-        guard_connections()
+        greet_clients_apart()
+        hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
         plugins = PluginRegistry(

@@ -5,11 +5,11 @@ from functools import partial
 from typing import Any
 
 import rospy
-import rospy.impl.simtime
 from gazebo_msgs.msg import LinkStates, ModelStates
 from rosgraph_msgs.msg import Clock
 
 from bullet_gazebo.ros.wire.conversions import to_pose_msg, to_time, to_twist_msg
+from bullet_gazebo.ros.wire.rospy_patches import set_time, stop_hearing_clock
 from bullet_gazebo.ros.wire.thinning import ThinnedTopic, Thinner
 from bullet_gazebo.simulator import Simulator
 
@@ -71,8 +71,8 @@ class ClockTopic(ThinnedTopic):
         # With use_sim_time:=false this node, like all others, goes by the wall clock.
         self._sets_own_time = bool(rospy.get_param("/use_sim_time", True))
         if self._sets_own_time:
-            _stop_listening_to_clock()
-            rospy.rostime._set_rostime(to_time(sim.now))
+            stop_hearing_clock()
+            set_time(to_time(sim.now))
 
     def __call__(self, now: int) -> None:
         if self._period and 0 <= now - self._last < self._period:  # negative after a reset: publish
@@ -83,20 +83,8 @@ class ClockTopic(ThinnedTopic):
     def _publish_time(self, now: int) -> None:
         time = to_time(now)
         if self._sets_own_time:
-            rospy.rostime._set_rostime(time)
+            set_time(time)
         self._publisher.publish(Clock(time))
-
-
-def _stop_listening_to_clock() -> None:
-    """Ends rospy's own subscription to the topic that this node itself publishes.
-
-    With /use_sim_time every node hears /clock. For the node that makes the time that is a message a
-    millisecond over a socket to itself, a good part of its CPU time; the publisher tells rospy directly.
-    rospy offers no way to say so, hence its private names.
-    """
-    subscription = getattr(rospy.impl.simtime, "_clock_sub", None)
-    if subscription is not None:
-        subscription.unregister()
 
 
 def advertise_states(

@@ -9,9 +9,9 @@ must be the only ones (docs/contract/gazebo.md 7).
 import traceback
 
 import rospy
-from rospy.impl.masterslave import ROSHandler
 
 from bullet_gazebo.ros.clients.world_client import CHUNK, METHOD
+from bullet_gazebo.ros.wire.rospy_patches import answer_xmlrpc
 from bullet_gazebo.simulator import Simulator
 
 Answer = tuple[int, str, int]
@@ -31,12 +31,8 @@ class WorldControl:
         }
 
     def offer(self) -> None:
-        """Has this process's node answer. rospy asks its handler's methods, and has one handler."""
-
-        def answer(_handler: ROSHandler, _caller: str, command: str, count: int = 1) -> Answer:
-            return self.answer(command, count)
-
-        setattr(ROSHandler, METHOD, answer)
+        """Has this process's node answer."""
+        answer_xmlrpc(METHOD, self.answer)
 
     def answer(self, command: str, count: int = 1) -> Answer:
         """Carries out a command, and answers in ROS's way: code (1 is success), text, ticks done."""
