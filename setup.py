@@ -1,6 +1,41 @@
-"""Tells catkin which Python packages there are; everything else is in package.xml."""
+"""What is installed: read by catkin (CMakeLists.txt) and by pip, which need nothing of each other.
 
-from catkin_pkg.python_setup import generate_distutils_setup
+Name, commands and dependencies for pip are in pyproject.toml, all else of the package in package.xml.
+"""
+
+import os
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree
+
 from setuptools import find_packages, setup
+from setuptools.command.build_py import build_py
 
-setup(**generate_distutils_setup(packages=find_packages("src"), package_dir={"": "src"}))
+# Files that are needed at run time and lie outside of src, and the folders of a wheel for them.
+DATA = {
+    "config/*.yaml": "rl_workbench/share/config",
+    "urdf/*": "cartpole/share/cartpole/urdf",
+    "companions/cartpole_controller/config/*": "cartpole/share/cartpole_controller/config",
+}
+
+
+class BuildWithData(build_py):
+    """Puts the data beside the modules, for a wheel: catkin installs it where ROS looks for it."""
+
+    def run(self) -> None:
+        super().run()
+        if self.editable_mode or "CATKIN_BINARY_DIR" in os.environ:
+            return
+        for pattern, place in DATA.items():
+            folder = Path(self.build_lib, place)
+            folder.mkdir(parents=True, exist_ok=True)
+            for path in sorted(Path().glob(pattern)):
+                shutil.copy(path, folder)
+
+
+setup(
+    version=ElementTree.parse("package.xml").findtext("version"),
+    packages=find_packages("src"),
+    package_dir={"": "src"},
+    cmdclass={"build_py": BuildWithData},
+)

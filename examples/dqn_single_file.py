@@ -145,7 +145,7 @@ def td_loss(q_network: QNetwork, target: QNetwork, batch: Any, args: Args) -> to
         best = picking.argmax(dim=1, keepdim=True)
         targets = rewards + discounts * next_values.gather(1, best).squeeze(1)
     values = q_network(observations).gather(1, actions.unsqueeze(1)).squeeze(1)
-    loss = {"huber": nn.functional.huber_loss, "mse": nn.functional.mse_loss}[args.loss]
+    loss: Any = {"huber": nn.functional.huber_loss, "mse": nn.functional.mse_loss}[args.loss]
     return loss(values, targets)
 
 
@@ -154,7 +154,7 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
     torch.set_num_threads(1)  # networks this small only lose by more
     torch.manual_seed(args.seed)
     explore_rng, replay_rng = (np.random.default_rng([args.seed, use]) for use in (0, 1))
-    env = gymnasium.make(args.env_id)
+    env: Any = gymnasium.make(args.env_id)
     size, actions = env.observation_space.shape[0], int(env.action_space.n)
     q_network, target_network = (QNetwork(size, actions, args) for _ in range(2))
     target_network.load_state_dict(q_network.state_dict())
@@ -170,7 +170,7 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
         return int(q_network(torch.Tensor(normalize(observation))[None]).argmax())
 
     exploration = max(args.exploration_fraction * args.total_timesteps, 1e-9)  # [steps]
-    window: deque = deque()  # the steps of the episode whose n rewards aren't known yet
+    window: deque[tuple[np.ndarray, int, float]] = deque()  # steps whose n rewards aren't known yet
     returns, episode_return, updates = [], 0.0, 0
     env.reset(seed=args.seed)  # seeds the environment; every episode has a reset of its own
     observation = np.array(env.reset()[0], np.float32)
@@ -202,9 +202,8 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
                 arrays = (normalize(seen), *middle, normalize(next_seen), discounts)
                 batch = [torch.from_numpy(array) for array in arrays]
                 loss = td_loss(q_network, target_network, batch, args)
-                q_network.zero_grad()
-                loss.backward()
-                weights.grad = nn.utils.parameters_to_vector(p.grad for p in q_network.parameters())
+                gradients = torch.autograd.grad(loss, tuple(q_network.parameters()))
+                weights.grad = nn.utils.parameters_to_vector(gradients)
                 norm = weights.grad.norm().item()
                 if norm > args.max_grad_norm:
                     weights.grad.mul_(args.max_grad_norm / norm)
@@ -227,7 +226,7 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
     return q_network, target_network, act_greedily, returns
 
 
-def evaluate(act: Callable, env_id: str, seed: int, episodes: int) -> list[float]:
+def evaluate(act: Callable[..., int], env_id: str, seed: int, episodes: int) -> list[float]:
     """Returns of episodes in which no action is random."""
     env, returns = gymnasium.make(env_id), []
     for episode in range(episodes):

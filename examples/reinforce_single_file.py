@@ -142,7 +142,7 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
     torch.set_num_threads(1)  # networks this small only lose by more
     torch.manual_seed(args.seed)
     rng = np.random.default_rng(args.seed)
-    env = gymnasium.make(args.env_id)
+    env: Any = gymnasium.make(args.env_id)
     size, actions = env.observation_space.shape[0], int(env.action_space.n)
     policy = policy_network(size, actions, args.policy_hidden)
     value = value_network(size, args.value_hidden)
@@ -230,7 +230,8 @@ if __name__ == "__main__":
     with SummaryWriter(f"runs/{name}") as writer:
         *_, act, _ = train(args, writer)
         # The robot repeats itself: from upright all greedy episodes would be one.
-        env = gymnasium.make(args.env_id, **({"noise": 0.02} if args.env_id == ROBOT else {}))
+        options: dict[str, Any] = {"noise": 0.02} if args.env_id == ROBOT else {}
+        env = gymnasium.make(args.env_id, **options)
         greedy = [run_episode(env, act, seed=1_000_000 + args.seed + k) for k in range(20)]
         env.close()
         returns = [sum(episode.rewards) for episode in greedy]

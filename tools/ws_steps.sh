@@ -144,14 +144,14 @@ make_extras() { pip_install base.txt extras.txt; }
 # --- catkin workspace ----------------------------------------------------------------------
 
 # What CMake reads, and the names of what it links to; sources are used where they are.
-PARTS=(CMakeLists.txt LICENSE README.md package.xml setup.py
+PARTS=(CMakeLists.txt LICENSE README.md package.xml pyproject.toml setup.py
     benchmark config docs launch rviz scripts src test urdf)  # of the package
 
 key_build() {
     key_place
     echo "${PARTS[@]}"
     cd -- "$ROOT"
-    find scripts src -mindepth 1 -maxdepth 1 ! -name __pycache__ 2>/dev/null | sort || true
+    find scripts src -mindepth 1 -maxdepth 1 ! -name __pycache__ ! -name '*.egg-info' 2>/dev/null | sort || true
     find CMakeLists.txt package.xml setup.py companions -type f ! -name '*.pyc' -print0 |
         sort -z | xargs -0 sha256sum
 }

@@ -1,5 +1,7 @@
 """The cart-pole's description: a cart that is moved along a rail, and a pole that swings on it."""
 
+import contextlib
+import importlib.util
 from pathlib import Path
 
 from cartpole.tasks import TASKS, CartPoleState
@@ -11,32 +13,35 @@ CART_LINK, POLE_LINK = "cart", "pole"
 CART_JOINT, POLE_JOINT = "stand_cart", "cart_pole"
 CONTROLLER = "stand_cart_position_controller"
 TREE = Path(__file__).resolve().parents[2]  # the source tree
+SHARE = Path(__file__).resolve().parent / "share"  # in a wheel (setup.py)
 
 
 def find_file(package: str, place: str) -> Path:
     """A file of one of the robot's ROS packages, found without a running ROS.
 
-    It lies in the source tree around this module or, once installed, where rospkg finds the package.
+    It lies in the source tree around this module; in a wheel beside this module; in a catkin workspace
+    that it was installed in, where rospkg finds the package.
 
     Args:
         package: the package's name.
         place: the file's path in it.
 
     Raises:
-        RobotEnvError: if it is in neither.
+        RobotEnvError: if it is in none of them.
     """
-    folder = TREE if package == "cartpole" else TREE / "companions" / package
-    if (folder / place).is_file():
-        return folder / place
-    try:
-        import rospkg  # not needed within the source tree, which may be used without ROS
+    source = TREE if package == "cartpole" else TREE / "companions" / package
+    for folder in (source, SHARE / package):
+        if (folder / place).is_file():
+            return folder / place
+    if importlib.util.find_spec("rospkg"):
+        import rospkg
 
-        return Path(rospkg.RosPack().get_path(package)) / place
-    except (ImportError, rospkg.ResourceNotFound) as error:
-        raise RobotEnvError(
-            f"package '{package}' is neither beside {TREE} nor on ROS_PACKAGE_PATH; "
-            "source the workspace that it is installed in"
-        ) from error
+        with contextlib.suppress(rospkg.ResourceNotFound):
+            return Path(rospkg.RosPack().get_path(package)) / place
+    raise RobotEnvError(
+        f"package '{package}' is neither beside {TREE} nor on ROS_PACKAGE_PATH; "
+        "source the workspace that it is installed in"
+    )
 
 
 def _urdf() -> Path:

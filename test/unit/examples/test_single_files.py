@@ -88,6 +88,7 @@ DQN = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flags", DQN.values(), ids=DQN.keys())
 def test_dqn_comes_to_the_weights_of_the_library(
     flags: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -118,6 +119,7 @@ REINFORCE = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flags", REINFORCE.values(), ids=REINFORCE.keys())
 def test_reinforce_comes_to_the_weights_of_the_library(
     flags: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -134,6 +136,7 @@ def test_reinforce_comes_to_the_weights_of_the_library(
         assert_same_weights(network, torch.load(tmp_path / f"run/{name}.pth", weights_only=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [["dqn_single_file.py", "--total-timesteps", "600"],

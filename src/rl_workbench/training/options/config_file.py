@@ -1,5 +1,7 @@
 """Tuned options in YAML: one file for each algorithm, one section for each environment."""
 
+import contextlib
+import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -9,25 +11,28 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.options import unknown
 
 TREE = Path(__file__).resolve().parents[4]
+SHARE = Path(__file__).resolve().parents[2] / "share"  # in a wheel (setup.py)
 
 
 def default_file(name: str) -> Path:
-    """The package's own config/<name>: in the source tree, or where rospkg finds the package.
+    """The project's own config/<name>.
+
+    It lies in the source tree around this module; in a wheel in its package; in a catkin workspace that
+    it was installed in, where rospkg finds the package.
 
     Raises:
-        WorkbenchError: if it is in neither.
+        WorkbenchError: if it is in none of them.
     """
-    path = TREE / "config" / name
-    if path.is_file():
-        return path
-    import rospkg  # the source tree may be used without ROS
+    for folder in (TREE, SHARE):
+        path = folder / "config" / name
+        if path.is_file():
+            return path
+    if importlib.util.find_spec("rospkg"):
+        import rospkg
 
-    try:
-        return Path(rospkg.RosPack().get_path("cartpole")) / "config" / name
-    except rospkg.ResourceNotFound as error:
-        raise WorkbenchError(
-            f"config/{name} is neither in {TREE} nor in a package on ROS_PACKAGE_PATH"
-        ) from error
+        with contextlib.suppress(rospkg.ResourceNotFound):
+            return Path(rospkg.RosPack().get_path("cartpole")) / "config" / name
+    raise WorkbenchError(f"config/{name} is neither in {TREE} nor in a package on ROS_PACKAGE_PATH")
 
 
 def read_section(path: Path, env_id: str | None, preset: str | None) -> dict[str, Any]:

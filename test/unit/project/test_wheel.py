@@ -1,0 +1,109 @@
+"""In-process work needs no ROS: the wheel trains in a plain virtual environment."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import venv
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+SOURCES = ("src", "config", "urdf", "companions", "requirements")
+ROS = ("rospy", "roslib", "rosgraph", "rospkg", "catkin_pkg", "gazebo_msgs", "bullet_gazebo_msgs")
+
+
+def run(*command: str | Path, cwd: Path) -> str:
+    """Runs a command of somebody who has sourced nothing; returns what it printed."""
+    done = subprocess.run(
+        command,
+        cwd=cwd,
+        env={"PATH": "/usr/bin:/bin", "HOME": str(cwd), "OMP_NUM_THREADS": "1"},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stdout[-3000:]
+    return done.stdout
+
+
+def pip(python: Path, *arguments: str | Path, cwd: Path) -> None:
+    # pip's own settings may say where packages come from, which counts here as everywhere else.
+    settings = [f"{name}={value}" for name, value in os.environ.items() if name.startswith("PIP_")]
+    run("env", *settings, python, "-m", "pip", "--disable-pip-version-check", *arguments, cwd=cwd)
+
+
+@pytest.fixture(scope="module")
+def python(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A plain virtual environment's Python, the wheel with all that it requires installed there.
+
+    The heavy packages aren't fetched again: a .pth file shows those of the workspace's virtual
+    environment, where pip finds them installed. It holds nothing of ROS, and none of ours.
+    """
+    folder = tmp_path_factory.mktemp("wheel")
+    sources = folder / "sources"  # a build leaves files behind
+    sources.mkdir()
+    for path in root.iterdir():
+        if path.is_file():
+            shutil.copy(path, sources)
+    for name in SOURCES:
+        shutil.copytree(
+            root / name, sources / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info")
+        )
+    venv.create(folder / "venv", with_pip=True, system_site_packages=False)
+    python = folder / "venv/bin/python3"
+    packages = sysconfig.get_path("purelib")
+    (folder / "venv/lib" / Path(packages).parent.name / "site-packages/workspace.pth").write_text(
+        packages
+    )
+    pip(python, "wheel", "--no-deps", "--wheel-dir", folder, sources, cwd=folder)
+    (wheel,) = folder.glob("cartpole-*.whl")
+    pip(python, "install", wheel, cwd=folder)
+    return python
+
+
+def test_there_is_no_ros(python: Path, tmp_path: Path) -> None:
+    find = f"import importlib.util as u; print([n for n in {ROS} if u.find_spec(n)])"
+    assert run(python, "-c", find, cwd=tmp_path) == "[]\n"
+
+
+def test_all_libraries_come_from_the_wheel(python: Path, tmp_path: Path) -> None:
+    code = "import cartpole, robot_envs, rl_workbench, bullet_gazebo.simulator as s; print(cartpole, s)"
+    printed = run(python, "-c", code, cwd=tmp_path)
+    assert printed.count(str(python.parents[1] / "lib")) == 2
+
+
+def test_the_robot_moves_as_in_the_workspace(python: Path, tmp_path: Path) -> None:
+    code = (
+        "import gymnasium, cartpole; env = gymnasium.make('cartpole/Balance-v0'); env.reset(seed=0);"
+        "print([env.step(k % 2)[0].tolist() for k in range(20)])"
+    )
+    ours = run(sys.executable, "-c", f"import sys; sys.path = {sys.path}; {code}", cwd=tmp_path)
+    assert len(ours.splitlines()[-1].split(",")) == 80
+    assert run(python, "-c", code, cwd=tmp_path).splitlines()[-1] == ours.splitlines()[-1]
+
+
+def test_rl_workbench_trains(python: Path, tmp_path: Path) -> None:
+    command = python.with_name("rl-workbench")
+    flags = ["--env-id", "cartpole:cartpole/Classic-v0", "--total-timesteps", "600", "--run-dir", "run"]
+    run(command, "train", "--algo", "dqn", *flags, cwd=tmp_path)
+    summary = json.loads((tmp_path / "run/summary.json").read_text())
+    assert summary["steps"] == 600
+    assert "mean" in run(command, "eval", "run", "--episodes", "2", cwd=tmp_path)
+
+
+def test_cartpole_pg_trains(python: Path, tmp_path: Path) -> None:
+    command = python.with_name("cartpole-pg")
+    run(command, "--backend", "bullet", "--episodes", "3", "--run-dir", "run", cwd=tmp_path)
+    summary = json.loads((tmp_path / "run/summary.json").read_text())
+    assert len(summary["lengths"]) == 3
+    assert (tmp_path / "run/policy_network.pth").is_file()
