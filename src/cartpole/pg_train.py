@@ -5,6 +5,7 @@ import contextlib
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from importlib.util import find_spec
 from typing import Any
 
 from cartpole.registration import NAMESPACE
@@ -34,9 +35,9 @@ class RobotOptions:
     """
 
     backend: str = option(
-        "ros", "ros: the robot in a simulator over ROS, which is started if none runs; bullet: in "
-        "this process, with the same bits, several times as fast, and no ROS needed",
-        choices=("ros", "bullet"),
+        "", "ros: the robot in a simulator over ROS, which is started if none runs; bullet: in this "
+        "process, with the same bits, several times as fast; ros where ROS is installed",
+        choices=("", "ros", "bullet"),
     )  # fmt: skip
     realtime: bool = option(False, "let the world run by itself, as the existing script does")
     start_noise: float = option(
@@ -60,7 +61,8 @@ class RobotOptions:
         """What it comes to as options of the environment."""
         noise = {"noise": self.start_noise} if self.start_noise else {}
         if not self.realtime:
-            return {"backend": self.backend, **noise}
+            installed = "ros" if find_spec("rospy") else "bullet"
+            return {"backend": self.backend or installed, **noise}
         # The newest joint state, without waiting for another one: as the existing script does.
         return {"backend": "ros-realtime", "control_period": None, **noise}
 

@@ -1,6 +1,7 @@
 """The command workbench.py: rl_workbench's command line, with the cart-pole's environments."""
 
 import sys
+from pathlib import Path
 
 from rl_workbench import cli
 
@@ -11,7 +12,7 @@ def main(argv: list[str] | None = None) -> int:
     """Does what the arguments say; returns the process's exit code."""
     argv = sys.argv[1:] if argv is None else argv
     plain = [each for each in argv if not (each.startswith("__") and ":=" in each)]  # roslaunch's
-    return cli.main(plain, "workbench.py", PROGRAM)
+    return cli.main(plain, Path(sys.argv[0]).name, PROGRAM)
 
 
 if __name__ == "__main__":

@@ -94,7 +94,14 @@ def test_the_robot_moves_as_in_the_workspace(python: Path, tmp_path: Path) -> No
 
 def test_rl_workbench_trains(python: Path, tmp_path: Path) -> None:
     command = python.with_name("rl-workbench")
-    flags = ["--env-id", "cartpole:cartpole/Classic-v0", "--total-timesteps", "600", "--run-dir", "run"]
+    flags = [
+        "--env-id",
+        "cartpole:cartpole/Classic-v0",
+        "--total-timesteps",
+        "600",
+        "--run-dir",
+        "run",
+    ]
     run(command, "train", "--algo", "dqn", *flags, cwd=tmp_path)
     summary = json.loads((tmp_path / "run/summary.json").read_text())
     assert summary["steps"] == 600
