@@ -76,8 +76,3 @@ class RunOptions:
     def evaluation_environment(self) -> dict[str, Any]:
         """And of the one in which the policy is evaluated meanwhile."""
         return self.training_environment | self.eval_env_kwargs
-
-    @property
-    def policy_environment(self) -> dict[str, Any]:
-        """And of the one in which a learned policy is looked at afterwards."""
-        return self.env_kwargs | self.eval_env_kwargs
