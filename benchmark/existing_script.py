@@ -25,7 +25,9 @@ import uuid
 from pathlib import Path
 from typing import Any
 
-from rl_workbench.training.run.learning_curve import learning_curve
+from rl_workbench.curves import learning_curve
+from rl_workbench.figure import as_png
+from rl_workbench.training.run.files import write_file
 
 ROOT = Path(__file__).resolve().parent.parent
 SCRIPT = ROOT.parent / "shared" / "pg_script" / "launch_robot_test.py"
@@ -191,7 +193,8 @@ def main() -> int:
     result = run(chosen.script.resolve(), chosen.episodes, folder)
     (chosen.out / "existing_script.json").write_text(json.dumps(result, indent=1) + "\n")
     title = "the existing script, unchanged, in real time"
-    learning_curve(chosen.out / "existing_script.png", result["lengths"], result["returns"], title)
+    figure = learning_curve(result["lengths"], result["returns"], title)
+    write_file(chosen.out / "existing_script.png", as_png(figure))
     print(report(result))
     return 1 if result["processes_left"] else 0
 

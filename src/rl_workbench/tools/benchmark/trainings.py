@@ -1,6 +1,5 @@
 """Trainings as processes of their own, like a user's: several at a time, each on one core."""
 
-import json
 import os
 import shutil
 import socket
@@ -16,13 +15,12 @@ from typing import Any
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.benchmark.suites import Variant, arguments
-from rl_workbench.tools.runs.runs import SUMMARY
+from rl_workbench.tools.runs.runs import SUMMARY, cost_file, cost_of, read_leniently
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.checkpoints import LAST
+from rl_workbench.training.run.files import as_json, write_file
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.results import write_json
 
-COST = "cost.json"  # beside the run's folder
 # One core each; the networks are too small to gain by more.
 ONE_CORE = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 LOOK_EVERY = 0.2  # [s] at the user's Ctrl-C
@@ -41,41 +39,24 @@ class Job:
         """What the training said."""
         return self.folder.with_name(f"{self.folder.name}.log")
 
-    @property
-    def cost_file(self) -> Path:
-        """What the processes took."""
-        return self.folder.with_name(f"{self.folder.name}.{COST}")
-
     def summary(self) -> dict[str, Any]:
         """What the run wrote at its end; empty if it has none."""
-        return _read(self.folder / SUMMARY)
+        return read_leniently(self.folder / SUMMARY)
 
     def is_done(self) -> bool:
         """Whether there is nothing left to train."""
         return bool(self.summary().get("complete"))
-
-    def cost(self) -> dict[str, Any]:
-        """Seconds of the clock and of the processor, for the whole command, and when it ran."""
-        return _read(self.cost_file)
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return content
 
 
 class Trainings:
     """Runs jobs, each as a process.
 
     Args:
-        say: is told of the end of each.
+        report: is told of the end of each.
     """
 
-    def __init__(self, say: Callable[[str], None]) -> None:
-        self._say = say
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self._report = report
         self._lock = Lock()
         self._running: set[int] = set()  # process ids
         self._stopped = False
@@ -134,18 +115,19 @@ class Trainings:
             _, status, usage = os.wait4(process.pid, 0)
             self._running.discard(process.pid)
         process.returncode = os.waitstatus_to_exitcode(status)
-        self._note(job, (began, time.time()), usage.ru_utime + usage.ru_stime)
-        self._say(_told(job, process.returncode))
+        _add_cost(job, (began, time.time()), usage.ru_utime + usage.ru_stime)
+        self._report(_outcome(job, process.returncode))
 
-    def _note(self, job: Job, span: tuple[float, float], cpu_seconds: float) -> None:
-        """Adds to what earlier parts of an interrupted training took."""
-        before = job.cost()
-        cost = {
-            "command_seconds": round(before.get("command_seconds", 0.0) + span[1] - span[0], 1),
-            "cpu_seconds": round(before.get("cpu_seconds", 0.0) + cpu_seconds, 1),
-            "spans": [*before.get("spans", []), [round(each, 1) for each in span]],
-        }
-        write_json(job.cost_file, cost)
+
+def _add_cost(job: Job, span: tuple[float, float], cpu_seconds: float) -> None:
+    """Adds to what earlier parts of an interrupted training took."""
+    before = cost_of(job.folder)
+    cost = {
+        "command_seconds": round(before.get("command_seconds", 0.0) + span[1] - span[0], 1),
+        "cpu_seconds": round(before.get("cpu_seconds", 0.0) + cpu_seconds, 1),
+        "spans": [*before.get("spans", []), [round(each, 1) for each in span]],
+    }
+    write_file(cost_file(job.folder), as_json(cost))
 
 
 def own_master() -> dict[str, str]:
@@ -169,7 +151,7 @@ def command(job: Job) -> list[str]:
     return [*begin, *arguments(job.variant, job.seed, job.folder)]
 
 
-def _told(job: Job, code: int) -> str:
+def _outcome(job: Job, code: int) -> str:
     name = f"{job.variant.name}, seed {job.seed}"
     summary = job.summary()
     if code or not summary:

@@ -1,21 +1,19 @@
 """benchmark: one training or several variants of it, over several seeds."""
 
 import argparse
-import contextlib
 import datetime
 import json
 import os
 import platform
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-
+from rl_workbench.curves import evaluation_curves, seed_curves
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.algorithms import ALGORITHMS, DQN
-from rl_workbench.tools.benchmark import benchmark
+from rl_workbench.tools.benchmark import tables
+from rl_workbench.tools.benchmark.results import RunResult, examine
 from rl_workbench.tools.benchmark.suites import (
     SEEDS,
     Suite,
@@ -24,17 +22,23 @@ from rl_workbench.tools.benchmark.suites import (
     read_suite,
 )
 from rl_workbench.tools.benchmark.trainings import Job, Trainings
-from rl_workbench.tools.commands.shared import number
-from rl_workbench.tools.pictures.curves import learning_curves
-from rl_workbench.tools.pictures.panels import evaluation_panels
+from rl_workbench.tools.commands.shared import number, write_figure
+from rl_workbench.tools.pictures.panels import seed_panels, variant_panels
 from rl_workbench.tools.runs.players import warn
 from rl_workbench.tools.runs.runs import Run, open_run, threshold
 from rl_workbench.training.options.options import key_values
 from rl_workbench.training.run import folder as run_folder
+from rl_workbench.training.run.files import as_json, as_text, write_file
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.results import write_figure, write_file, write_json
 
 RECORD = "suite.json"
+
+
+class _Hint(argparse.Action):
+    """A flag of `train` and `sweep`, which somebody may expect here."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        parser.error(f"{self.option_strings[0]} is an option of the training: {self.metavar}")
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
@@ -56,6 +60,8 @@ def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
     add("--out", type=Path, metavar="FOLDER",
         help="for runs, tables and curves; one that was interrupted is gone on with "
         "(runs/benchmark/SUITE)")  # fmt: skip
+    add("--total-timesteps", nargs="?", action=_Hint, help=argparse.SUPPRESS,
+        metavar="--params total_timesteps=N, or the suite's own")  # fmt: skip
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
@@ -78,15 +84,15 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     ]
     with run_folder.held(folder):
         interrupt.defer()
-        Trainings(_say).run(jobs, arguments.jobs, interrupt)
+        Trainings(_tell).run(jobs, arguments.jobs, interrupt)
         if interrupt.requested():
-            _say("interrupted; the same command goes on")
+            _tell("interrupted; the same command goes on")
             return
         interrupt.at_once()  # what follows takes minutes, and can be made again
         _report(folder, suite, jobs, arguments)
 
 
-def _say(text: str) -> None:
+def _tell(text: str) -> None:
     print(text, flush=True)
 
 
@@ -117,7 +123,7 @@ def _claim(folder: Path, suite: Suite) -> None:
     except FileNotFoundError:
         if folder.is_dir() and any(folder.iterdir()):
             raise WorkbenchError(f"{folder} holds something else; name another folder") from None
-        write_json(path, wanted)
+        write_file(path, as_json(wanted))
         return
     except (OSError, ValueError) as error:
         raise WorkbenchError(f"can't read {path}: {error}") from error
@@ -126,55 +132,57 @@ def _claim(folder: Path, suite: Suite) -> None:
 
 
 def _report(folder: Path, suite: Suite, jobs: list[Job], arguments: argparse.Namespace) -> None:
-    runs = _readable(jobs)
-    rows = [benchmark.examine(job, arguments.episodes, warn) for job in jobs]
-    if all(row.steps is None for row in rows):
+    runs, results = _examine(jobs, arguments.episodes)
+    if all(each.steps is None for each in results):
         raise WorkbenchError(f"no training came to anything; see {jobs[0].log}")
-    lines = {run.experiment: threshold(run.env_id) for run in runs}
-    tables = [benchmark.summary_table(rows, lines), benchmark.table(rows)]
-    head = f"# {suite.name}\n\n{suite.about}\n\n{_machine(arguments, set(lines.values()))}"
-    text = "\n\n".join([head, *tables]) + "\n"
-    write_file(folder / "results.md", lambda stream: stream.write(text.encode()))
-    write_json(folder / "results.json", _content(rows, arguments))
-    for name, draw in (("curves", learning_curves), ("evaluations", evaluation_panels)):
-        _draw(folder / f"{name}.png", draw, runs)
-    _say("\n\n".join(reversed(tables)))
-    _say(f"\ntables, figures and curves lie in {folder}")
+    thresholds = {run.experiment: threshold(run.env_id) for run in runs}
+    summary = tables.summary_table(tables.grouped(results), tables.BENCHMARK_SUMMARY, thresholds)
+    every = tables.table(results, tables.BENCHMARK)
+    about = _machine(arguments, set(thresholds.values()))
+    text = f"# {suite.name}\n\n{suite.about}\n\n{about}\n\n{summary}\n\n{every}\n"
+    write_file(folder / "results.md", as_text(text))
+    write_file(folder / "results.json", as_json(_content(results, arguments)))
+    for name, panels, draw in (
+        ("curves.png", seed_panels, seed_curves),
+        ("evaluations.png", variant_panels, evaluation_curves),
+    ):
+        try:  # a picture that can't be drawn costs no table
+            figure = draw(panels(runs))
+        except WorkbenchError as error:
+            warn(f"no {name}: {error}")
+        else:
+            write_figure(folder / name, figure)
+    _tell(f"{every}\n\n{summary}\n\ntables, figures and curves lie in {folder}")
 
 
-def _draw(path: Path, draw: Callable[[list[Run]], Figure], runs: list[Run]) -> None:
-    """A picture that can't be drawn costs no table."""
-    try:
-        figure = draw(runs)
-    except WorkbenchError as error:
-        warn(f"no {path.name}: {error}")
-        return
-    write_figure(path, figure)
-
-
-def _readable(jobs: list[Job]) -> list[Run]:
-    """The runs whose record can be read; the row of each other one says why not."""
-    found = []
+def _examine(jobs: list[Job], episodes: int) -> tuple[list[Run], list[RunResult]]:
+    """The runs whose record can be read, and a row of figures for every job."""
+    runs, results = [], []
     for job in jobs:
-        with contextlib.suppress(WorkbenchError):
-            found.append(open_run(job.folder))
-    return found
+        name = job.variant.name
+        try:
+            runs.append(open_run(job.folder))
+        except WorkbenchError as error:
+            results.append(RunResult(name, job.seed, job.folder.name, fault=str(error)))
+        else:
+            results.append(examine(runs[-1], name, episodes, warn, also_last=True))
+    return runs, results
 
 
-def _machine(arguments: argparse.Namespace, lines: set[float | None]) -> str:
+def _machine(arguments: argparse.Namespace, thresholds: set[float | None]) -> str:
     about = f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
-    solved = "".join(f" Solved: {line:g}." for line in lines if line is not None)
+    solved = "".join(f" Solved: {line:g}." for line in thresholds if line is not None)
     return (
         f"{datetime.date.today().isoformat()}, {about}, {arguments.jobs} at a time. Best and final: "
         f"mean return of {arguments.episodes} greedy episodes that nothing was chosen by.{solved}"
     )
 
 
-def _content(rows: list[benchmark.Row], arguments: argparse.Namespace) -> dict[str, Any]:
+def _content(results: list[RunResult], arguments: argparse.Namespace) -> dict[str, Any]:
     return {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "versions": run_folder.versions(),
         "episodes": arguments.episodes,
         "jobs": arguments.jobs,
-        "runs": benchmark.content(rows),
+        "runs": tables.rows(results, tables.BENCHMARK),
     }

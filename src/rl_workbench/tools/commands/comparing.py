@@ -1,23 +1,17 @@
 """compare: groups of runs against each other."""
 
 import argparse
-from dataclasses import asdict
 from pathlib import Path
 
-from rl_workbench.tools.benchmark.comparison import (
-    Row,
-    by_group,
-    examine,
-    statistics_of,
-    summary_table,
-    table,
-)
-from rl_workbench.tools.commands.shared import number
-from rl_workbench.tools.pictures.curves import learning_curves
+from rl_workbench.curves import seed_curves
+from rl_workbench.tools.benchmark import tables
+from rl_workbench.tools.benchmark.results import RunResult, examine
+from rl_workbench.tools.commands.shared import number, write_figure
+from rl_workbench.tools.pictures.panels import seed_panels
 from rl_workbench.tools.runs.players import WHICH, warn
 from rl_workbench.tools.runs.runs import find_runs
+from rl_workbench.training.run.files import as_json, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.results import check_writable, write_figure, write_json
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
@@ -41,25 +35,34 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     for path in filter(None, (arguments.out, arguments.json)):
         check_writable(path)
     runs = find_runs(arguments.runs, warn)
-    rows = [examine(run, arguments.episodes, arguments.checkpoint, warn) for run in runs]
-    groups = by_group(rows)
-    ordered = [row for each in groups.values() for row in each]
-    print(f"{table(ordered)}\n\n{summary_table(groups)}", flush=True)
+    results = [
+        # The seeds of one experiment and environment are compared with those of another.
+        examine(
+            run, f"{run.experiment} in {run.env_id}", arguments.episodes, warn, arguments.checkpoint
+        )
+        for run in runs
+    ]
+    results.sort(key=lambda result: (result.group, result.seed, result.run))
+    groups = tables.grouped(results)
+    print(tables.table(results, tables.COMPARE), end="\n\n")
+    print(tables.summary_table(groups, tables.COMPARE_SUMMARY), flush=True)
     if arguments.json:
-        write_json(arguments.json, _content(arguments, groups))
+        write_file(arguments.json, as_json(_content(arguments, groups)))
     if arguments.out:
-        write_figure(arguments.out, learning_curves(runs))
+        write_figure(arguments.out, seed_curves(seed_panels(runs)))
 
 
-def _content(arguments: argparse.Namespace, groups: dict[str, list[Row]]) -> dict[str, object]:
+def _content(
+    arguments: argparse.Namespace, groups: dict[str, list[RunResult]]
+) -> dict[str, object]:
     kind = f"mean of {arguments.episodes} greedy episodes, {arguments.checkpoint} checkpoint"
     return {
         "score": kind if arguments.episodes else "mean of the last 100 training episodes",
         "groups": {
             name: {
-                "statistics": found._asdict() if (found := statistics_of(rows)) else None,
-                "runs": [asdict(row) for row in rows],
+                "statistics": found._asdict() if (found := tables.statistics_of(results)) else None,
+                "runs": tables.rows(results, tables.COMPARE),
             }
-            for name, rows in groups.items()
+            for name, results in groups.items()
         },
     }

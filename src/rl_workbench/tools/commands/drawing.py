@@ -3,14 +3,15 @@
 import argparse
 from pathlib import Path
 
-from rl_workbench.tools.commands.shared import add_policy_flags, env_options
-from rl_workbench.tools.pictures.state_plane import plane_of, policy_picture
-from rl_workbench.tools.pictures.training_curves import training_curves
+from rl_workbench.curves import STEPS, training_curves
+from rl_workbench.tools.commands.shared import add_policy_flags, env_options, write_figure
+from rl_workbench.tools.pictures.panels import run_panels
+from rl_workbench.tools.pictures.policy_map import policy_map, state_plane
 from rl_workbench.tools.runs.episodes import TEST_SEED
 from rl_workbench.tools.runs.players import load_player, warn
 from rl_workbench.tools.runs.runs import find_runs, open_run
+from rl_workbench.training.run.files import check_writable
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.results import check_writable, write_figure
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
@@ -31,8 +32,9 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         WorkbenchError: if something is wrong with a run or the file.
     """
     if arguments.command == "plot":
-        runs = find_runs(arguments.runs, warn)
-        write_figure(arguments.out, training_curves(runs, arguments.over))
+        panels = run_panels(find_runs(arguments.runs, warn), arguments.over)
+        across = "episode" if arguments.over == "episodes" else STEPS
+        write_figure(arguments.out, training_curves(panels, across))
     else:
         _policy(arguments)
     print(arguments.out)
@@ -40,11 +42,12 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
 
 def _policy(arguments: argparse.Namespace) -> None:
     run = open_run(arguments.run)
-    plane_of(run)  # other environments are refused before anything is loaded
+    plane = state_plane(run.env_id)  # other environments are refused before anything is loaded
     check_writable(arguments.out)
     player = load_player(run, arguments.checkpoint, env_options(arguments))
+    title = f"policy of {run.label}; cart in the middle, at rest"
     try:
-        figure = policy_picture(run, player, TEST_SEED + arguments.seed)
+        figure = policy_map(plane, player, TEST_SEED + arguments.seed, title)
     finally:
         player.env.close()
     write_figure(arguments.out, figure)

@@ -1,11 +1,16 @@
-"""Flags that several subcommands have."""
+"""What several subcommands have: flags, and pictures as files."""
 
 import argparse
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.figure import as_png
 from rl_workbench.tools.runs.players import WHICH
 from rl_workbench.training.dqn.settings import OPTIONS
+from rl_workbench.training.run.files import write_file
 
 
 def add_policy_flags(parser: argparse.ArgumentParser) -> None:
@@ -40,3 +45,14 @@ def number(lowest: int) -> Any:
 
     whole.__name__ = "whole number"  # argparse's word for it
     return whole
+
+
+def write_figure(path: Path, figure: Figure) -> None:
+    """Writes a picture as PNG.
+
+    Raises:
+        WorkbenchError: if the disk refuses, or the name says another format.
+    """
+    if path.suffix.lower() != ".png":
+        raise WorkbenchError(f"pictures are PNG: name one that ends in .png, not {path}")
+    write_file(path, as_png(figure))

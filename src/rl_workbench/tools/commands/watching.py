@@ -7,15 +7,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cartpole.envs.display import hindrance
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.commands.shared import add_policy_flags, env_options, number
-from rl_workbench.tools.pictures.films import GIF_RATE, MP4_RATE, check_format, film, write_film
-from rl_workbench.tools.runs.episodes import TEST_SEED, figures, play, table, verdict
+from rl_workbench.tools.pictures import videos
+from rl_workbench.tools.runs import episodes
 from rl_workbench.tools.runs.players import Player, load_player
 from rl_workbench.tools.runs.runs import Run, open_run, threshold
+from rl_workbench.training.run.files import as_json, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.results import check_writable, write_json
+
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")  # any of them names one
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
@@ -63,48 +64,48 @@ def _eval(arguments: argparse.Namespace, run: Run) -> None:
         check_writable(arguments.json)
     player = _player(arguments, run)
     try:
-        result = play(player, arguments.episodes, arguments.seed)
+        result = episodes.play(player, arguments.episodes, arguments.seed)
     finally:
         player.env.close()
     line = threshold(run.env_id)
-    found = {"run": str(run.folder), **figures(result, player.checkpoint, line)}
+    found = {"run": str(run.folder), **episodes.statistics(result, player.checkpoint, line)}
     # With the figures on standard output, what people read goes beside it.
     stream = sys.stderr if to_stdout else sys.stdout
-    print(table(result), file=stream)
-    print(verdict(found, line), file=stream)
+    print(episodes.lines(result), file=stream)
+    print(episodes.summary(found, line), file=stream)
     if to_stdout:
         print(json.dumps(found, indent=1))
     elif arguments.json:
-        write_json(arguments.json, found)
+        write_file(arguments.json, as_json(found))
 
 
 def _enjoy(arguments: argparse.Namespace, run: Run) -> None:
-    reason = hindrance()
-    if reason:
+    if not any(os.environ.get(name) for name in DISPLAYS):
         raise WorkbenchError(
-            f"enjoy needs a display to open a window on, and {reason}; "
+            "enjoy needs a display to open a window on, and DISPLAY isn't set; "
             f"record {arguments.run} --out episode.gif shows it without one"
         )
     player = _player(arguments, run, render_mode="human")
     try:
-        print(table(play(player, arguments.episodes, arguments.seed)))
+        print(episodes.lines(episodes.play(player, arguments.episodes, arguments.seed)))
     finally:
         player.env.close()
 
 
 def _record(arguments: argparse.Namespace, run: Run) -> None:
-    check_format(arguments.out)
+    videos.check_format(arguments.out)
     check_writable(arguments.out)
-    if hindrance():  # pygame would look for a screen, and complain that there is none
-        os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # or pygame would look for a screen
     player = _player(arguments, run, render_mode="rgb_array")
-    fastest = GIF_RATE if arguments.out.suffix.lower() == ".gif" else MP4_RATE
+    fastest = videos.GIF_RATE if arguments.out.suffix.lower() == ".gif" else videos.MP4_RATE
     try:
-        shown = film(player, TEST_SEED + arguments.seed, fastest, arguments.max_steps)
+        video = videos.record_episode(
+            player, episodes.TEST_SEED + arguments.seed, fastest, arguments.max_steps
+        )
     finally:
         player.env.close()
-    write_film(arguments.out, shown, arguments.scale)
+    videos.write_video(arguments.out, video, arguments.scale)
     print(
-        f"{arguments.out}: return {shown.total_reward:.2f} in {shown.length} steps, "
-        f"{len(shown.frames)} frames, {len(shown.frames) / shown.rate:.1f} s"
+        f"{arguments.out}: return {video.total_reward:.2f} in {video.length} steps, "
+        f"{len(video.frames)} frames, {len(video.frames) / video.rate:.1f} s"
     )

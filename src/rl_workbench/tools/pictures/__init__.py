@@ -1,1 +1,1 @@
-"""Curves, panels, policies and films."""
+"""Panels of curves, policies over the state plane, and videos."""

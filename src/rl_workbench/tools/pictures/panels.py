@@ -1,64 +1,101 @@
-"""Evaluations during the training, a panel for each variant, with the first one in grey behind it."""
+"""Which runs share the axes of a picture, and by which names."""
 
-import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
+from rl_workbench.curves import Panel, SeedCurve
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.tools.pictures.curves import draw_band
-from rl_workbench.tools.runs.runs import Run, evaluation_curve, threshold
-from rl_workbench.training.run.results import new_figure
+from rl_workbench.tools.runs.runs import (
+    Curve,
+    Run,
+    evaluation_curve,
+    summary_of,
+    threshold,
+    training_curve,
+)
 
-COLUMNS = 4
-SIZE = (3.2, 2.4)  # [inches] of a panel
+
+def run_panels(runs: Sequence[Run], over: str) -> list[Panel]:
+    """Every run by itself, a panel for each environment.
+
+    Args:
+        over: "episodes" or "steps".
+
+    Raises:
+        WorkbenchError: if a run has no episode yet.
+    """
+    short = {run.folder: f"{run.experiment}, seed {run.seed}" for run in runs}
+    count = Counter((run.env_id, short[run.folder]) for run in runs)
+
+    def name(run: Run) -> str:
+        found = short[run.folder]
+        return found if count[run.env_id, found] == 1 else f"{found} ({run.name})"
+
+    def curve(run: Run) -> SeedCurve:
+        found = training_curve(run)
+        episodes = np.arange(1.0, len(found.values) + 1.0)
+        return SeedCurve(found.steps if over == "steps" else episodes, found.values)
+
+    return _panels(runs, name, curve)
 
 
-def evaluation_panels(runs: Sequence[Run]) -> Figure:
-    """Mean return of greedy evaluations over the training's steps: means over seeds, 95 % bands.
+def seed_panels(runs: Sequence[Run]) -> list[Panel]:
+    """The returns of experiments over their seeds, a panel for each environment.
+
+    Raises:
+        WorkbenchError: if no run has an episode.
+    """
+
+    def curve(run: Run) -> SeedCurve | None:
+        try:
+            return _seed_curve(run, training_curve(run))
+        except WorkbenchError:
+            return None  # the table names it
+
+    panels = _panels(runs, lambda run: run.experiment, curve)
+    if not panels:
+        raise WorkbenchError("no episode has ended yet in any of these runs")
+    return panels
+
+
+def variant_panels(runs: Sequence[Run]) -> list[Panel]:
+    """The evaluations of experiments over their seeds, a panel for each experiment.
 
     Raises:
         WorkbenchError: if nothing was evaluated.
     """
-    variants = {
-        name: curves
-        for name in dict.fromkeys(run.experiment for run in runs)
-        if (curves := _curves([run for run in runs if run.experiment == name]))
-    }
-    if not variants:
+
+    def curve(run: Run) -> SeedCurve | None:
+        found = evaluation_curve(run)
+        return _seed_curve(run, found) if len(found.values) else None
+
+    panels = _panels(runs, lambda run: run.experiment, curve, apart=True)
+    if not panels:
         raise WorkbenchError("none of these runs was evaluated")
-    columns = min(COLUMNS, len(variants))
-    rows = math.ceil(len(variants) / columns)
-    figure = new_figure(max(SIZE[0] * columns, 6.0), SIZE[1] * rows + 0.6)
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    first, behind = next(iter(variants.items()))
-    lines = {run.experiment: threshold(run.env_id) for run in runs}
-    for axes, (name, curves) in zip(grid.flat, variants.items(), strict=False):
-        if name != first:
-            draw_band(axes, behind, "tab:gray", first)
-        draw_band(axes, curves, "tab:blue", name)
-        _finish(axes, f"{name} ({len(curves)} seeds)", lines[name])
-    for axes in grid.flat[len(variants) :]:
-        axes.set_axis_off()
-    figure.supxlabel("step of the environment", fontsize="medium")
-    figure.supylabel("return of greedy episodes", fontsize="medium")
-    if len(variants) > 1:
-        figure.suptitle(
-            f"blue: the variant, grey: {first}; bands: 95 % of the mean", fontsize="medium"
-        )
-    return figure
+    return panels
 
 
-def _curves(runs: Sequence[Run]) -> list[tuple[np.ndarray, np.ndarray]]:
-    found = [evaluation_curve(run) for run in runs]
-    return [(curve.steps, curve.values) for curve in found if len(curve.values)]
+def _seed_curve(run: Run, curve: Curve) -> SeedCurve:
+    return SeedCurve(curve.steps, curve.values, bool(summary_of(run).get("complete")))
 
 
-def _finish(axes: Axes, title: str, line: float | None) -> None:
-    axes.set_title(title, fontsize="small")
-    axes.grid(alpha=0.3)
-    axes.tick_params(labelsize="x-small")
-    if line is not None:
-        axes.axhline(line, color="tab:red", linestyle="--", linewidth=0.8)
+def _panels(
+    runs: Sequence[Run],
+    name_of: Callable[[Run], str],
+    curve_of: Callable[[Run], SeedCurve | None],
+    apart: bool = False,
+) -> list[Panel]:
+    """A panel for each environment, in the order in which they appear, of runs that have a curve.
+
+    Args:
+        apart: also one for each name.
+    """
+    found: dict[tuple[str, str], dict[str, list[SeedCurve]]] = {}
+    for run in runs:
+        name, curve = name_of(run), curve_of(run)
+        if curve is not None:
+            panel = found.setdefault((run.env_id, name if apart else ""), {})
+            panel.setdefault(name, []).append(curve)
+    return [Panel(env_id, groups, threshold(env_id)) for (env_id, _), groups in found.items()]

@@ -1,5 +1,7 @@
-"""`eval`: greedy episodes of a run's policy, and their figures."""
+"""Greedy episodes of a run's policy, and their figures."""
 
+from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +28,26 @@ def play(player: Player, episodes: int, seed: int) -> Evaluation:
     return result
 
 
-def figures(result: Evaluation, checkpoint: Path, threshold: float | None) -> dict[str, Any]:
+def greedy_steps(
+    player: Player, seed: int, longest: int = 0
+) -> Iterator[tuple[np.ndarray, float, bool]]:
+    """One greedy episode: observation, reward and whether it is over, from the reset on.
+
+    Args:
+        longest: number of steps after which it is cut off; 0: never.
+    """
+    observation, _ = player.env.reset(seed=seed)
+    yield observation, 0.0, False
+    for length in count(1):
+        action = player.act(np.asarray(observation, np.float32))
+        observation, reward, terminated, truncated, _ = player.env.step(action)
+        finished = terminated or truncated or length == longest
+        yield observation, float(reward), finished
+        if finished:
+            return
+
+
+def statistics(result: Evaluation, checkpoint: Path, threshold: float | None) -> dict[str, Any]:
     """Plain numbers, for JSON."""
     returns = np.array(result.returns)
     return {
@@ -42,7 +63,7 @@ def figures(result: Evaluation, checkpoint: Path, threshold: float | None) -> di
     }
 
 
-def table(result: Evaluation) -> str:
+def lines(result: Evaluation) -> str:
     """A line for each episode."""
     rows = zip(result.returns, result.lengths, strict=True)
     return "\n".join(
@@ -51,7 +72,7 @@ def table(result: Evaluation) -> str:
     )
 
 
-def verdict(found: dict[str, Any], threshold: float | None) -> str:
+def summary(found: dict[str, Any], threshold: float | None) -> str:
     """The line that sums it up."""
     line = f"mean {found['mean']:.2f} ± {found['std']:.2f} over {found['episodes']} greedy episodes"
     line += f" (min {found['min']:.2f}, max {found['max']:.2f})"

@@ -113,27 +113,46 @@ def summary_of(run: Run) -> dict[str, Any]:
     return _read_json(run.folder / SUMMARY) or {}
 
 
-def find_runs(patterns: Sequence[str], say: Callable[[str], None]) -> list[Run]:
+def cost_file(folder: Path) -> Path:
+    """Beside a run's folder: what its processes took, if `benchmark` trained it."""
+    return folder.with_name(f"{folder.name}.cost.json")
+
+
+def cost_of(folder: Path) -> dict[str, Any]:
+    """Seconds of the clock and of the processor, and when it ran; empty if that isn't known."""
+    return read_leniently(cost_file(folder))
+
+
+def read_leniently(path: Path) -> dict[str, Any]:
+    """What a JSON file holds; nothing if it can't be read."""
+    try:
+        content = _read_json(path)
+    except WorkbenchError:
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def find_runs(patterns: Sequence[str], warn: Callable[[str], None]) -> list[Run]:
     """The runs of folders, of patterns such as 'runs/*dqn*', and of folders that hold runs.
 
     What matches a pattern or lies in a folder but is no run is passed over.
 
     Args:
-        say: is told of runs that are passed over because their record is damaged.
+        warn: is told of runs that are passed over because their record is damaged.
 
     Raises:
         WorkbenchError: if one of them has no run, or is a run with a damaged record.
     """
     found: dict[Path, Run] = {}
     for pattern in patterns:
-        runs = _matching(pattern, say)
+        runs = _matching(pattern, warn)
         if not runs:
             raise WorkbenchError(f"there is no run folder at {pattern}")
         found.update((run.folder, run) for run in runs)
     return list(found.values())
 
 
-def _matching(pattern: str, say: Callable[[str], None]) -> list[Run]:
+def _matching(pattern: str, warn: Callable[[str], None]) -> list[Run]:
     path = Path(pattern)
     if is_run(path):
         return [open_run(path)]
@@ -144,7 +163,7 @@ def _matching(pattern: str, say: Callable[[str], None]) -> list[Run]:
             try:
                 found.append(open_run(folder))
             except WorkbenchError as error:  # one damaged run costs no other
-                say(f"{error}; passed over")
+                warn(f"{error}; passed over")
     return found
 
 

@@ -16,8 +16,8 @@ import yaml
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.extras import need
 from rl_workbench.tools.sweep.ranges import Range
+from rl_workbench.training.run.files import as_json, as_text, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.results import check_writable, write_file, write_json
 
 STUDY, NAME = "study.db", "sweep"
 
@@ -131,11 +131,11 @@ def _write_results(sweep: Sweep, study: Any, optuna: Any) -> None:
         }
         for trial in study.trials
     ]
-    write_json(sweep.folder / "trials.json", rows)
+    write_file(sweep.folder / "trials.json", as_json(rows))
     if not _complete(study, optuna):
         print("no trial came to its end", flush=True)
         return
     best = yaml.safe_dump({sweep.section: study.best_params})
-    write_file(sweep.folder / "best.yaml", lambda stream: stream.write(best.encode()))
+    write_file(sweep.folder / "best.yaml", as_text(best))
     print(f"best: trial {study.best_trial.number}, {study.best_value:.2f}; its options are in "
           f"{sweep.folder / 'best.yaml'}", flush=True)  # fmt: skip

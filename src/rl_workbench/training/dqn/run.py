@@ -7,7 +7,9 @@ from typing import Any
 
 import torch
 
+from rl_workbench.curves import learning_curve
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.figure import as_png
 from rl_workbench.training.dqn.episode_tape import EpisodeTape
 from rl_workbench.training.dqn.judge import Judge
 from rl_workbench.training.dqn.loop import Loop, Observer
@@ -17,9 +19,9 @@ from rl_workbench.training.dqn.settings import Choice, check_same, config
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.checkpoints import Checkpoints, candidates, read_newest
 from rl_workbench.training.run.environments import make_environment
+from rl_workbench.training.run.files import as_json, write_atomically
 from rl_workbench.training.run.history import History
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.learning_curve import learning_curve
 from rl_workbench.training.run.random_states import random_states, restore_random_states, seed_all
 from rl_workbench.training.run.record import read_record, write_record
 from rl_workbench.training.run.scalar_log import Figures, ScalarLog
@@ -197,7 +199,7 @@ class DQNTraining:
         """Draws and tells; then passes a failure on, unless the user had stopped anyway."""
         try:
             self._draw()
-            run_folder.write_summary(self._folder / "summary.json", self._summary(failure))
+            write_atomically(self._folder / "summary.json", as_json(self._summary(failure)))
         except OSError as error:
             problem = self._not_written(error)
             failure = problem if self._interrupt.requested() else failure or problem
@@ -221,7 +223,9 @@ class DQNTraining:
         if self._history.returns:
             title = f"DQN, {self._run.env_id}, seed {self._run.seed}"
             path = self._folder / "learning_curve.png"
-            learning_curve(path, self._history.lengths, self._history.returns, title)
+            write_atomically(
+                path, as_png(learning_curve(self._history.lengths, self._history.returns, title))
+            )
 
     def _summary(self, failure: WorkbenchError | None) -> dict[str, Any]:
         history = self._history

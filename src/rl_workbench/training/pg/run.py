@@ -8,7 +8,9 @@ from typing import Any
 
 import torch
 
+from rl_workbench.curves import learning_curve
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.figure import as_png
 from rl_workbench.training.pg.figures import PolicyFigures
 from rl_workbench.training.pg.keeper import Keeper
 from rl_workbench.training.pg.loop import Observer, is_complete, train
@@ -18,10 +20,9 @@ from rl_workbench.training.pg.stage import Stage
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.checkpoints import candidates, read_newest
 from rl_workbench.training.run.evaluation import Evaluation
-from rl_workbench.training.run.files import NetworkSaver
+from rl_workbench.training.run.files import NetworkSaver, as_json, write_atomically
 from rl_workbench.training.run.history import History
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.learning_curve import learning_curve
 from rl_workbench.training.run.progress import progress
 from rl_workbench.training.run.random_states import seed_all
 from rl_workbench.training.run.record import read_record, write_record
@@ -159,7 +160,7 @@ class Training:
         try:
             self._saver.save()
             self._draw()
-            run_folder.write_summary(self._folder / "summary.json", self._summary(failure))
+            write_atomically(self._folder / "summary.json", as_json(self._summary(failure)))
         except OSError as error:
             problem = self._not_written(error)
             failure = problem if self._interrupt.requested() else failure or problem
@@ -179,12 +180,9 @@ class Training:
     def _draw(self) -> None:
         if self._history.lengths:
             what = "policy gradient" if self._run.is_robot else f"REINFORCE, {self._run.env_id}"
-            learning_curve(
-                self._folder / "learning_curve.png",
-                self._history.lengths,
-                self._history.returns,
-                f"{what}, seed {self._run.seed}",
-            )
+            title = f"{what}, seed {self._run.seed}"
+            figure = learning_curve(self._history.lengths, self._history.returns, title)
+            write_atomically(self._folder / "learning_curve.png", as_png(figure))
 
     def _summary(self, failure: WorkbenchError | None) -> dict[str, Any]:
         history = self._history

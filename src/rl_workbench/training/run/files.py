@@ -1,6 +1,7 @@
-"""Network weights on disk: plain state_dicts, each file whole or absent."""
+"""Files on disk: each one whole, or as it was before."""
 
 import io
+import json
 import os
 import tempfile
 from collections.abc import Callable
@@ -10,10 +11,13 @@ from typing import Any, BinaryIO
 import torch
 
 from rl_workbench.agents.pg.two_networks import TwoNetworks
+from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.pg.loop import EpisodeRecord
 
+Writer = Callable[[BinaryIO], object]  # fills a file
 
-def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
+
+def write_atomically(path: Path, write: Writer) -> None:
     """Lets `write` fill a file that replaces `path` only once it is whole and on disk.
 
     Raises:
@@ -31,6 +35,46 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
         os.unlink(temporary)
         raise
     _sync_folder(path.parent)
+
+
+def write_file(path: Path, write: Writer) -> None:
+    """The same for what a user asked for: makes the folder, and tells what the disk refuses.
+
+    Raises:
+        WorkbenchError: if it does; an older file of that name is untouched.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, write)
+    except OSError as error:
+        raise WorkbenchError(f"can't write {path}: {error.strerror or error}") from error
+
+
+def check_writable(path: Path) -> None:
+    """Refuses a place where nothing can be written, before hours are spent on what goes there.
+
+    Raises:
+        WorkbenchError: if it is one.
+    """
+    if path.is_dir():
+        raise WorkbenchError(f"can't write {path}: it is a folder")
+    probe = path.with_name(f".{path.name}.probe")
+    write_file(probe, as_text(""))
+    probe.unlink()
+
+
+def as_text(text: str) -> Writer:
+    """Writes a text."""
+    return lambda stream: stream.write(text.encode())
+
+
+def as_json(content: Any) -> Writer:
+    """Writes JSON with an end of line.
+
+    Raises:
+        ValueError: if a number of it is none.
+    """
+    return as_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def save_tensors(path: Path, content: dict[str, Any]) -> None:

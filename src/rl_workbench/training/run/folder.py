@@ -1,8 +1,7 @@
-"""The folder of one run: its name, and its summary as JSON."""
+"""The folder of one run: its name, who holds it, and the versions that write in it."""
 
 import contextlib
 import fcntl
-import json
 import os
 import platform
 import re
@@ -11,7 +10,6 @@ import sys
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.run.files import write_atomically
@@ -83,16 +81,6 @@ def _fresh(wanted: Path) -> Path:
             return folder
         except FileExistsError:
             folder, number = wanted.with_name(f"{wanted.name}_{number}"), number + 1
-
-
-def write_summary(path: Path, content: dict[str, Any]) -> None:
-    """Writes a JSON file, whole or not at all.
-
-    Raises:
-        OSError: if the disk refuses.
-    """
-    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
-    write_atomically(path, lambda stream: stream.write(text.encode()))
 
 
 def other_versions(before: Mapping[str, str]) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.run import folder as run_folder
+from rl_workbench.training.run.files import as_json, write_atomically
 
 CONFIG_RECORD = "config.json"
 
@@ -48,4 +49,4 @@ def write_record(folder: Path, config: dict[str, Any], resumed: bool) -> None:
     record: dict[str, Any] = {"versions": run_folder.versions(), "began": time.time()}
     if resumed:
         record = read_record(folder)
-    run_folder.write_summary(folder / CONFIG_RECORD, {**record, **config})
+    write_atomically(folder / CONFIG_RECORD, as_json({**record, **config}))

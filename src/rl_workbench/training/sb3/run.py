@@ -9,17 +9,18 @@ from typing import Any
 
 import torch
 
+from rl_workbench.curves import learning_curve
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.figure import as_png
 from rl_workbench.training.dqn.run import LAST, say
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.checkpoints import LAST as RESUMABLE
 from rl_workbench.training.run.checkpoints import Checkpoints, read_newest
 from rl_workbench.training.run.environments import shares_robot
+from rl_workbench.training.run.files import as_json, write_atomically, write_file
 from rl_workbench.training.run.history import History
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.learning_curve import learning_curve
 from rl_workbench.training.run.record import CONFIG_RECORD, read_record
-from rl_workbench.training.run.results import write_file
 from rl_workbench.training.run.scalar_log import ScalarLog
 from rl_workbench.training.sb3.callback import Follower, logger_to
 from rl_workbench.training.sb3.judge import SB3Judge
@@ -146,7 +147,7 @@ class SB3Training:
         content = {"versions": sb3_versions(), "began": time.time()}
         if self._resumed:
             content = read_record(self._folder)
-        run_folder.write_summary(self._folder / CONFIG_RECORD, content | record(self._choice))
+        write_atomically(self._folder / CONFIG_RECORD, as_json(content | record(self._choice)))
 
     def _tell_beginning(self) -> None:
         if self._resumed:
@@ -201,8 +202,10 @@ class SB3Training:
             if history.returns:
                 title = f"{self._choice.algorithm}, {self._run.env_id}, seed {self._run.seed}"
                 path = self._folder / "learning_curve.png"
-                learning_curve(path, history.lengths, history.returns, title)
-            run_folder.write_summary(self._folder / "summary.json", self._summary(failure))
+                write_atomically(
+                    path, as_png(learning_curve(history.lengths, history.returns, title))
+                )
+            write_atomically(self._folder / "summary.json", as_json(self._summary(failure)))
         except OSError as error:
             problem = self._not_written(error)
             failure = problem if self._interrupt.requested() else failure or problem

@@ -83,15 +83,15 @@ def test_options_of_the_environment_reach_it(runs: Path, given: list[str], capsy
 
 @pytest.mark.parametrize("name", ["dqn_0", "robot", "pg"])
 def test_record_writes_a_gif_without_a_display(runs: Path, tmp_path: Path, name: str) -> None:
-    out = tmp_path / "film.gif"
+    out = tmp_path / "video.gif"
     assert work("record", runs / name, "--out", out, "--max-steps", 40, "--scale", 0.5) == 0
-    with Image.open(out) as film:
-        assert film.format == "GIF" and film.n_frames > 1
+    with Image.open(out) as video:
+        assert video.format == "GIF" and video.n_frames > 1
         seen = []
-        for index in range(film.n_frames):
-            film.seek(index)
-            seen.append(np.array(film.convert("RGB")))
-            assert film.info["duration"] >= 20
+        for index in range(video.n_frames):
+            video.seek(index)
+            seen.append(np.array(video.convert("RGB")))
+            assert video.info["duration"] >= 20
     assert any((seen[0] != each).any() for each in seen), "something moves"
     assert len(np.unique(seen[0].reshape(-1, 3), axis=0)) > 2, "there is something to see"
 
@@ -101,7 +101,7 @@ def test_record_writes_a_gif_without_a_display(runs: Path, tmp_path: Path, name:
 def test_record_writes_an_mp4_that_can_be_read(runs: Path, tmp_path: Path, name: str) -> None:
     import imageio_ffmpeg
 
-    out = tmp_path / "film.mp4"
+    out = tmp_path / "video.mp4"
     assert work("record", runs / name, "--out", out, "--max-steps", 20) == 0
     frames = imageio_ffmpeg.read_frames(str(out))
     about = next(frames)
@@ -110,7 +110,8 @@ def test_record_writes_an_mp4_that_can_be_read(runs: Path, tmp_path: Path, name:
 
 
 def test_enjoy_without_a_display_says_so(runs: Path, monkeypatch, capsys) -> None:
-    monkeypatch.delenv("DISPLAY", raising=False)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
     line = refused(capsys, "enjoy", runs / "dqn_0")
     assert "DISPLAY isn't set" in line and "record" in line
 
@@ -121,11 +122,11 @@ def test_plot_draws_runs_of_every_kind(runs: Path, tmp_path: Path, over: str) ->
     chosen = [runs / name for name in ALL]
     assert work("plot", *chosen, "--over", over, "--out", out) == 0
     with Image.open(out) as picture:
-        assert picture.format == "PNG" and picture.size == (1100, 550)
+        assert picture.format == "PNG" and picture.size[0] > 1000
 
 
 def test_runs_in_a_picture_can_be_told_apart(tmp_path: Path) -> None:
-    from rl_workbench.tools.pictures.training_curves import training_curves
+    from rl_workbench.tools.pictures.panels import run_panels
     from rl_workbench.tools.runs.runs import open_run
 
     kinds = [{}, {"seed": 1}, {"env_id": "cartpole/Classic-v0"}, {"env_id": "cartpole/Classic-v0"}]
@@ -134,13 +135,37 @@ def test_runs_in_a_picture_can_be_told_apart(tmp_path: Path) -> None:
         for index, kind in enumerate(kinds)
     ]
     runs = [open_run(folder) for folder in folders]
-    for chosen in (runs[:2], runs[:3], runs):
-        axes = training_curves(chosen, "episodes").axes[0]
-        names = [text.get_text() for text in axes.get_legend().get_texts()]
-        assert len(set(names)) == len(chosen) + 1, "and the line from which it is solved"
-        (line,) = [each for each in axes.lines if each.get_linestyle() == "--"]
-        bold = [each.get_color() for each in axes.lines if each.get_linewidth() == 2.0]
-        assert len(set(bold)) == len(chosen) and line.get_color() not in bold
+    one, two, *same = ("dqn, seed 0", "dqn, seed 1", "dqn, seed 0 (run_2)", "dqn, seed 0 (run_3)")
+    for chosen, names in (
+        (runs[:2], {"CartPole-v1": [one, two]}),
+        (runs[:3], {"CartPole-v1": [one, two], "cartpole/Classic-v0": [one]}),
+        (runs, {"CartPole-v1": [one, two], "cartpole/Classic-v0": same}),
+    ):
+        panels = run_panels(chosen, "episodes")
+        assert {panel.environment: list(panel.curves) for panel in panels} == names
+
+
+def test_which_seeds_share_axes(tmp_path: Path) -> None:
+    from rl_workbench.tools.pictures.panels import seed_panels, variant_panels
+    from rl_workbench.tools.runs.runs import open_run
+
+    kinds = [{}, {"seed": 1}, {"env_id": "MountainCar-v0"}, {"exp_name": "other"}]
+    runs = []
+    for index, kind in enumerate(kinds):
+        folder = workbench_runs.record(tmp_path / f"run_{index}", [1.0, 2.0], **kind)
+        with (folder / "scalars.csv").open("a") as file:
+            file.write("10,eval/mean_reward,5.0,0\n")
+        runs.append(open_run(folder))
+    (runs[1].folder / "summary.json").write_text('{"complete": true}')
+    cart, car = seed_panels(runs)
+    assert (cart.environment, cart.threshold) == ("CartPole-v1", 475.0)
+    assert (car.environment, car.threshold) == ("MountainCar-v0", -110.0)
+    assert {name: len(seeds) for name, seeds in cart.curves.items()} == {"dqn": 2, "other": 1}
+    assert [seed.complete for seed in cart.curves["dqn"]] == [False, True]
+    variants = [(each.environment, *each.curves) for each in variant_panels(runs)]
+    assert variants == [
+        ("CartPole-v1", "dqn"), ("MountainCar-v0", "dqn"), ("CartPole-v1", "other"),
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -178,7 +203,7 @@ def test_a_failed_run_stays_in_the_table(runs: Path, tmp_path: Path, capsys) -> 
     told = capsys.readouterr().out
     row = next(line for line in told.splitlines() if "| 3 |" in line)
     assert "it has no checkpoint yet" in row
-    assert "2 of 3 (see remarks)" in told
+    assert "2 of 3 (see faults)" in told
 
 
 def test_compare_by_training_needs_no_checkpoint(tmp_path: Path, capsys) -> None:
@@ -277,8 +302,8 @@ def test_roslaunchs_arguments_are_left_out(runs: Path) -> None:
     assert work("eval", runs / "dqn_0", "--episodes", 1, *extra) == 0
 
 
-@pytest.mark.parametrize("name", ["film.avi", "film"])
-def test_a_film_of_another_format(runs: Path, tmp_path: Path, name: str, capsys) -> None:
+@pytest.mark.parametrize("name", ["video.avi", "video"])
+def test_a_video_of_another_format(runs: Path, tmp_path: Path, name: str, capsys) -> None:
     line = refused(capsys, "record", runs / "dqn_0", "--out", tmp_path / name)
     assert ".gif or .mp4" in line
 

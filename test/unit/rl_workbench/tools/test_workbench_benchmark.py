@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -15,8 +15,8 @@ import workbench_runs
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.tools.benchmark import benchmark, trainings
-from rl_workbench.tools.benchmark.benchmark import Row, examine, summary_table
+from rl_workbench.tools.benchmark import trainings
+from rl_workbench.tools.benchmark.results import RunResult, examine
 from rl_workbench.tools.benchmark.suites import (
     CONFIG,
     arguments,
@@ -25,7 +25,10 @@ from rl_workbench.tools.benchmark.suites import (
     make_variant,
     read_suite,
 )
+from rl_workbench.tools.benchmark.tables import BENCHMARK_SUMMARY, grouped, summary_table
 from rl_workbench.tools.benchmark.trainings import Job, Trainings
+from rl_workbench.tools.commands import benchmarking
+from rl_workbench.tools.runs.runs import cost_file, cost_of, open_run
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.interrupt import Interrupt
 
@@ -54,6 +57,10 @@ def suites(tmp_path: Path) -> Path:
 
 def job(folder: Path, seed: int = 0, **options: object) -> Job:
     return Job(make_variant("test", "quick", {**QUICK, **options}), seed, folder / f"seed_{seed}")
+
+
+def examined(one: Job) -> RunResult:
+    return examine(open_run(one.folder), "quick", 2, lambda text: None, also_last=True)
 
 
 def test_every_suite_of_the_package_has_options_that_exist() -> None:
@@ -182,14 +189,22 @@ def test_options_that_stable_baselines3_does_not_know_are_refused_before_anythin
     )
 
 
+def test_a_flag_of_train_leads_to_its_place_here(capsys: pytest.CaptureFixture[str]) -> None:
+    for flag in (["--total-timesteps", "1000"], ["--total-timesteps=1000"]):
+        with pytest.raises(SystemExit) as ended:
+            cli.main(["benchmark", "--env-id=CartPole-v1", *flag])
+        assert ended.value.code == 2
+        assert "--params total_timesteps=N" in capsys.readouterr().err
+
+
 def test_a_failed_training_stays_in_the_table(tmp_path: Path) -> None:
     one = job(tmp_path)
     workbench_runs.record(one.folder, [20.0] * 30)
     (one.folder / "summary.json").write_text(
         json.dumps({"complete": False, "failure": "the loss is nan", "returns": [20.0] * 30})
     )
-    row = examine(one, 2, lambda text: None)
-    assert row.best is None and row.fault.startswith("the loss is nan")
+    row = examined(one)
+    assert row.score is None and row.fault.startswith("the loss is nan")
     assert row.avg20 == pytest.approx(20.0)
 
 
@@ -197,7 +212,7 @@ def test_figures_that_cannot_be_read_are_faults(tmp_path: Path) -> None:
     one = job(tmp_path)
     workbench_runs.record(one.folder, [20.0] * 30)
     (one.folder / "scalars.csv").write_text("a,b\n1,2\n")
-    row = examine(one, 2, lambda text: None)
+    row = examined(one)
     assert row.fault.count("isn't the table of a training") == 1 and "no policy" in row.fault
 
 
@@ -208,41 +223,47 @@ def test_pauses_are_no_part_of_the_seconds_to_solve(tmp_path: Path) -> None:
     (one.folder / "config.json").write_text(json.dumps({**config, "began": 1000.0}))
     with (one.folder / "scalars.csv").open("a") as file:
         file.write("300,eval/mean_reward,475.0,1200.0\n")
-    assert examine(one, 1, lambda text: None).solved_seconds == 200.0
+    assert examined(one).solved_seconds == 200.0
     spans = [[1000.0, 1050.0], [1150.0, 1300.0], [2000.0, 2100.0]]
-    one.cost_file.write_text(json.dumps({"spans": spans}))
-    row = examine(one, 1, lambda text: None)
+    cost_file(one.folder).write_text(json.dumps({"spans": spans}))
+    row = examined(one)
     assert (row.solved_step, row.solved_seconds) == (300, 100.0)
     with (one.folder / "scalars.csv").open("a") as file:
         file.write("400,eval/confirmed_reward,480.0,1250.0\n")
-    assert examine(one, 1, lambda text: None).solved_step == 400
+    assert examined(one).solved_step == 400
 
 
-def row(seed: int, best: float | None, step: int | None, fault: str = "") -> Row:
-    return Row("a", seed, best, best, best, best, step, None, 100, 5, 1.0, 1.0, fault)
+def row(seed: int, score: float | None, step: int | None, fault: str = "") -> RunResult:
+    return RunResult(
+        "a", seed, "run", score, final=score, evaluations=score, solved_step=step, seconds=1.0,
+        fault=fault,
+    )  # fmt: skip
+
+
+def summarised(rows: list[RunResult], line: float | None) -> str:
+    return summary_table(grouped(rows), BENCHMARK_SUMMARY, {"a": line}).splitlines()[2]
 
 
 def test_seeds_that_never_solve_count_as_never() -> None:
     rows = [row(0, 475.0, 100), row(1, 500.0, 300), row(2, 20.0, None)]
-    line = summary_table(rows, {"a": 475.0}).splitlines()[2]
+    line = summarised(rows, 475.0)
     assert "| a | 2 of 3 |" in line and "| 300 | never |" in line
 
 
 def test_a_statistic_tells_how_many_seeds_it_lacks() -> None:
     rows = [row(0, 480.0, 100), row(1, 500.0, 300), row(2, None, None, "the loss is nan")]
-    cells = summary_table(rows, {"a": 475.0}).splitlines()[2].split(" | ")
+    cells = summarised(rows, 475.0).split(" | ")
     assert cells[1] == "2 of 3, 1 failed" and cells[2] == "490.0 ± 14.1 (2 of 3)"
     assert all(cell.endswith(" (2 of 3)") for cell in cells[3:6])
 
 
 def test_where_there_is_no_line_nobody_has_missed_it() -> None:
-    line = summary_table([row(0, 5.0, None), row(1, 6.0, None)], {"a": None}).splitlines()[2]
+    line = summarised([row(0, 5.0, None), row(1, 6.0, None)], None)
     assert "never" not in line and line.startswith("| a | - |")
 
 
 def test_a_variant_without_any_run_has_a_line_of_its_own() -> None:
-    nothing = replace(row(0, None, None, "no run folder"), seconds=None)
-    line = summary_table([nothing], {}).splitlines()[2]
+    line = summarised([RunResult("a", 0, "run", fault="no run folder")], None)
     assert line == "| a | 0 of 1, 1 failed | - | - | - | - | - | - | - | - |"
 
 
@@ -266,7 +287,9 @@ def test_ctrl_c_while_policies_are_played(tmp_path: Path, monkeypatch) -> None:
     command = complete(tmp_path)
     assert cli.main(command) == 0
     (tmp_path / "results.md").unlink()
-    monkeypatch.setattr(benchmark, "examine", lambda *_: os.kill(os.getpid(), signal.SIGINT))
+    monkeypatch.setattr(
+        benchmarking, "examine", lambda *_, **__: os.kill(os.getpid(), signal.SIGINT)
+    )
     assert cli.main(command) == 130
     assert not (tmp_path / "results.md").exists()
 
@@ -321,8 +344,8 @@ def test_ctrl_c_as_a_training_ends_by_itself(tmp_path: Path, monkeypatch) -> Non
     monkeypatch.setattr(os, "waitid", waited)
     one, other = (job(tmp_path, seed) for seed in range(2))
     running.run([one, other], 1, interrupt)
-    assert interrupt.requested() and one.cost()["cpu_seconds"] >= 0.0
-    assert not other.log.read_text() and not other.cost(), "no further one begins"
+    assert interrupt.requested() and cost_of(one.folder)["cpu_seconds"] >= 0.0
+    assert not other.log.read_text() and not cost_of(other.folder), "no further one begins"
 
 
 def test_the_training_is_told_all_of_its_options(tmp_path: Path) -> None:

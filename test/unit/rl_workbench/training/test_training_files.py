@@ -5,7 +5,6 @@ import os
 from pathlib import Path
 from typing import BinaryIO
 
-import numpy as np
 import pytest
 import torch
 
@@ -14,7 +13,6 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.pg.loop import EpisodeRecord
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.files import NetworkSaver, write_atomically
-from rl_workbench.training.run.learning_curve import learning_curve, moving_average
 from rl_workbench.training.run.progress import Bar, Lines, progress
 
 
@@ -82,19 +80,6 @@ def test_networks_are_saved_every_so_often_and_load_safely(tmp_path: Path) -> No
 def test_zero_saves_only_when_asked(tmp_path: Path) -> None:
     NetworkSaver(tmp_path, PolicyGradientAgent(0), every=0).episode_done(record(0))
     assert names(tmp_path) == set()
-
-
-def test_moving_average() -> None:
-    values = [1.0, 2.0, 3.0, 4.0, 5.0]
-    assert moving_average(values, 3) == pytest.approx([1.0, 1.5, 2.0, 3.0, 4.0])
-    assert moving_average([], 3).shape == (0,)
-
-
-@pytest.mark.parametrize("count", [1, 300])
-def test_the_curve_is_a_png(tmp_path: Path, count: int) -> None:
-    lengths = np.random.default_rng(0).integers(1, 3000, count).tolist()
-    learning_curve(tmp_path / "curve.png", lengths, [length / 2 for length in lengths], "title")
-    assert (tmp_path / "curve.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
 def test_the_default_run_folder_is_new_each_time(tmp_path, monkeypatch) -> None:

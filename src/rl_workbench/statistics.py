@@ -1,13 +1,14 @@
 """Scores of several seeds as figures: mean, deviation, median, interquartile mean, intervals."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
 
 CONFIDENCE = 0.95
 RESAMPLES = 10_000
 CUT = 0.25  # of either end, for the interquartile mean
+Statistic = Callable[..., np.ndarray]  # of an array along `axis`
 
 
 class Statistics(NamedTuple):
@@ -24,7 +25,9 @@ class Statistics(NamedTuple):
 
 def iqm(scores: np.ndarray, axis: int = -1) -> np.ndarray:
     """The mean of the middle half: neither a lucky nor a failed seed decides it alone."""
-    return np.asarray(stats.trim_mean(scores, CUT, axis=axis))
+    ordered = np.sort(np.moveaxis(scores, axis, 0), axis=0)
+    cut = int(CUT * len(ordered))
+    return np.asarray(ordered[cut : len(ordered) - cut].mean(axis=0))
 
 
 def describe(scores: np.ndarray) -> Statistics:
@@ -41,23 +44,19 @@ def describe(scores: np.ndarray) -> Statistics:
     )
 
 
-def interval(scores: np.ndarray, statistic: object) -> tuple[float, float]:
+def interval(scores: np.ndarray, statistic: Statistic) -> tuple[float, float]:
     """The bootstrap interval of a statistic over scores (N,); always the same for the same."""
     low, high = bands(scores[:, None], statistic, RESAMPLES)
     return float(low[0]), float(high[0])
 
 
 def bands(
-    scores: np.ndarray, statistic: object, resamples: int = 1_000
+    scores: np.ndarray, statistic: Statistic, resamples: int = 1_000
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bootstrap intervals over the first axis of (N, P): two arrays (P,)."""
-    found = stats.bootstrap(
-        (scores,),
-        statistic,
-        axis=0,
-        n_resamples=resamples,
-        confidence_level=CONFIDENCE,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    return np.asarray(found.low), np.asarray(found.high)
+    """Percentile bootstrap intervals over the first axis of (N, P): two arrays (P,)."""
+    count = len(scores)
+    chosen = np.random.default_rng(0).integers(0, count, (resamples, count))
+    found = statistic(scores[chosen], axis=1)  # (resamples, P)
+    tail = 50.0 * (1.0 - CONFIDENCE)
+    low, high = np.percentile(found, [tail, 100.0 - tail], axis=0)
+    return low, high

@@ -4,7 +4,6 @@ import importlib.util
 import math
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -13,8 +12,9 @@ import numpy as np
 from PIL import Image
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools.runs.episodes import greedy_steps
 from rl_workbench.tools.runs.players import Player
-from rl_workbench.training.run.results import write_file
+from rl_workbench.training.run.files import write_file
 
 GIF_RATE, MP4_RATE = 25.0, 50.0  # [Hz]; frames between them are left out
 GIF_TICK = 10  # [ms], the format's own
@@ -22,7 +22,7 @@ COLOURS = 64  # of a GIF; drawings have few
 FORMATS = (".gif", ".mp4")
 
 
-class Film(NamedTuple):
+class Video(NamedTuple):
     """An episode that was seen."""
 
     frames: list[np.ndarray]  # (H, W, 3), uint8
@@ -38,13 +38,13 @@ def check_format(path: Path) -> None:
         WorkbenchError: if the name's ending isn't known, or the writer isn't installed.
     """
     if path.suffix.lower() not in FORMATS:
-        raise WorkbenchError(f"a film's name ends in {' or '.join(FORMATS)}: not {path}")
+        raise WorkbenchError(f"a video's name ends in {' or '.join(FORMATS)}: not {path}")
     if path.suffix.lower() == ".mp4" and not importlib.util.find_spec("imageio_ffmpeg"):
         raise WorkbenchError("MP4 needs imageio-ffmpeg: ./ws extras installs it; GIF needs nothing")
 
 
-def film(player: Player, seed: int, fastest: float, longest: int = 0) -> Film:
-    """Plays one greedy episode and keeps every frame that a film of `fastest` Hz shows.
+def record_episode(player: Player, seed: int, fastest: float, longest: int = 0) -> Video:
+    """Plays one greedy episode and keeps every frame that a video of at most `fastest` [Hz] shows.
 
     Args:
         longest: number of steps after which it is cut off; 0: never.
@@ -52,19 +52,14 @@ def film(player: Player, seed: int, fastest: float, longest: int = 0) -> Film:
     Raises:
         WorkbenchError: if the environment draws no pictures.
     """
-    env, total, length = player.env, 0.0, 0
-    rate = float(env.metadata.get("render_fps") or 30.0)
+    rate = float(player.env.metadata.get("render_fps") or 30.0)
     stride = math.ceil(rate / fastest)
-    observation, _ = env.reset(seed=seed)
-    frames, finished = [_picture(env)], False
-    while not finished:
-        action = player.act(np.asarray(observation, np.float32))
-        observation, reward, terminated, truncated, _ = env.step(action)
-        length, total = length + 1, total + float(reward)
-        finished = terminated or truncated or length == longest
+    frames, total = [], 0.0
+    for length, (_, reward, finished) in enumerate(greedy_steps(player, seed, longest)):
+        total += reward
         if finished or length % stride == 0:
-            frames.append(_picture(env))
-    return Film(frames, rate / stride, length, total)
+            frames.append(_picture(player.env))
+    return Video(frames, rate / stride, length, total)
 
 
 def _picture(env: gymnasium.Env[Any, Any]) -> np.ndarray:
@@ -77,7 +72,7 @@ def _picture(env: gymnasium.Env[Any, Any]) -> np.ndarray:
     return picture
 
 
-def write_film(path: Path, shown: Film, scale: float = 1.0) -> None:
+def write_video(path: Path, video: Video, scale: float = 1.0) -> None:
     """Writes it in the format that the name's ending says; replaces an older file as a whole.
 
     Args:
@@ -86,12 +81,9 @@ def write_film(path: Path, shown: Film, scale: float = 1.0) -> None:
     Raises:
         WorkbenchError: if the disk refuses.
     """
-    frames = [_scaled(frame, scale) for frame in shown.frames]
-    writers: dict[str, Callable[[BinaryIO], None]] = {
-        ".gif": lambda stream: _write_gif(stream, frames, shown.rate),
-        ".mp4": lambda stream: _write_mp4(stream, frames, shown.rate),
-    }
-    write_file(path, writers[path.suffix.lower()])
+    frames = [_scaled(frame, scale) for frame in video.frames]
+    write = _write_gif if path.suffix.lower() == ".gif" else _write_mp4
+    write_file(path, lambda stream: write(stream, frames, video.rate))
 
 
 def _scaled(frame: np.ndarray, scale: float) -> Image.Image:
@@ -121,7 +113,7 @@ def _write_gif(stream: BinaryIO, frames: list[Image.Image], rate: float) -> None
 def _write_mp4(stream: BinaryIO, frames: list[Image.Image], rate: float) -> None:
     """ffmpeg writes files only, so it writes one beside."""
     with tempfile.TemporaryDirectory(prefix="cartpole_") as folder:
-        path = Path(folder, "film.mp4")
+        path = Path(folder, "video.mp4")
         _encode(path, frames, rate)
         with path.open("rb") as made:
             shutil.copyfileobj(made, stream)
@@ -135,13 +127,9 @@ def _encode(path: Path, frames: list[Image.Image], rate: float) -> None:
     )
     writer.send(None)  # starts ffmpeg
     try:
-        for content in _contents(frames):
-            writer.send(content)
+        for frame in frames:
+            writer.send(frame.convert("RGB").tobytes())
     except OSError as error:
         raise WorkbenchError(f"ffmpeg gave up: {error}") from error
     finally:
         writer.close()
-
-
-def _contents(frames: list[Image.Image]) -> Iterator[bytes]:
-    return (frame.convert("RGB").tobytes() for frame in frames)

@@ -1,29 +1,27 @@
-"""`policy`: what a policy does over the pole's angle and angular velocity, the rest at 0."""
+"""`policy`: what a cart-pole's policy prefers over the pole's angle and velocity, the rest at 0."""
 
 import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-import gymnasium
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from cartpole.task import ANGLE_LIMIT
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.figure import new_figure
+from rl_workbench.tools.runs.episodes import greedy_steps
 from rl_workbench.tools.runs.players import Player
-from rl_workbench.tools.runs.runs import Run
-from rl_workbench.training.run.results import new_figure
 
 POINTS = 161  # of each axis
 LONGEST = 1500  # [steps] of the episode that is drawn over the policy
 
 
-class Plane(NamedTuple):
+class StatePlane(NamedTuple):
     """How an environment's observation holds the pole."""
 
-    angle: float  # [rad], largest that is shown
+    angle: float  # [rad], the largest that is shown
     velocity: float  # [rad/s]
     lean: str  # where the pole leans at a positive angle
     observe: Callable[[np.ndarray, np.ndarray], np.ndarray]  # (N,), (N,) to (N, D)
@@ -49,92 +47,84 @@ def _in_five(observation: np.ndarray) -> tuple[float, float]:
     return math.atan2(observation[2], observation[3]), float(observation[4])
 
 
-BALANCING = Plane(ANGLE_LIMIT, 3.0, "left (-x)", _four, _in_four)
+FALLEN = math.radians(12.0)  # from which the balancing ones end an episode
+BALANCING = StatePlane(FALLEN, 3.0, "left (-x)", _four, _in_four)
 PLANES = {
-    "CartPole-v1": Plane(ANGLE_LIMIT, 3.0, "right (+x)", _four, _in_four),
+    "CartPole-v1": StatePlane(FALLEN, 3.0, "right (+x)", _four, _in_four),
     "cartpole/Balance-v0": BALANCING,
     "cartpole/Classic-v0": BALANCING,
-    "cartpole/SwingUp-v0": Plane(math.pi, 12.0, "left (-x)", _five, _in_five),
+    "cartpole/SwingUp-v0": StatePlane(math.pi, 12.0, "left (-x)", _five, _in_five),
 }
 
 
-def plane_of(run: Run) -> Plane:
-    """The plane of a run's environment.
+def state_plane(env_id: str) -> StatePlane:
+    """The plane of an environment.
 
     Raises:
         WorkbenchError: if its observation isn't a cart-pole's.
     """
-    if run.env_id not in PLANES:
+    if env_id not in PLANES:
         raise WorkbenchError(
-            f"{run.env_id} has no pole's angle and velocity; policy draws {', '.join(PLANES)}"
+            f"{env_id} has no pole's angle and velocity; policy draws {', '.join(PLANES)}"
         )
-    return PLANES[run.env_id]
+    return PLANES[env_id]
 
 
-def policy_picture(run: Run, player: Player, seed: int) -> Figure:
-    """The policy's preference over the plane, with one greedy episode over it.
-
-    Raises:
-        WorkbenchError: if the environment isn't a cart-pole.
-    """
-    plane = plane_of(run)
+def policy_map(plane: StatePlane, player: Player, seed: int, title: str) -> Figure:
+    """The policy's preference over the plane, with one greedy episode over it."""
     angles = np.linspace(-plane.angle, plane.angle, POINTS)
     velocities = np.linspace(-plane.velocity, plane.velocity, POINTS)
-    field = _field(plane, player, angles, velocities)
+    preferences = _preferences(plane, player, angles, velocities)
     figure = new_figure(8, 6)
     axes = figure.subplots()
-    _draw_field(axes, player, np.degrees(angles), velocities, field)
-    _draw_episode(axes, _trace(plane, player, seed), plane)
+    _draw_preferences(axes, player, np.degrees(angles), velocities, preferences)
+    _draw_episode(axes, _trajectory(plane, player, seed), plane)
     axes.set_xlabel(f"pole angle θ [°], 0 upright; positive leans to the {plane.lean}")
     axes.set_ylabel("angular velocity dθ/dt [rad/s]")
-    axes.set_title(f"policy of {run.label}; cart in the middle, at rest")
+    axes.set_title(title)
     axes.legend(loc="upper right", fontsize="small", framealpha=0.9)
     return figure
 
 
-def _field(plane: Plane, player: Player, angles: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+def _preferences(
+    plane: StatePlane, player: Player, angles: np.ndarray, velocities: np.ndarray
+) -> np.ndarray:
     """The preference at every point, (velocities, angles)."""
     across, up = np.meshgrid(angles, velocities)
     values = player.preference(plane.observe(across.ravel(), up.ravel()))
     return values.reshape(across.shape)
 
 
-def _draw_field(
-    axes: Axes, player: Player, angles: np.ndarray, velocities: np.ndarray, field: np.ndarray
+def _draw_preferences(
+    axes: Axes, player: Player, angles: np.ndarray, velocities: np.ndarray, values: np.ndarray
 ) -> None:
     # Rare corners with huge values would leave no colour for the rest.
-    strongest = max(float(np.percentile(np.abs(field), 95)), 1e-9)
+    strongest = max(float(np.percentile(np.abs(values), 95)), 1e-9)
     mesh = axes.pcolormesh(
-        angles, velocities, field, cmap="RdBu_r", vmin=-strongest, vmax=strongest,
+        angles, velocities, values, cmap="RdBu_r", vmin=-strongest, vmax=strongest,
         shading="auto", rasterized=True,
     )  # fmt: skip
     axes.figure.colorbar(mesh, ax=axes, label=f"{player.meaning}: red pushes right, blue left")
-    if field.min() < 0.0 < field.max():
-        axes.contour(angles, velocities, field, levels=[0.0], colors="black", linewidths=1.5)
+    if values.min() < 0.0 < values.max():
+        axes.contour(angles, velocities, values, levels=[0.0], colors="black", linewidths=1.5)
         axes.plot([], [], color="black", linewidth=1.5, label="the policy changes its mind")
 
 
-def _trace(plane: Plane, player: Player, seed: int) -> np.ndarray:
+def _trajectory(plane: StatePlane, player: Player, seed: int) -> np.ndarray:
     """Angle [°] and velocity [rad/s] along one greedy episode, (T, 2)."""
-    env: gymnasium.Env = player.env
-    observation, _ = env.reset(seed=seed)
-    places, finished = [plane.locate(observation)], False
-    while not finished and len(places) < LONGEST:
-        action = player.act(np.asarray(observation, np.float32))
-        observation, _, terminated, truncated, _ = env.step(action)
-        places.append(plane.locate(observation))
-        finished = terminated or truncated
+    steps = greedy_steps(player, seed, LONGEST)
+    places = [plane.locate(observation) for observation, _, _ in steps]
     return np.array(places) * (180.0 / math.pi, 1.0)
 
 
-def _draw_episode(axes: Axes, trace: np.ndarray, plane: Plane) -> None:
-    angles, velocities = trace.T.copy()
+def _draw_episode(axes: Axes, trajectory: np.ndarray, plane: StatePlane) -> None:
+    angles, velocities = trajectory.T.copy()
     # A turn through hanging is one point to the next, not a line across the picture.
-    angles[1:][np.abs(np.diff(trace[:, 0])) > 180.0] = np.nan
+    angles[1:][np.abs(np.diff(trajectory[:, 0])) > 180.0] = np.nan
     seam = [withStroke(linewidth=1.8, foreground="white", alpha=0.6)]  # for dark grounds
     axes.plot(angles, velocities, color="0.1", linewidth=0.8, path_effects=seam,
               label="a greedy episode")  # fmt: skip
-    axes.plot(*trace[0], "o", color="black", markersize=5, label="its start")
+    axes.plot(*trajectory[0], "o", color="black", markersize=5, label="its start")
     limit = math.degrees(plane.angle)
     axes.set_xlim(-limit, limit)
     axes.set_ylim(-plane.velocity, plane.velocity)

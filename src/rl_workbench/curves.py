@@ -1,0 +1,254 @@
+"""Learning curves as pictures, of one training or of many seeds; they need no display.
+
+What is drawn comes as plain arrays: a training at its end and the tools share this module.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from rl_workbench.figure import new_figure
+from rl_workbench.statistics import bands
+
+WINDOW = 20  # [episodes] of the moving average
+POINTS = 200  # of a mean over seeds
+PALE_AT_MOST = 8  # runs; of more of them the single episodes would be a fog
+COLUMNS = 4  # of small panels
+# Red is the threshold's, grey is what others are held against.
+COLOURS = ("C0", "C1", "C2", "C4", "C5", "C6", "C8", "C9")
+LINE_STYLES = ("-", "-.", ":")
+STEPS = "step of the environment"
+
+
+class SeedCurve(NamedTuple):
+    """What one training came to, over its steps or episodes."""
+
+    positions: np.ndarray  # (N,), ascending; N is at least 1
+    values: np.ndarray  # (N,)
+    complete: bool = True  # whether the training came to its own end
+
+
+class Panel(NamedTuple):
+    """One pair of axes: all that was trained in one environment."""
+
+    environment: str
+    curves: Mapping[str, Sequence[SeedCurve]]  # by the name of the group; one at least of each
+    threshold: float | None  # the return from which the environment is solved
+
+
+def moving_average(values: Sequence[float] | np.ndarray, window: int = WINDOW) -> np.ndarray:
+    """The mean of the last `window` values (of fewer at the start); same length as `values`."""
+    sums = np.concatenate([[0.0], np.cumsum(np.asarray(values, dtype=float))])
+    ends = np.arange(1, len(sums))
+    starts = np.maximum(ends - window, 0)
+    return (sums[ends] - sums[starts]) / (ends - starts)
+
+
+def mean_over_seeds(
+    curves: Sequence[SeedCurve],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The mean over all seeds, from where each has a value to the end of the longest.
+
+    A seed that has ended counts with its last value: without it the mean would be that of those
+    that still learn, and fall each time one of them is done.
+
+    Returns:
+        Positions, means and the ends of their 95 % intervals, each (P,).
+    """
+    positions = np.unique(np.concatenate([curve.positions for curve in curves]))
+    positions = positions[positions >= max(curve.positions[0] for curve in curves)]
+    if len(positions) > POINTS and len(curves) > 1:
+        positions = np.linspace(positions[0], positions[-1], POINTS)
+    table = np.array([np.interp(positions, curve.positions, curve.values) for curve in curves])
+    mean = table.mean(axis=0)
+    low, high = bands(table, np.mean) if len(curves) > 1 else (mean, mean)
+    return positions, mean, low, high
+
+
+# Pictures.
+
+
+def learning_curve(lengths: Sequence[int], returns: Sequence[float], title: str) -> Figure:
+    """One training: length and return of every episode, with their moving averages."""
+    figure = new_figure(9, 6)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    for axes, values, label, colour in (
+        (upper, lengths, "episode length [steps]", "tab:blue"),
+        (lower, returns, "return", "tab:green"),
+    ):
+        episodes = np.arange(len(values))
+        axes.plot(episodes, values, ".", ms=3, alpha=0.45, color=colour, label="one episode")
+        average = f"mean of {WINDOW} episodes"
+        axes.plot(episodes, moving_average(values), color="tab:red", lw=1.8, label=average)
+        axes.set_ylabel(label)
+        axes.grid(alpha=0.3)
+    upper.set_title(title)
+    upper.legend(loc="upper left")
+    lower.set_xlabel("episode")
+    return figure
+
+
+def training_curves(panels: Sequence[Panel], across: str) -> Figure:
+    """Every run by itself: return of each episode and moving average; axes for each environment.
+
+    Args:
+        panels: their groups are single runs.
+        across: what the positions are.
+    """
+    figure, grid = _environments(panels)
+    pale, styles = sum(len(panel.curves) for panel in panels) <= PALE_AT_MOST, _styles(panels)
+    for axes, panel in zip(grid, panels, strict=True):
+        for name, (run,) in panel.curves.items():
+            style = styles[name]
+            if pale:
+                axes.plot(run.positions, run.values, gid="episodes", alpha=0.3, lw=0.9, **style)
+            axes.plot(run.positions, moving_average(run.values), lw=2, label=name, **style)
+        _finish(axes, panel, across, "return")
+    about = f"mean of {WINDOW} episodes" + (", pale: each episode" if pale else "")
+    figure.suptitle(f"training: {about}", fontsize="medium")
+    return figure
+
+
+def seed_curves(panels: Sequence[Panel]) -> Figure:
+    """Groups of seeds, their moving averages over the steps; axes for each environment.
+
+    Args:
+        panels: with the return of each episode, over the steps.
+    """
+    figure, grid = _environments(panels)
+    styles = _styles(panels)
+    for axes, panel in zip(grid, panels, strict=True):
+        for name, seeds in panel.curves.items():
+            averages = [each._replace(values=moving_average(each.values)) for each in seeds]
+            _draw_seeds(axes, averages, f"{name} ({_seeds(seeds)})", styles[name])
+        _finish(axes, panel, STEPS, f"return, mean of {WINDOW} episodes")
+    _explain(figure, panels)
+    return figure
+
+
+def evaluation_curves(panels: Sequence[Panel]) -> Figure:
+    """A small panel for each variant, with the first one's mean in grey behind it.
+
+    Args:
+        panels: of one variant each, with the mean returns of its evaluations over the steps.
+    """
+    first, environments = panels[0], {panel.environment for panel in panels}
+    columns = min(COLUMNS, len(panels))
+    rows = math.ceil(len(panels) / columns)
+    figure = new_figure(max(3.2 * columns, 7.0), max(2.4 * rows, 3.0) + 0.9)
+    grid = figure.subplots(
+        rows, columns, sharex=len(environments) == 1, sharey=len(environments) == 1, squeeze=False
+    )
+    for axes, panel in zip(grid.flat, panels, strict=False):
+        ((name, seeds),) = panel.curves.items()
+        if panel is not first and panel.environment == first.environment:
+            (behind,) = first.curves.values()
+            axes.plot(*mean_over_seeds(behind)[:2], gid="reference", color="0.55", lw=1.5)
+        _draw_seeds(axes, seeds, name, {"color": "tab:blue"})
+        _draw_threshold(axes, panel.threshold)
+        where = f", {panel.environment}" if len(environments) > 1 else ""
+        axes.set_title(f"{name} ({_seeds(seeds)}){where}", fontsize="small")
+        axes.grid(alpha=0.3)
+        axes.tick_params(labelsize="x-small")
+    for axes in grid.flat[len(panels) :]:
+        axes.set_axis_off()
+    figure.supxlabel(STEPS, fontsize="medium")
+    figure.supylabel("return of greedy episodes", fontsize="medium")
+    more = []
+    if any(panel.environment == first.environment for panel in panels[1:]):
+        name = next(iter(first.curves))
+        more.append(Line2D([], [], color="0.55", lw=1.5, label=f"mean of {name}"))
+    if any(panel.threshold is not None for panel in panels):
+        more.append(Line2D([], [], color="tab:red", lw=1, ls="--", label="solved"))
+    _explain(figure, panels, *more)
+    return figure
+
+
+# What they are made of.
+
+
+def _environments(panels: Sequence[Panel]) -> tuple[Figure, list[Axes]]:
+    """Large axes, one pair for each environment: returns of different ones don't compare."""
+    if len(panels) == 1:
+        figure = new_figure(10, 5)
+        return figure, [figure.subplots()]
+    rows = math.ceil(len(panels) / 2)
+    figure = new_figure(13, 4.2 * rows + 0.4)
+    grid = list(figure.subplots(rows, 2, squeeze=False).flat)
+    for axes in grid[len(panels) :]:
+        figure.delaxes(axes)
+    return figure, grid[: len(panels)]
+
+
+def _styles(panels: Sequence[Panel]) -> dict[str, dict[str, Any]]:
+    """Colour and line of each group: the same wherever it is drawn."""
+    names = dict.fromkeys(name for panel in panels for name in panel.curves)
+    count = len(COLOURS)
+    return {
+        name: {"color": COLOURS[i % count], "ls": LINE_STYLES[i // count % len(LINE_STYLES)]}
+        for i, name in enumerate(names)
+    }
+
+
+def _draw_seeds(
+    axes: Axes, seeds: Sequence[SeedCurve], label: str, style: Mapping[str, Any]
+) -> None:
+    """Every seed thinly, where it ended, the mean over all of them, and its interval."""
+    colour = style["color"]
+    positions, mean, low, high = mean_over_seeds(seeds)
+    if len(seeds) > 1:
+        axes.fill_between(positions, low, high, color=colour, alpha=0.15, linewidth=0)
+        for seed in seeds:
+            axes.plot(seed.positions, seed.values, gid="seed", color=colour, lw=0.7, alpha=0.4)
+    axes.plot(positions, mean, gid="mean", lw=2, label=label, **style)
+    for complete, gid, marker, size in ((True, "ended", "o", 4), (False, "stopped", "x", 6)):
+        ends = [
+            (seed.positions[-1], seed.values[-1]) for seed in seeds if seed.complete == complete
+        ]
+        if ends:
+            axes.plot(*np.transpose(ends), marker, gid=gid, color=colour, ms=size, mew=1.5,
+                      zorder=3, clip_on=False)  # fmt: skip
+
+
+def _draw_threshold(axes: Axes, threshold: float | None) -> None:
+    if threshold is not None:
+        label = f"solved ({threshold:g})"
+        axes.axhline(threshold, gid="threshold", color="tab:red", ls="--", lw=1, label=label)
+
+
+def _finish(axes: Axes, panel: Panel, across: str, up: str) -> None:
+    _draw_threshold(axes, panel.threshold)
+    axes.set_title(panel.environment)
+    axes.set_xlabel(across)
+    axes.set_ylabel(up)
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize="small")
+
+
+def _explain(figure: Figure, panels: Sequence[Panel], *more: Line2D) -> None:
+    """One legend above all panels for what their lines and marks mean."""
+    seeds = [each for panel in panels for group in panel.curves.values() for each in group]
+    mean = "mean of all seeds, ended ones with their last value"
+    handles: list[Artist] = [
+        Line2D([], [], color="k", lw=2, label=mean),
+        Patch(color="k", alpha=0.15, lw=0, label="its 95 % interval"),
+        Line2D([], [], color="k", lw=0.7, alpha=0.6, label="a seed"),
+        Line2D([], [], color="k", marker="o", ls="", ms=4, label="its end"),
+    ]
+    if not all(seed.complete for seed in seeds):
+        handles.append(Line2D([], [], color="k", marker="x", ls="", ms=6, label="not complete"))
+    handles += more
+    columns = len(handles) if figure.get_figwidth() >= 10 else 3
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns, fontsize="small",
+                  frameon=False)  # fmt: skip
+
+
+def _seeds(seeds: Sequence[SeedCurve]) -> str:
+    return f"{len(seeds)} seed{'s' if len(seeds) > 1 else ''}"

@@ -1,0 +1,160 @@
+"""Comparison tables as Markdown: every run, and statistics of each group of seeds."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rl_workbench.statistics import Statistics, describe
+from rl_workbench.tools.benchmark.results import RunResult
+
+# The columns of each command: name, and the field of RunResult.
+COMPARE = {name: name for name in ("group", "run", "seed", "score", "training_mean", "episodes",
+                                   "steps", "seconds", "solved_step", "fault")}  # fmt: skip
+BENCHMARK = {"variant": "group", "seed": "seed", "best": "score"}
+BENCHMARK |= {name: name for name in ("final", "evaluations", "avg20", "solved_step",
+                                      "solved_seconds", "steps", "episodes", "seconds",
+                                      "cpu_seconds", "fault")}  # fmt: skip
+
+
+def grouped(results: Sequence[RunResult]) -> dict[str, list[RunResult]]:
+    """Groups in the order in which they appear."""
+    names = dict.fromkeys(each.group for each in results)
+    return {name: [each for each in results if each.group == name] for name in names}
+
+
+def statistics_of(results: Sequence[RunResult], field: str = "score") -> Statistics | None:
+    """Of a figure of a group; None if no run has it."""
+    values = [value for each in results if (value := getattr(each, field)) is not None]
+    return describe(np.array(values)) if values else None
+
+
+def rows(results: Sequence[RunResult], columns: Mapping[str, str]) -> list[dict[str, Any]]:
+    """A command's columns as plain values, for JSON."""
+    return [{name: getattr(each, field) for name, field in columns.items()} for each in results]
+
+
+def table(results: Sequence[RunResult], columns: Mapping[str, str]) -> str:
+    """Every run, as Markdown."""
+    cells = [[_cell(value) for value in row.values()] for row in rows(results, columns)]
+    return _markdown([[name.replace("_", " ") for name in columns], *cells])
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.1f}" if isinstance(value, float) else str(value).replace("|", "/")
+
+
+def _markdown(lines: list[list[str]]) -> str:
+    head, *rest = lines
+    return "\n".join(f"| {' | '.join(line)} |" for line in [head, ["---"] * len(head), *rest])
+
+
+# A cell of a summary: of the results of a group, and the return from which it counts as solved.
+Cell = Callable[[Sequence[RunResult], float | None], str]
+
+
+def summary_table(
+    groups: Mapping[str, Sequence[RunResult]],
+    columns: Sequence[tuple[str, Cell]],
+    thresholds: Mapping[str, float | None] | None = None,
+) -> str:
+    """A line for each group, as Markdown. Where seeds lack a figure, it says over how many it is.
+
+    Args:
+        thresholds: the groups' returns from which they count as solved, where that is counted.
+    """
+    lines = [
+        [cell(results, (thresholds or {}).get(name)) for _, cell in columns]
+        for name, results in groups.items()
+    ]
+    return _markdown([[name for name, _ in columns], *lines])
+
+
+def _name(results: Sequence[RunResult], line: float | None) -> str:
+    return results[0].group
+
+
+def _scored(results: Sequence[RunResult], line: float | None) -> str:
+    count = sum(each.score is not None for each in results)
+    return str(count) if count == len(results) else f"{count} of {len(results)} (see faults)"
+
+
+def _solved_count(results: Sequence[RunResult], line: float | None) -> str:
+    """A seed without a figure hasn't solved it."""
+    scores = [each.score for each in results if each.score is not None]
+    failed = sum(bool(each.fault) for each in results)
+    reached = sum(score >= line for score in scores) if line is not None else 0
+    text = "-" if line is None and scores else f"{reached} of {len(results)}"
+    return f"{text}, {failed} failed" if failed else text
+
+
+def _of(field: str, show: Callable[[Statistics], str]) -> Cell:
+    """A statistic of a figure."""
+
+    def cell(results: Sequence[RunResult], line: float | None) -> str:
+        found = statistics_of(results, field)
+        if found is None:
+            return "-"
+        lacking = f" ({found.n} of {len(results)})" if found.n < len(results) else ""
+        return show(found) + lacking
+
+    return cell
+
+
+def _spread(found: Statistics) -> str:
+    return f"{found.mean:.1f}" + (f" ± {found.std:.1f}" if found.n > 1 else "")
+
+
+def _median(found: Statistics) -> str:
+    return f"{found.median:.1f}"
+
+
+def _iqm(found: Statistics) -> str:
+    interval = found.iqm_interval
+    return f"{found.iqm:.1f}" + (f" [{interval[0]:.1f}, {interval[1]:.1f}]" if interval else "")
+
+
+def _range(interval: tuple[float, float] | None) -> str:
+    return "needs two seeds" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}"
+
+
+def _steps_to_solve(reduce: Callable[[list[float]], Any]) -> Cell:
+    """Over all seeds: one that never solved it took for ever."""
+
+    def cell(results: Sequence[RunResult], line: float | None) -> str:
+        steps = [math.inf if each.solved_step is None else each.solved_step for each in results]
+        found = reduce(steps)
+        never = "-" if line is None else "never"
+        return never if found == math.inf else f"{found:.0f}"
+
+    return cell
+
+
+def _most_seconds(results: Sequence[RunResult], line: float | None) -> str:
+    return _cell(max((each.seconds for each in results if each.seconds is not None), default=None))
+
+
+COMPARE_SUMMARY = (
+    ("group", _name),
+    ("runs", _scored),
+    ("mean ± std", _of("score", _spread)),
+    ("median", _of("score", _median)),
+    ("IQM", _of("score", lambda found: f"{found.iqm:.1f}")),
+    ("95% of the mean", _of("score", lambda found: _range(found.mean_interval))),
+    ("95% of the IQM", _of("score", lambda found: _range(found.iqm_interval))),
+)
+BENCHMARK_SUMMARY = (
+    ("variant", _name),
+    ("seeds solved", _solved_count),
+    ("best: mean ± std", _of("score", _spread)),
+    ("IQM [95 %]", _of("score", _iqm)),
+    ("final: IQM [95 %]", _of("final", _iqm)),
+    ("evaluations: IQM [95 %]", _of("evaluations", _iqm)),
+    ("median steps to solve", _steps_to_solve(np.median)),
+    ("most", _steps_to_solve(max)),
+    ("median seconds", _of("seconds", _median)),
+    ("most", _most_seconds),
+)
