@@ -116,6 +116,13 @@ def test_enjoy_without_a_display_says_so(runs: Path, monkeypatch, capsys) -> Non
     assert "DISPLAY isn't set" in line and "record" in line
 
 
+def test_enjoy_shows_episodes_where_a_display_is_named(runs: Path, monkeypatch, capsys) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    assert work("enjoy", runs / "dqn_0", "--episodes", 2) == 0
+    assert capsys.readouterr().out.count("| return") == 2
+
+
 @pytest.mark.parametrize("over", ["episodes", "steps"])
 def test_plot_draws_runs_of_every_kind(runs: Path, tmp_path: Path, over: str) -> None:
     out = tmp_path / "plot.png"
