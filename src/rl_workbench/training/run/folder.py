@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.record import CONFIG_RECORD, read_record
