@@ -1,4 +1,4 @@
-"""The balancing task against the document's figures; the other two against their own words."""
+"""The balancing task against the figures of the ROS policy-gradient document; the others against their own."""
 
 import numpy as np
 import pytest

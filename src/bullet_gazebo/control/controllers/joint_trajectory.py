@@ -165,7 +165,7 @@ class JointTrajectoryController(Controller):
     def _watch(self, goal: Goal) -> None:
         """Aborts at once; tells of progress and success at the monitor's rate."""
         if goal.outcome is None:
-            goal.outcome = goal.verdict(self._uptime)
+            goal.outcome = goal.outcome_at(self._uptime)
             if goal.outcome is not None and goal.outcome.code:
                 self._end_goal("")
                 return

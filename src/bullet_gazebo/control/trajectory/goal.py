@@ -77,7 +77,7 @@ class Goal:
         self._start = start
         self._late = late
 
-    def verdict(self, uptime: int) -> Outcome | None:
+    def outcome_at(self, uptime: int) -> Outcome | None:
         """Returns the outcome, None while the joints are on their way."""
         reached = True
         for axis, path, goal in self._watched:

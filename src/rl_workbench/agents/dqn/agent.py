@@ -204,7 +204,7 @@ class DQNAgent:
         }
 
     def load_policy_state(self, state: dict[str, Any]) -> None:
-        """Takes over what `policy_state` gave; a file of the document's has no normaliser."""
+        """Takes over what `policy_state` gave; a file of the DQN tutorial's has no normaliser."""
         self.q_net.load_state_dict(state["q_net"])
         self.target_net.load_state_dict(state["target_net"])
         self._epsilon.value = state["epsilon"]

@@ -7,8 +7,8 @@ class Epsilon:
     """The probability of a random action.
 
     - linear: from start_e to end_e over exploration_fraction of total_timesteps
-    - step: times epsilon_decay after each round of learning, as in the document's code
-    - episode: times epsilon_decay after each episode, as in the document's table
+    - step: times epsilon_decay after each round of learning, as in the DQN tutorial's code
+    - episode: times epsilon_decay after each episode, as in the DQN tutorial's table
     """
 
     def __init__(self, settings: DQNSettings) -> None:

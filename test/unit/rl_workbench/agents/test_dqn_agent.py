@@ -1,4 +1,4 @@
-"""The agent: its targets against the document's formulas, and that it learns."""
+"""The agent: its targets against the DQN tutorial's formulas, and that it learns."""
 
 import copy
 from typing import Any
@@ -31,7 +31,7 @@ def fill(learner: DQNAgent, steps: int = 8, terminated: bool = False) -> list[tu
 
 
 def the_documents_loss(learner: DQNAgent, seen: list[tuple], done: float, double: bool) -> float:
-    """One loss, written as the document's train_step and train_step_double_dqn write it."""
+    """One loss, written as the DQN tutorial's train_step and train_step_double_dqn write it."""
     s, a, r, s_ = (torch.tensor(np.array(column)) for column in zip(*seen, strict=True))
     q_pred = learner.q_net(s).gather(1, a.unsqueeze(1)).squeeze()
     if double:
@@ -119,7 +119,7 @@ def test_an_infinite_loss_leaves_the_weights() -> None:
 
 
 def test_the_documents_own_way_of_loading(tmp_path) -> None:
-    """The document's class has these layers, and its code loads these keys."""
+    """The DQN tutorial's class has these layers, and its code loads these keys."""
     theirs = nn.Module()
     theirs.net = nn.Sequential(nn.Linear(4, 128), nn.ReLU(), nn.Linear(128, 128), nn.ReLU(),
                                nn.Linear(128, 2))  # fmt: skip

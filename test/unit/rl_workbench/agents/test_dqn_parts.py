@@ -184,7 +184,7 @@ def test_epsilon_by_step_and_by_episode() -> None:
     for _ in range(20):
         by_episode.episode_done()
     assert by_step.value == 0.3
-    assert f"{by_episode.value:.3f}" == "0.905", "the document's first line"
+    assert f"{by_episode.value:.3f}" == "0.905", "the DQN tutorial's first line"
 
 
 def test_learning_rates() -> None:

@@ -1,4 +1,4 @@
-"""The learner against the document's own, slow and obvious, way."""
+"""The learner against the ROS policy-gradient document's own, slow and obvious, way."""
 
 import random
 
@@ -31,7 +31,7 @@ def document_future_reward(rewards: list[float], index: int) -> float:
 
 
 def document_update(agent: PolicyGradientAgent, episode: Episode) -> tuple[float, float]:
-    """One update in the document's words, on the agent's networks and optimisers."""
+    """One update in the ROS policy-gradient document's words, on the agent's networks and optimisers."""
     advantages, targets = [], []
     for index, observation in enumerate(episode.observations):
         future = document_future_reward(episode.rewards, index)
