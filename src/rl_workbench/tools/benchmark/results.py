@@ -10,7 +10,7 @@ import numpy as np
 from rl_workbench.curves import WINDOW
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.episodes import play
-from rl_workbench.tools.runs.players import load_player
+from rl_workbench.tools.runs.policies import load_learned
 from rl_workbench.tools.runs.runs import (
     CONFIRMED,
     EVALUATION,
@@ -101,11 +101,11 @@ def examine(
 
 def _greedy(run: Run, episodes: int, which: str, warn: Callable[[str], None]) -> float:
     """Mean return of a checkpoint's greedy episodes."""
-    player = load_player(run, which, say=warn)
+    policy = load_learned(run, which, say=warn)
     try:
-        return play(player, episodes, run.seed).mean_return
+        return play(policy, episodes, run.seed).mean_return
     finally:
-        player.env.close()
+        policy.env.close()
 
 
 def _mean_evaluation(run: Run) -> float | None:

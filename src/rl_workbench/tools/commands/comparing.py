@@ -8,7 +8,7 @@ from rl_workbench.tools.benchmark import tables
 from rl_workbench.tools.benchmark.results import RunResult, examine
 from rl_workbench.tools.commands.shared import number, write_figure
 from rl_workbench.tools.pictures.panels import seed_panels
-from rl_workbench.tools.runs.players import WHICH
+from rl_workbench.tools.runs.policies import WHICH
 from rl_workbench.tools.runs.runs import find_runs
 from rl_workbench.training.run.files import as_json, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt

@@ -8,7 +8,7 @@ from rl_workbench.tools.commands.shared import add_policy_flags, env_options, wr
 from rl_workbench.tools.pictures.panels import run_panels
 from rl_workbench.tools.pictures.policy_map import policy_map, state_plane
 from rl_workbench.tools.runs.episodes import TEST_SEED
-from rl_workbench.tools.runs.players import load_player
+from rl_workbench.tools.runs.policies import load_learned
 from rl_workbench.tools.runs.runs import find_runs, open_run
 from rl_workbench.training.run.files import check_writable
 from rl_workbench.training.run.interrupt import Interrupt
@@ -45,10 +45,10 @@ def _policy(arguments: argparse.Namespace) -> None:
     run = open_run(arguments.run)
     plane = state_plane(run.env_id)  # other environments are refused before anything is loaded
     check_writable(arguments.out)
-    player = load_player(run, arguments.checkpoint, env_options(arguments))
+    policy = load_learned(run, arguments.checkpoint, env_options(arguments))
     title = f"policy of {run.label}; cart in the middle, at rest"
     try:
-        figure = policy_map(plane, player, TEST_SEED + arguments.seed, title)
+        figure = policy_map(plane, policy, TEST_SEED + arguments.seed, title)
     finally:
-        player.env.close()
+        policy.env.close()
     write_figure(arguments.out, figure)

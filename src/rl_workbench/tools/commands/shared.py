@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.figure import as_png
-from rl_workbench.tools.runs.players import WHICH
+from rl_workbench.tools.runs.policies import WHICH
 from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.run_options import RunOptions
 from rl_workbench.training.run.files import write_file

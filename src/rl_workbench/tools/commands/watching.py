@@ -11,7 +11,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.commands.shared import add_policy_flags, env_options, number
 from rl_workbench.tools.pictures import videos
 from rl_workbench.tools.runs import episodes
-from rl_workbench.tools.runs.players import Player, load_player
+from rl_workbench.tools.runs.policies import LearnedPolicy, load_learned
 from rl_workbench.tools.runs.runs import Run, open_run, threshold
 from rl_workbench.training.run.files import as_json, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
@@ -54,21 +54,21 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     commands[arguments.command](arguments, open_run(arguments.run))
 
 
-def _player(arguments: argparse.Namespace, run: Run, **options: Any) -> Player:
-    return load_player(run, arguments.checkpoint, {**env_options(arguments), **options})
+def _policy(arguments: argparse.Namespace, run: Run, **options: Any) -> LearnedPolicy:
+    return load_learned(run, arguments.checkpoint, {**env_options(arguments), **options})
 
 
 def _eval(arguments: argparse.Namespace, run: Run) -> None:
     to_stdout = str(arguments.json) == "-"
     if arguments.json and not to_stdout:
         check_writable(arguments.json)
-    player = _player(arguments, run)
+    policy = _policy(arguments, run)
     try:
-        result = episodes.play(player, arguments.episodes, arguments.seed)
+        result = episodes.play(policy, arguments.episodes, arguments.seed)
     finally:
-        player.env.close()
+        policy.env.close()
     line = threshold(run.env_id)
-    found = {"run": str(run.folder), **episodes.statistics(result, player.checkpoint, line)}
+    found = {"run": str(run.folder), **episodes.statistics(result, policy.checkpoint, line)}
     # With the figures on standard output, what people read goes beside it.
     stream = sys.stderr if to_stdout else sys.stdout
     print(episodes.lines(result), file=stream)
@@ -85,25 +85,25 @@ def _enjoy(arguments: argparse.Namespace, run: Run) -> None:
             "enjoy needs a display to open a window on, and DISPLAY isn't set; "
             f"record {arguments.run} --out episode.gif shows it without one"
         )
-    player = _player(arguments, run, render_mode="human")
+    policy = _policy(arguments, run, render_mode="human")
     try:
-        print(episodes.lines(episodes.play(player, arguments.episodes, arguments.seed)))
+        print(episodes.lines(episodes.play(policy, arguments.episodes, arguments.seed)))
     finally:
-        player.env.close()
+        policy.env.close()
 
 
 def _record(arguments: argparse.Namespace, run: Run) -> None:
     videos.check_format(arguments.out)
     check_writable(arguments.out)
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # or pygame would look for a screen
-    player = _player(arguments, run, render_mode="rgb_array")
+    policy = _policy(arguments, run, render_mode="rgb_array")
     fastest = videos.GIF_RATE if arguments.out.suffix.lower() == ".gif" else videos.MP4_RATE
     try:
         video = videos.record_episode(
-            player, episodes.TEST_SEED + arguments.seed, fastest, arguments.max_steps
+            policy, episodes.TEST_SEED + arguments.seed, fastest, arguments.max_steps
         )
     finally:
-        player.env.close()
+        policy.env.close()
     videos.write_video(arguments.out, video, arguments.scale)
     print(
         f"{arguments.out}: return {video.total_reward:.2f} in {video.length} steps, "

@@ -12,7 +12,7 @@ from matplotlib.patheffects import withStroke
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.figure import new_figure
 from rl_workbench.tools.runs.episodes import greedy_steps
-from rl_workbench.tools.runs.players import Player
+from rl_workbench.tools.runs.policies import LearnedPolicy
 
 POINTS = 161  # of each axis
 LONGEST = 1500  # [steps] of the episode that is drawn over the policy
@@ -70,15 +70,15 @@ def state_plane(env_id: str) -> StatePlane:
     return PLANES[env_id]
 
 
-def policy_map(plane: StatePlane, player: Player, seed: int, title: str) -> Figure:
+def policy_map(plane: StatePlane, policy: LearnedPolicy, seed: int, title: str) -> Figure:
     """The policy's preference over the plane, with one greedy episode over it."""
     angles = np.linspace(-plane.angle, plane.angle, POINTS)
     velocities = np.linspace(-plane.velocity, plane.velocity, POINTS)
-    preferences = _preferences(plane, player, angles, velocities)
+    preferences = _preferences(plane, policy, angles, velocities)
     figure = new_figure(8, 6)
     axes = figure.subplots()
-    _draw_preferences(axes, player, np.degrees(angles), velocities, preferences)
-    _draw_episode(axes, _trajectory(plane, player, seed), plane)
+    _draw_preferences(axes, policy, np.degrees(angles), velocities, preferences)
+    _draw_episode(axes, _trajectory(plane, policy, seed), plane)
     axes.set_xlabel(f"pole angle θ [°], 0 upright; positive leans to the {plane.lean}")
     axes.set_ylabel("angular velocity dθ/dt [rad/s]")
     axes.set_title(title)
@@ -87,16 +87,20 @@ def policy_map(plane: StatePlane, player: Player, seed: int, title: str) -> Figu
 
 
 def _preferences(
-    plane: StatePlane, player: Player, angles: np.ndarray, velocities: np.ndarray
+    plane: StatePlane, policy: LearnedPolicy, angles: np.ndarray, velocities: np.ndarray
 ) -> np.ndarray:
     """The preference at every point, (velocities, angles)."""
     across, up = np.meshgrid(angles, velocities)
-    values = player.preference(plane.observe(across.ravel(), up.ravel()))
+    values = policy.preference(plane.observe(across.ravel(), up.ravel()))
     return values.reshape(across.shape)
 
 
 def _draw_preferences(
-    axes: Axes, player: Player, angles: np.ndarray, velocities: np.ndarray, values: np.ndarray
+    axes: Axes,
+    policy: LearnedPolicy,
+    angles: np.ndarray,
+    velocities: np.ndarray,
+    values: np.ndarray,
 ) -> None:
     # Rare corners with huge values would leave no colour for the rest.
     strongest = max(float(np.percentile(np.abs(values), 95)), 1e-9)
@@ -104,15 +108,15 @@ def _draw_preferences(
         angles, velocities, values, cmap="RdBu_r", vmin=-strongest, vmax=strongest,
         shading="auto", rasterized=True,
     )  # fmt: skip
-    axes.figure.colorbar(mesh, ax=axes, label=f"{player.meaning}: red pushes right, blue left")
+    axes.figure.colorbar(mesh, ax=axes, label=f"{policy.meaning}: red pushes right, blue left")
     if values.min() < 0.0 < values.max():
         axes.contour(angles, velocities, values, levels=[0.0], colors="black", linewidths=1.5)
         axes.plot([], [], color="black", linewidth=1.5, label="the policy changes its mind")
 
 
-def _trajectory(plane: StatePlane, player: Player, seed: int) -> np.ndarray:
+def _trajectory(plane: StatePlane, policy: LearnedPolicy, seed: int) -> np.ndarray:
     """Angle [°] and velocity [rad/s] along one greedy episode, (T, 2)."""
-    steps = greedy_steps(player, seed, LONGEST)
+    steps = greedy_steps(policy, seed, LONGEST)
     places = [plane.locate(observation) for observation, _, _ in steps]
     return np.array(places) * (180.0 / math.pi, 1.0)
 

@@ -13,7 +13,7 @@ from PIL import Image
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.episodes import greedy_steps
-from rl_workbench.tools.runs.players import Player
+from rl_workbench.tools.runs.policies import LearnedPolicy
 from rl_workbench.training.run.files import write_file
 
 GIF_RATE, MP4_RATE = 25.0, 50.0  # [Hz]; frames between them are left out
@@ -43,7 +43,7 @@ def check_format(path: Path) -> None:
         raise WorkbenchError("MP4 needs imageio-ffmpeg: ./ws extras installs it; GIF needs nothing")
 
 
-def record_episode(player: Player, seed: int, fastest: float, longest: int = 0) -> Video:
+def record_episode(policy: LearnedPolicy, seed: int, fastest: float, longest: int = 0) -> Video:
     """Plays one greedy episode and keeps every frame that a video of at most `fastest` [Hz] shows.
 
     Args:
@@ -52,13 +52,13 @@ def record_episode(player: Player, seed: int, fastest: float, longest: int = 0) 
     Raises:
         WorkbenchError: if the environment draws no pictures.
     """
-    rate = float(player.env.metadata.get("render_fps") or 30.0)
+    rate = float(policy.env.metadata.get("render_fps") or 30.0)
     stride = math.ceil(rate / fastest)
     frames, total = [], 0.0
-    for length, (_, reward, finished) in enumerate(greedy_steps(player, seed, longest)):
+    for length, (_, reward, finished) in enumerate(greedy_steps(policy, seed, longest)):
         total += reward
         if finished or length % stride == 0:
-            frames.append(_picture(player.env))
+            frames.append(_picture(policy.env))
     return Video(frames, rate / stride, length, total)
 
 

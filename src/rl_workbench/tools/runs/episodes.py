@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.tools.runs.players import Player
+from rl_workbench.tools.runs.policies import LearnedPolicy
 from rl_workbench.training.run.evaluator import Evaluation, run_greedily
 
 TEST_SEED = 5_000_000  # other episodes than those of any training or of its evaluations
 
 
-def play(player: Player, episodes: int, seed: int) -> Evaluation:
+def play(policy: LearnedPolicy, episodes: int, seed: int) -> Evaluation:
     """Runs greedy episodes, seeded once.
 
     Raises:
         WorkbenchError: if the environment fails.
     """
     try:
-        result = run_greedily(player.env, player.act, TEST_SEED + seed, episodes)
+        result = run_greedily(policy.env, policy.act, TEST_SEED + seed, episodes)
     except (ValueError, AssertionError) as error:
         raise WorkbenchError(f"the policy doesn't fit the environment: {error}") from error
     assert result is not None  # nothing told it to stop
@@ -29,18 +29,18 @@ def play(player: Player, episodes: int, seed: int) -> Evaluation:
 
 
 def greedy_steps(
-    player: Player, seed: int, longest: int = 0
+    policy: LearnedPolicy, seed: int, longest: int = 0
 ) -> Iterator[tuple[np.ndarray, float, bool]]:
     """One greedy episode: observation, reward and whether it is over, from the reset on.
 
     Args:
         longest: number of steps after which it is cut off; 0: never.
     """
-    observation, _ = player.env.reset(seed=seed)
+    observation, _ = policy.env.reset(seed=seed)
     yield observation, 0.0, False
     for length in count(1):
-        action = player.act(np.asarray(observation, np.float32))
-        observation, reward, terminated, truncated, _ = player.env.step(action)
+        action = policy.act(np.asarray(observation, np.float32))
+        observation, reward, terminated, truncated, _ = policy.env.step(action)
         finished = terminated or truncated or length == longest
         yield observation, float(reward), finished
         if finished:

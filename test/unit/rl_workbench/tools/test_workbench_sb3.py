@@ -86,15 +86,15 @@ def test_the_other_commands_take_it(ppo: Path, tmp_path: Path) -> None:
 def test_the_policy_is_the_one_that_was_trained(ppo: Path) -> None:
     from stable_baselines3 import PPO
 
-    from rl_workbench.tools.runs.players import load_player
+    from rl_workbench.tools.runs.policies import load_learned
     from rl_workbench.tools.runs.runs import open_run
 
-    player = load_player(open_run(ppo), "last")
+    learned = load_learned(open_run(ppo), "last")
     model = PPO.load(ppo / "model.zip")
     env = gymnasium.make("CartPole-v1")
     for seed in range(20):
         observation, _ = env.reset(seed=seed)
-        assert player.act(observation) == model.predict(observation, deterministic=True)[0]
+        assert learned.act(observation) == model.predict(observation, deterministic=True)[0]
 
 
 @pytest.mark.parametrize(
@@ -105,18 +105,18 @@ def test_the_policy_is_the_one_that_was_trained(ppo: Path) -> None:
 def test_a_choice_is_drawn_by_how_much_it_is_preferred(
     tmp_path: Path, algorithm: str, options: dict, meaning: str
 ) -> None:
-    from rl_workbench.tools.runs.players import load_player
+    from rl_workbench.tools.runs.policies import load_learned
     from rl_workbench.tools.runs.runs import open_run
 
     run = workbench_runs.sb3(tmp_path / "run", algorithm, **options)
-    player = load_player(open_run(run))
+    learned = load_learned(open_run(run))
     observations = np.random.default_rng(0).normal(size=(50, 4)).astype(np.float32)
-    preferred = player.preference(observations)
+    preferred = learned.preference(observations)
     assert preferred.shape == (50,) and len(np.unique(preferred)) > 10
-    assert player.meaning == meaning
-    chosen = [player.act(each) for each in observations]
+    assert learned.meaning == meaning
+    chosen = [learned.act(each) for each in observations]
     assert [int(value > 0) for value in preferred] == chosen
-    player.env.close()
+    learned.env.close()
 
 
 def test_the_same_seed_learns_the_same(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a training learned, ready to act: one `Player` for every kind of run."""
+"""What a training learned, ready to act in an environment of its kind."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -18,7 +18,7 @@ from rl_workbench.training.run.progress import warn
 WHICH = ("best", "last")
 
 
-class Player(NamedTuple):
+class LearnedPolicy(NamedTuple):
     """A learned policy, and an environment of the kind it learned in; the caller closes that."""
 
     act: Callable[[np.ndarray], Any]  # greedily, for one observation (D,)
@@ -28,12 +28,12 @@ class Player(NamedTuple):
     checkpoint: Path
 
 
-def load_player(
+def load_learned(
     run: Run,
     which: str = "best",
     env_options: Mapping[str, Any] | None = None,
     say: Callable[[str], None] = warn,
-) -> Player:
+) -> LearnedPolicy:
     """The policy of a run's best or last checkpoint, or of the one before it if that is damaged.
 
     Args:
@@ -50,18 +50,18 @@ def load_player(
         except WorkbenchError as error:
             say(f"{error}; taking an earlier one")
             continue
-        return _player(run, path, content, env_options or {})
+        return _learned(run, path, content, env_options or {})
     reason = "none of its checkpoints can be read" if paths else "it has no checkpoint yet"
     raise WorkbenchError(f"{run.folder} has no policy: {reason}")
 
 
-def _player(
+def _learned(
     run: Run, path: Path, content: dict[str, Any], env_options: Mapping[str, Any]
-) -> Player:
+) -> LearnedPolicy:
     options = recorded_options(content.get("config"), str(path))
     env = make_environment(run.env_id, {**run.env_kwargs, **env_options})
     try:
-        return Player(*load_policy(options, content, env, str(path)), env, path)
+        return LearnedPolicy(*load_policy(options, content, env, str(path)), env, path)
     except WorkbenchError:
         env.close()
         raise
