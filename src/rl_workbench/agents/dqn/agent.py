@@ -234,7 +234,7 @@ class DQNAgent:
         self._returns.load_state_dict(state["window"])
         for generator, text in zip((self._explore, self._draw), state["generators"], strict=True):
             generator.bit_generator.state = json.loads(text)
-        self.steps, self.gradient_steps = state["steps"], state["gradient_steps"]
+        self.steps, self.gradient_steps = int(state["steps"]), int(state["gradient_steps"])
 
 
 def _copied(network: nn.Module) -> dict[str, torch.Tensor]:
