@@ -207,7 +207,7 @@ class DQNAgent:
         """Takes over what `policy_state` gave; a file of the document's has no normaliser."""
         self.q_net.load_state_dict(state["q_net"])
         self.target_net.load_state_dict(state["target_net"])
-        self._epsilon.value = state["epsilon"]
+        self._epsilon.value = float(state["epsilon"])
         if self.normaliser is not None:
             self.normaliser.load_state_dict(state["normaliser"])
 

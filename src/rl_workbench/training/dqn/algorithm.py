@@ -144,7 +144,7 @@ class DQNTraining(Algorithm):
         if state["episode"] is None:
             return
         self._observation = self._place.load_state_dict(state["episode"])
-        self._reward = state["reward"]
+        self._reward = float(state["reward"])
         if self._observation is None:
             say("the environment doesn't repeat itself: the episode under way is given up")
             self._reward = 0.0

@@ -62,7 +62,7 @@ def restore(model: Any, state: dict[str, Any], seed: int) -> None:
         if state["entropy"] is not None:
             getattr(model, ENTROPY).data.copy_(state["entropy"])
         for name, value in state["counters"].items():
-            setattr(model, name, value)
+            setattr(model, name, int(value))
         if state["buffer"] is not None:
             _restore_buffer(model.replay_buffer, state["buffer"])
         # Another seed than at the start, or the same episodes would be explored again.
@@ -86,6 +86,6 @@ def _buffer_state(buffer: Any) -> dict[str, Any] | None:
 
 
 def _restore_buffer(buffer: Any, state: dict[str, Any]) -> None:
-    buffer.pos, buffer.full = state["position"], state["full"]
+    buffer.pos, buffer.full = int(state["position"]), bool(state["full"])
     for name, values in state["arrays"].items():
         getattr(buffer, name)[: len(values)] = values.numpy()
