@@ -25,22 +25,22 @@ def register_with(monkeypatch: pytest.MonkeyPatch, kind: type[gymnasium.Env]) ->
 class Dicing(gymnasium.Env):
     """Draws from the generators that all of a process share."""
 
-    observation_space = gymnasium.spaces.Box(-9, 9, (2,), np.float32)
+    observation_space = gymnasium.spaces.Box(-9, 9, (4,), np.float32)
     action_space = gymnasium.spaces.Discrete(2)
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        return np.full(2, random.random(), np.float32), {}
+        return np.full(4, random.random(), np.float32), {}
 
     def step(self, action):
         ended = bool(np.random.random() < 0.1)
-        return np.full(2, torch.rand(1).item(), np.float32), random.random(), ended, False, {}
+        return np.full(4, torch.rand(1).item(), np.float32), random.random(), ended, False, {}
 
 
 class OnlyOne(gymnasium.Env):
     """As over ROS: another one of its kind would move the same robot."""
 
-    observation_space = gymnasium.spaces.Box(-9, 9, (2,), np.float32)
+    observation_space = gymnasium.spaces.Box(-9, 9, (4,), np.float32)
     action_space = gymnasium.spaces.Discrete(2)
     shares_robot = True
 
@@ -58,7 +58,80 @@ class OnlyOne(gymnasium.Env):
         )
 
     def _observation(self):
-        return self.np_random.random(2, np.float32)
+        return self.np_random.random(4, np.float32)
+
+
+class Died(gymnasium.error.Error):
+    """What an environment raises whose simulator has ended; those of robots are of this kind, too."""
+
+
+class Pole(gymnasium.Env):
+    """A pole on a cart that follows its set-point with a lag; an action nudges that. Semi-implicit Euler.
+
+    Args:
+        noise: episodes start within +-noise of the origin [m] and of upright [rad]; 0: all alike.
+        dies_after: number of actions after which the simulator "dies"; None: never.
+    """
+
+    observation_space = gymnasium.spaces.Box(-99, 99, (4,), np.float32)
+    action_space = gymnasium.spaces.Discrete(2)
+
+    def __init__(self, noise: float = 0.0, dies_after: int | None = None) -> None:
+        self._noise, self._dies_after, self._actions = noise, dies_after, 0
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        x, angle = self.np_random.uniform(-self._noise, self._noise, 2) if self._noise else (0.0, 0.0)
+        self._state, self._set_point = (x, 0.0, angle, 0.0), x
+        return np.array(self._state, np.float32), {}
+
+    def step(self, action):
+        self._actions += 1
+        if self._dies_after is not None and self._actions > self._dies_after:
+            raise Died("the connection broke; the simulator has ended")
+        x, v, angle, rate = self._state
+        self._set_point += 0.02 if action == 1 else -0.02
+        acceleration = 100.0 * (self._set_point - x) - 14.0 * v
+        v += acceleration * DT
+        x += v * DT
+        rate += (30.0 * angle + 3.0 * acceleration) * DT  # leans towards -x
+        angle += rate * DT
+        self._state = (x, v, angle, rate)
+        fallen = abs(x) > 0.4 or abs(angle) > 0.2
+        reward = 0.5 + abs(angle) - abs(x) - 10.0 * fallen
+        return np.array(self._state, np.float32), float(reward), bool(fallen), False, {}
+
+
+POLE = "fakes/Pole-v0"
+gymnasium.register(POLE, Pole, max_episode_steps=3000, disable_env_checker=True)
+
+
+class Spoilt(gymnasium.Env):
+    """Gives numbers at its 30th step that are none, or too large to learn from.
+
+    Args:
+        observation: in the observation of that step.
+        reward: of that step.
+    """
+
+    observation_space = gymnasium.spaces.Box(-1, 1, (4,), np.float32)
+    action_space = gymnasium.spaces.Discrete(2)
+
+    def __init__(self, observation: float = 0.0, reward: float = 1.0) -> None:
+        self._spoilt, self._steps = (observation, reward), 0
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return np.zeros(4, np.float32), {}
+
+    def step(self, action):
+        self._steps += 1
+        number, reward = self._spoilt if self._steps == 30 else (0.0, 1.0)
+        return np.array([0.0, 0.0, 0.0, number]), reward, self._steps % 7 == 0, False, {}
+
+
+SPOILT = "fakes/Spoilt-v0"
+gymnasium.register(SPOILT, Spoilt, disable_env_checker=True)
 
 
 class FakePlant:

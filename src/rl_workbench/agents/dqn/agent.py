@@ -207,7 +207,7 @@ class DQNAgent:
         """Takes over what `policy_state` gave; a file of the DQN tutorial's has no normaliser."""
         self.q_net.load_state_dict(state["q_net"])
         self.target_net.load_state_dict(state["target_net"])
-        self._epsilon.value = state["epsilon"]
+        self._epsilon.value = float(state["epsilon"])
         if self.normaliser is not None:
             self.normaliser.load_state_dict(state["normaliser"])
 
@@ -234,7 +234,7 @@ class DQNAgent:
         self._returns.load_state_dict(state["window"])
         for generator, text in zip((self._explore, self._draw), state["generators"], strict=True):
             generator.bit_generator.state = json.loads(text)
-        self.steps, self.gradient_steps = state["steps"], state["gradient_steps"]
+        self.steps, self.gradient_steps = int(state["steps"]), int(state["gradient_steps"])
 
 
 def _copied(network: nn.Module) -> dict[str, torch.Tensor]:

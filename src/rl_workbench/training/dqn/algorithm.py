@@ -10,6 +10,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.dqn.repeatable import RepeatableEnvironment
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
+from rl_workbench.training.run.checkpoints import fitting
 from rl_workbench.training.run.environments import discrete_actions, make_environment
 from rl_workbench.training.run.policy import Policy
 
@@ -117,12 +118,8 @@ class DQNTraining(Algorithm):
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """See `Algorithm.load_state_dict`."""
-        try:
+        with fitting("agent"):
             self._agent.load_state_dict(state)
-        except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
-            raise WorkbenchError(
-                f"the checkpoint holds another agent: {_first_line(error)}"
-            ) from error
 
     def environment_state(self) -> dict[str, Any]:
         """The episode under way, if there is one, the generator, and the last loss."""
@@ -147,12 +144,8 @@ class DQNTraining(Algorithm):
         if state["episode"] is None:
             return
         self._observation = self._place.load_state_dict(state["episode"])
-        self._reward = state["reward"]
+        self._reward = float(state["reward"])
         if self._observation is None:
             say("the environment doesn't repeat itself: the episode under way is given up")
             self._reward = 0.0
             self._agent.episode_done()
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).split("\n")[0]

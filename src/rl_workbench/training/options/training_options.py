@@ -51,7 +51,9 @@ class TrainingOptions(NamedTuple):
 
 def _flat(record: Any, origin: str) -> dict[str, Any]:
     """As JSON has it, where there are no tuples."""
-    if not isinstance(record, dict) or not {"algorithm", "run", "hyperparameters"} <= set(record):
+    found = record if isinstance(record, dict) else {}
+    parts = [found.get(name) for name in ("run", "hyperparameters")]
+    if "algorithm" not in found or not all(isinstance(each, dict) for each in parts):
         raise WorkbenchError(f"{origin} isn't a training of this version")
     plain = json.loads(json.dumps(record))
     return {"algorithm": plain["algorithm"], **plain["run"], **plain["hyperparameters"]}

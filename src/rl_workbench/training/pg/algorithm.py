@@ -13,6 +13,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.pg.episodes import EpisodeGenerators, run_episode
 from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
+from rl_workbench.training.run.checkpoints import fitting
 from rl_workbench.training.run.environments import discrete_actions, make_environment
 from rl_workbench.training.run.files import save_tensors
 from rl_workbench.training.run.policy import Policy
@@ -151,13 +152,10 @@ class PolicyGradientTraining(Algorithm):
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """See `Algorithm.load_state_dict`."""
-        try:
+        with fitting("agent"):
             self._agent.load_state_dict(state["agent"])
             self._episodes, self._stride = int(state["episodes"]), int(state["stride"])
             self._steps = int(state["steps"])
-        except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
-            text = str(error).split("\n")[0]
-            raise WorkbenchError(f"the checkpoint holds another agent: {text}") from error
 
     def environment_state(self) -> str:
         """The state of the environment's generator; there is no episode under way."""

@@ -12,7 +12,7 @@ import pickle
 import shutil
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ LEFTOVERS = (".*.pt.*", ".*.pt.new", ".*.pth.*", ".*.json.*", ".*.png.*")  # of 
 FORMAT = "rl_workbench 2"  # changes when older files can't be read any more
 _DAMAGED = (RuntimeError, pickle.UnpicklingError, EOFError, ValueError, KeyError, TypeError,
             AttributeError, IndexError, zipfile.BadZipFile, zlib.error)  # fmt: skip
+_MISFITS = (LookupError, TypeError, ValueError, RuntimeError, AttributeError)
 
 
 class Checkpoints:
@@ -116,6 +117,23 @@ def read(path: Path) -> dict[str, Any]:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise WorkbenchError(f"{path} is no checkpoint of this version")
     return content
+
+
+@contextlib.contextmanager
+def fitting(what: str) -> Iterator[None]:
+    """Tells in one line if what is taken over from a checkpoint doesn't fit.
+
+    Args:
+        what: is taken over, for the error.
+
+    Raises:
+        WorkbenchError: if it doesn't.
+    """
+    try:
+        yield
+    except _MISFITS as error:
+        text = str(error).split("\n")[0] or type(error).__name__
+        raise WorkbenchError(f"the checkpoint holds another {what}: {text}") from error
 
 
 def read_newest(run: Path, say: Callable[[str], None]) -> dict[str, Any]:

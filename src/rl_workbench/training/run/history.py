@@ -32,8 +32,18 @@ class History:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Takes over what `state_dict` gave."""
-        self.returns, self.lengths = state["returns"].tolist(), state["lengths"].tolist()
-        self.evaluations = [(step, mean) for step, mean in state["evaluations"]]
-        self.best = None if state["best"] is None else (state["best"][0], state["best"][1])
-        self.seconds = state["seconds"]
+        """Takes over what `state_dict` gave.
+
+        Raises:
+            TypeError, ValueError, LookupError, AttributeError: if it gave something else.
+        """
+        self.returns = [float(each) for each in state["returns"].tolist()]
+        self.lengths = [int(each) for each in state["lengths"].tolist()]
+        if len(self.returns) != len(self.lengths):
+            raise ValueError(f"{len(self.returns)} returns, {len(self.lengths)} lengths")
+        self.evaluations = [(int(step), float(mean)) for step, mean in state["evaluations"]]
+        self.best = None
+        if state["best"] is not None:
+            step, mean = state["best"]
+            self.best = (int(step), float(mean))
+        self.seconds = float(state["seconds"])

@@ -13,7 +13,7 @@ from rl_workbench.training.options.record import read_record
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.algorithm import make_algorithm
-from rl_workbench.training.run.checkpoints import Checkpoints, candidates, read_newest
+from rl_workbench.training.run.checkpoints import Checkpoints, candidates, fitting, read_newest
 from rl_workbench.training.run.evaluator import Evaluation, Evaluator
 from rl_workbench.training.run.history import History
 from rl_workbench.training.run.interrupt import Interrupt
@@ -43,15 +43,14 @@ class Training:
         self._options, self._run = options, options.run
         self.folder, self._interrupt = folder, interrupt
         self._checkpoints = Checkpoints(folder, self._run.keep_checkpoints)
-        self._history = History()
+        self._history, self._log_bytes = History(), 0
         self._resumed = self._read_checkpoint() if options.resume else None
         seed_all(self._run.seed)
         self._algorithm = make_algorithm(options)
         try:
             self._evaluator = Evaluator(self._run, self._algorithm, interrupt.requested)
             if self._resumed:
-                self._algorithm.load_state_dict(self._resumed)
-                self._history.load_state_dict(self._resumed["history"])
+                self._take_over(self._resumed)
         except WorkbenchError:
             self._algorithm.close()
             raise
@@ -70,6 +69,15 @@ class Training:
         content = read_newest(self.folder, tell)
         self._options.check_same(content.get("config"), str(self.folder))
         return content
+
+    def _take_over(self, content: dict[str, Any]) -> None:
+        """All but the environment's state, which needs it to be seeded."""
+        self._algorithm.load_state_dict(content)
+        with fitting("history"):
+            self._history.load_state_dict(content["history"])
+            self._log_bytes = int(content["log_bytes"])
+        with fitting("state of the random generators"):
+            restore_random_states(content["random"])
 
     # --- the course of a training ---------------------------------------------------------------
 
@@ -95,13 +103,18 @@ class Training:
         self._checkpoints.remove_leftovers()
         record = self._options.record()
         run_folder.write_record(self.folder, record, bool(self._resumed))
-        length = self._resumed["log_bytes"] if self._resumed else 0
-        self.log = ScalarLog(
-            self.folder, {**record["run"], **record["hyperparameters"]}, length, tell
-        )
+        settings = {**record["run"], **record["hyperparameters"]}
+        self.log = ScalarLog(self.folder, settings, self._log_bytes, tell)
         self._shown = self._make_progress()
         try:
             self._begin()
+            self._learn()
+        finally:
+            self._shown.close()
+            self.log.close()
+
+    def _learn(self) -> None:
+        try:
             self._algorithm.learn(self)
             self._update_clock()
             self._saved_at = -1  # some learn once more after their last step
@@ -110,9 +123,6 @@ class Training:
         except WorkbenchError:
             self._save_after_failure()
             raise
-        finally:
-            self._shown.close()
-            self.log.close()
 
     def _make_progress(self) -> Progress:
         if self._run.total_timesteps:
@@ -131,7 +141,8 @@ class Training:
         others = run_folder.other_versions(read_record(self.folder).get("versions", {}))
         if others:
             tell(f"{others}: from here on it may come to other bits")
-        algorithm.start_environment(self._resumed["environment"], self._shown.say)
+        with fitting("state of the environment"):
+            algorithm.start_environment(self._resumed["environment"], self._shown.say)
         restore_random_states(self._resumed["random"])
         tell(f"going on at step {algorithm.steps}{self._of_total()}: {self.folder}")
         self._resumed = None  # a replay buffer's worth of memory

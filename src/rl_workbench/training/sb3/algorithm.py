@@ -107,8 +107,7 @@ class SB3Training(Algorithm):
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """See `Algorithm.load_state_dict`."""
-        # Another seed than at the start, or the same episodes would be explored again.
-        restore(self._model, state, (self._run.seed + int(state["steps"])) % 2**31)
+        restore(self._model, state, self._run.seed)
 
     def environment_state(self) -> None:
         """None: it can't be brought back."""

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.run.checkpoints import fitting
 
 COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_n_calls")
 ENTROPY = "log_ent_coef"  # SAC's, no part of a network
@@ -51,23 +52,21 @@ def restore(model: Any, state: dict[str, Any], seed: int) -> None:
     """Lets a new model go on from what `state_of` gave.
 
     Args:
-        seed: of what is random from here on.
+        seed: of the training.
 
     Raises:
         WorkbenchError: if the state is another model's.
     """
-    try:
+    with fitting("model"):
         model.set_parameters({"policy": state["policy"], **state["optimizers"]})
         if state["entropy"] is not None:
             getattr(model, ENTROPY).data.copy_(state["entropy"])
         for name, value in state["counters"].items():
-            setattr(model, name, value)
+            setattr(model, name, int(value))
         if state["buffer"] is not None:
             _restore_buffer(model.replay_buffer, state["buffer"])
-    except (KeyError, RuntimeError, ValueError, AttributeError) as error:
-        text = str(error).splitlines()[0]
-        raise WorkbenchError(f"the checkpoint can't be gone on from: {text}") from error
-    model.set_random_seed(seed)
+        # Another seed than at the start, or the same episodes would be explored again.
+        model.set_random_seed((seed + int(state["steps"])) % 2**31)
 
 
 def _buffer_state(buffer: Any) -> dict[str, Any] | None:
@@ -87,6 +86,6 @@ def _buffer_state(buffer: Any) -> dict[str, Any] | None:
 
 
 def _restore_buffer(buffer: Any, state: dict[str, Any]) -> None:
-    buffer.pos, buffer.full = state["position"], state["full"]
+    buffer.pos, buffer.full = int(state["position"]), bool(state["full"])
     for name, values in state["arrays"].items():
         getattr(buffer, name)[: len(values)] = values.numpy()

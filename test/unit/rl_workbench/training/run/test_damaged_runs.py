@@ -1,0 +1,199 @@
+"""Folders of trainings that somebody damaged, moved or changed: told in one line, or made good."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import torch
+from training_runs import (
+    ALL,
+    EXACT,
+    InterruptAfter,
+    assert_no_doubles,
+    assert_same,
+    assert_same_run,
+    checkpoint,
+    record,
+    resume,
+    rows,
+    summary,
+    train,
+)
+
+from rl_workbench.errors import WorkbenchError
+
+
+def rewrite(run: Path, change: Callable[[dict], object]) -> None:
+    """Changes the newest checkpoint of a run."""
+    content = torch.load(run / "last.pt", weights_only=True)
+    change(content)
+    for path in run.rglob("*.pt"):
+        path.unlink()
+    torch.save(content, run / "last.pt")
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_damaged_checkpoint_is_told_and_the_one_before_is_used(
+    whole, times, tmp_path: Path, capsys, name: str
+) -> None:
+    run = train(tmp_path / "run", name, InterruptAfter(round(0.9 * times(name))))
+    newest = run / "last.pt"
+    content = bytearray(newest.read_bytes())
+    content[len(content) // 2] ^= 1  # in the middle of some tensor: torch alone would not see it
+    newest.write_bytes(content)  # under both of its names
+    resume(run)
+    told = capsys.readouterr().out
+    assert f"{newest} is damaged" in told and "looking for an earlier one" in told
+    assert summary(run)["complete"]
+    if name in EXACT:
+        assert_same_run(whole(name), run)
+
+
+@pytest.mark.parametrize("damage", [lambda path: path.write_bytes(b""), Path.unlink])
+def test_without_any_good_checkpoint(stopped: Path, damage: Callable[[Path], object]) -> None:
+    for path in set(stopped.rglob("*.pt")):
+        damage(path)
+    if damage is Path.unlink:
+        assert summary(resume(stopped))["complete"], "as one that was killed before its first"
+        return
+    with pytest.raises(WorkbenchError, match="holds no checkpoint to go on from"):
+        resume(stopped)
+
+
+def change_record(run: Path, part: str, name: str, value: object) -> None:
+    content = record(run)
+    content[part][name] = value
+    (run / "config.json").write_text(json.dumps(content))
+
+
+def refusal(run: Path) -> str:
+    """The one line with which a training isn't gone on with."""
+    with pytest.raises(WorkbenchError) as raised:
+        resume(run)
+    assert "\n" not in str(raised.value)
+    return str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("part", "name", "value", "words"),
+    [("hyperparameters", "gamma", 0.5, "gamma 0.5, the checkpoint 0.99"),
+     ("hyperparameters", "hidden_sizes", [32], "hidden_sizes [32], the checkpoint [16, 16]"),
+     ("run", "seed", 9, "seed 9, the checkpoint 3")],
+)  # fmt: skip
+def test_a_record_that_somebody_changed_is_refused(
+    stopped: Path, part: str, name: str, value: object, words: str
+) -> None:
+    change_record(stopped, part, name, value)
+    assert f"config.json says {words}; a resumed training keeps" in refusal(stopped)
+
+
+def test_what_may_be_changed_may_be_changed_in_the_record_too(stopped: Path) -> None:
+    change_record(stopped, "run", "episodes", 5)
+    assert summary(resume(stopped))["episodes"] == 5
+
+
+def test_other_versions_are_told(stopped: Path, capsys) -> None:
+    change_record(stopped, "versions", "torch", "1.0")
+    resume(stopped)
+    assert f"torch 1.0 is now {torch.__version__}: from here on" in capsys.readouterr().out
+    assert record(stopped)["versions"]["torch"] == "1.0", "those that it began with"
+
+
+@pytest.mark.parametrize(
+    "content",
+    ['{"algorithm": "dqn"}', "[]", "{", "", '{"algorithm": "dqn", "run": [1], "dqn": {}}',
+     '{"algorithm": "dqn", "run": [1], "hyperparameters": {}}',
+     '{"algorithm": 3, "run": {}, "hyperparameters": {}}',
+     '{"algorithm": "dqn", "run": {"seed": "x"}, "hyperparameters": {}}'],
+)  # fmt: skip
+def test_a_damaged_record_is_one_line(stopped: Path, content: str) -> None:
+    (stopped / "config.json").write_text(content)
+    assert str(stopped / "config.json") in refusal(stopped)
+
+
+def test_the_record_of_a_version_before_is_refused(stopped: Path) -> None:
+    old = record(stopped)
+    old["dqn"] = old.pop("hyperparameters")
+    (stopped / "config.json").write_text(json.dumps(old))
+    assert "isn't the configuration of a training of this version" in refusal(stopped)
+
+
+@pytest.mark.parametrize("old", ["rl_workbench 1", "cartpole dqn 1", None])
+def test_checkpoints_of_a_version_before_are_refused(stopped: Path, capsys, old: str) -> None:
+    rewrite(stopped, lambda content: content.update(format=old))
+    assert "holds no checkpoint to go on from" in refusal(stopped)
+    assert f"{stopped / 'last.pt'} is no checkpoint of this version" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("left", [None, 0, 10, 300])
+def test_figures_that_were_lost_cost_nothing_else(
+    short: Path, tmp_path: Path, capsys, left: int | None
+) -> None:
+    run = train(tmp_path / "run", "dqn", InterruptAfter(80), total_timesteps=120, eval_frequency=0)
+    path = run / "scalars.csv"
+    if left is None:
+        path.unlink()
+    else:
+        path.write_bytes(path.read_bytes()[:left])
+    resume(run)
+    assert "lacks rows that it had" in capsys.readouterr().out
+    assert_same(checkpoint(run)["q_net"], checkpoint(short)["q_net"])
+    assert set(rows(run)) < set(rows(short)) and rows(run)
+    assert_no_doubles(run)
+
+
+def test_a_moved_run_goes_on_where_it_lies(short: Path, stopped: Path, tmp_path: Path) -> None:
+    moved = resume(stopped.rename(tmp_path / "elsewhere"))
+    assert rows(moved) == rows(short)
+    assert not stopped.exists()
+
+
+# Checkpoints that can be read, but don't hold what they should.
+
+
+@pytest.mark.parametrize(
+    "history",
+    [[1, 2], {}, "text", {"returns": [1.0]}, {"lengths": torch.zeros(0)}, {"best": "ab"},
+     {"best": [1]}, {"best": ["a", "b"]}, {"evaluations": 3}, {"evaluations": [[1]]},
+     {"evaluations": [["a", "b"]]}, {"seconds": "long"}, {"returns": torch.zeros(5)}],
+    ids=str,
+)  # fmt: skip
+def test_a_history_of_other_types_is_one_line(stopped: Path, history: object) -> None:
+    def change(content: dict) -> None:
+        merged = isinstance(history, dict) and history
+        content["history"] = content["history"] | history if merged else history
+
+    rewrite(stopped, change)
+    assert "the checkpoint" in refusal(stopped) and "history" in refusal(stopped)
+
+
+@pytest.mark.parametrize("key", ["history", "random", "environment", "steps", "log_bytes"])
+@pytest.mark.parametrize("name", EXACT)
+def test_a_checkpoint_that_lacks_something_or_has_another_type_of_it(
+    whole, tmp_path: Path, name: str, key: str
+) -> None:
+    for index, value in enumerate(("text", [], {})):
+        run = Path(shutil.copytree(whole(name), tmp_path / str(index)))
+        rewrite(run, lambda content, value=value: content.update({key: value}))
+        assert "the checkpoint holds another" in refusal(run)
+
+
+@pytest.mark.parametrize(("name", "key"), [("dqn", "q_net"), ("dqn", "replay"), ("reinforce", "agent"),
+                                           ("reinforce-document", "agent")])  # fmt: skip
+def test_a_checkpoint_of_another_agent_is_refused(
+    whole, tmp_path: Path, name: str, key: str
+) -> None:
+    for index, value in enumerate((None, {})):
+        run = Path(shutil.copytree(whole(name), tmp_path / str(index)))
+        rewrite(run, lambda content, value=value: content.update({key: value}))
+        assert "the checkpoint holds another agent" in refusal(run)
+
+
+@pytest.mark.extras("stable_baselines3")
+@pytest.mark.parametrize("key", ["optimizers", "counters", "policy", "steps"])
+def test_a_checkpoint_of_another_model_is_refused(whole, tmp_path: Path, key: str) -> None:
+    run = Path(shutil.copytree(whole("ppo"), tmp_path / "run"))
+    rewrite(run, lambda content: content.pop(key))
+    assert "the checkpoint" in refusal(run)

@@ -1,0 +1,235 @@
+"""The frame of all trainings: what one leaves behind, how long it lasts, and what it depends on."""
+
+import csv
+from pathlib import Path
+
+import pytest
+import torch
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from tensorboard.plugins.hparams import plugin_data_pb2
+from training_runs import (
+    ALL,
+    EXACT,
+    assert_no_doubles,
+    assert_same,
+    assert_same_run,
+    checkpoint,
+    files,
+    points,
+    record,
+    rows,
+    small,
+    summary,
+    train,
+)
+
+from rl_workbench.errors import WorkbenchError
+
+FILES = {"last.pt", "best.pt", "checkpoints", "config.json", "scalars.csv", "summary.json",
+         "learning_curve.png"}  # fmt: skip
+NETWORKS = {
+    f"{kind}_network{suffix}.pth"
+    for kind in ("policy", "value")
+    for suffix in ("", "_episode_0", "_episode_5", "_episode_10")
+}
+OWN_FILES = {"dqn": set(), "ppo": {"model.zip"}, "sac": {"model.zip"}}
+TAGS = {"charts/episodic_return", "charts/episodic_length", "charts/SPS", "eval/mean_reward",
+        "eval/confirmed_reward"}  # fmt: skip
+BY_EPISODE = {"Reward", "Value Loss", "Policy Loss"}
+OWN_TAGS = {
+    "dqn": {"charts/epsilon", "losses/td_loss", "losses/q_values"},
+    "ppo": {"losses/loss", "losses/value_loss", "losses/policy_loss"},
+    "sac": {"losses/actor_loss", "losses/critic_loss"},
+}
+OF_REINFORCE = BY_EPISODE | {"losses/value_loss", "losses/policy_loss"}
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_training_leaves_its_files(whole, name: str) -> None:
+    assert files(whole(name)) == FILES | OWN_FILES.get(name, NETWORKS)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_summary_tells_it_all(whole, name: str) -> None:
+    result, run = summary(whole(name)), small(name).run
+    assert result["complete"] and not result["interrupted"] and result["failure"] is None
+    assert result["episodes"] == len(result["returns"]) == len(result["lengths"]) > 0
+    assert result["steps"] == (run.total_timesteps or sum(result["lengths"]))
+    assert sum(result["lengths"]) <= result["steps"]
+    assert run.episodes in (0, result["episodes"])
+    assert len(result["evaluation"]["lengths"]) == run.eval_episodes
+    assert result["seconds"] > 0
+    assert result["mean_length_last_20"] == pytest.approx(
+        sum(result["lengths"][-20:]) / len(result["lengths"][-20:])
+    )
+    assert result["mean_return_last_100"] == pytest.approx(
+        sum(result["returns"]) / result["episodes"]
+    )
+
+
+def test_the_means_are_of_the_last_episodes_alone(tmp_path: Path) -> None:
+    result = summary(train(tmp_path, "reinforce-document", episodes=120, eval_frequency=0))
+    assert result["mean_length_last_20"] == pytest.approx(sum(result["lengths"][-20:]) / 20)
+    assert result["mean_return_last_100"] == pytest.approx(sum(result["returns"][-100:]) / 100)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_record_says_what_was_trained_and_with_what(whole, name: str) -> None:
+    found, options = record(whole(name)), small(name)
+    assert found["algorithm"] == name
+    assert found["run"]["env_id"] == options.run.env_id
+    assert (found["run"]["seed"], found["run"]["exp_name"]) == (3, name)
+    assert set(found["hyperparameters"]) == set(options.record()["hyperparameters"])
+    assert found["began"] > 1e9
+    assert {"python", "numpy", "torch", "gymnasium", "machine", "command"} <= set(found["versions"])
+    assert checkpoint(whole(name))["config"]["hyperparameters"] == (
+        options.record()["hyperparameters"]
+    )
+    assert summary(whole(name))["hyperparameters"] == found["hyperparameters"]
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_tensorboard_shows_what_the_csv_holds(whole, name: str) -> None:
+    run, result = whole(name), summary(whole(name))
+    assert set(points(run)) == TAGS | OWN_TAGS.get(name, OF_REINFORCE)
+    assert_no_doubles(run)
+    by_tag: dict[str, list[float]] = {}
+    with (run / "scalars.csv").open(newline="") as file:
+        for row in csv.DictReader(file):
+            by_tag.setdefault(row["tag"], []).append(float(row["value"]))
+    assert by_tag["charts/episodic_return"] == result["returns"]
+    assert by_tag["charts/episodic_length"] == result["lengths"]
+    for tag, values in points(run).items():
+        if tag != "charts/SPS":
+            assert [value for _, value in values] == pytest.approx(by_tag[tag], rel=1e-6)
+    shown = points(run)["eval/mean_reward"]
+    assert [step for step, _ in shown] == [step for step, _ in result["evaluations"]]
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_hyper_parameters_stand_beside_the_result(whole, name: str) -> None:
+    log = EventAccumulator(str(whole(name)))
+    log.Reload()
+    content = log.PluginTagToContent("hparams")
+    read = plugin_data_pb2.HParamsPluginData.FromString
+    start = read(content["_hparams_/session_start_info"]).session_start_info
+    assert start.hparams["gamma"].number_value == 0.99
+    assert start.hparams["env_id"].string_value == small(name).run.env_id
+    if name == "dqn":
+        assert start.hparams["double"].string_value == "True", "not the number 1"
+    experiment = read(content["_hparams_/experiment"]).experiment
+    metrics = {each.name.tag for each in experiment.metric_infos}
+    assert metrics == {"eval/mean_reward", "charts/episodic_return"}
+    assert "hp_metric" not in points(whole(name))
+
+
+def test_the_user_is_told_of_begin_and_end(tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.setenv("CARTPOLE_WS", "/a place/ws")
+    result = summary(train(tmp_path, "reinforce", eval_episodes=20))
+    told = capsys.readouterr().out
+    assert f"training reinforce in CartPole-v1 with seed 3: {tmp_path}\n" in told
+    step, mean = result["best"]
+    assert f"trained 13 episodes, {result['steps']} steps in " in told
+    assert f"; best evaluation {mean:.1f} at step {step}" in told
+    assert "; the last one over 20 greedy episodes: length " in told
+    assert f"everything lies in {tmp_path}\n" in told and "--resume" not in told
+    assert f"watch: '/a place/ws' tensorboard --logdir {tmp_path}\n" in told
+
+
+# The same seed and options: the same bits.
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_same_seed_gives_the_same_bits_and_another_one_others(
+    whole, tmp_path: Path, name: str
+) -> None:
+    assert_same_run(whole(name), train(tmp_path / "again", name))
+    assert rows(train(tmp_path / "other", name, seed=4)) != rows(whole(name))
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_evaluations_and_checkpoints_change_nothing_that_is_learned(
+    tmp_path: Path, name: str
+) -> None:
+    none = {"eval_frequency": 0, "checkpoint_frequency": 0}
+    plain = train(tmp_path / "plain", name, **none)
+    evaluated = train(tmp_path / "evaluated", name, eval_frequency=40, checkpoint_frequency=7)
+    assert len(summary(evaluated)["evaluations"]) > 4
+    assert summary(plain)["returns"] == summary(evaluated)["returns"]
+    mine, other = checkpoint(plain), checkpoint(evaluated)
+    for content in (mine, other):
+        del content["config"], content["history"]
+    assert_same(mine, other)
+
+
+# Checkpoints.
+
+
+def test_the_newest_checkpoints_are_kept(whole, tmp_path: Path) -> None:
+    steps = [path.name for path in sorted((whole("dqn") / "checkpoints").iterdir())]
+    assert steps == ["step_000000490.pt", "step_000000560.pt", "step_000000600.pt"]
+    run = train(tmp_path, "dqn", total_timesteps=200, keep_checkpoints=0)
+    steps = [int(path.stem[5:]) for path in sorted((run / "checkpoints").iterdir())]
+    assert set(steps) >= {0, 70, 140, 200} and set(steps) <= {0, 70, 140, 150, 200}
+
+
+@pytest.mark.parametrize("name", EXACT[1:])
+def test_learners_from_whole_episodes_save_after_the_one_that_passes_a_multiple(
+    tmp_path: Path, name: str
+) -> None:
+    run = train(tmp_path, name, keep_checkpoints=0, eval_frequency=0)
+    ends = [0]
+    for length in summary(run)["lengths"]:
+        ends.append(ends[-1] + length)
+    due = {now for before, now in zip(ends, ends[1:], strict=False) if now // 60 > before // 60}
+    steps = {int(path.stem[5:]) for path in (run / "checkpoints").iterdir()}
+    assert steps == due | {0, ends[-1]}
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_checkpoint_loads_safely_and_says_of_which_training_it_is(whole, name: str) -> None:
+    content = torch.load(whole(name) / "last.pt", weights_only=True)
+    assert {"format", "config", "history", "random", "environment", "steps", "log_bytes"} <= set(
+        content
+    )
+    assert content["config"]["algorithm"] == name
+    assert content["steps"] == summary(whole(name))["steps"]
+
+
+# How long it lasts.
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_a_number_of_episodes_or_of_steps(tmp_path: Path, name: str) -> None:
+    few = train(tmp_path / "few", name, episodes=4)
+    assert summary(few)["episodes"] == 4 and summary(few)["complete"]
+    short = summary(train(tmp_path / "short", name, total_timesteps=50))
+    assert short["complete"] and 50 <= short["steps"]
+    assert short["steps"] == 50 if name == "dqn" else sum(short["lengths"][:-1]) < 50
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_a_mean_return_ends_it_once_it_is_confirmed(tmp_path: Path, name: str) -> None:
+    result = summary(train(tmp_path, name, stop_at_return=-1000))
+    assert result["complete"] and [result["steps"], result["best"][1]] == result["best"]
+    assert len(result["evaluations"]) == 1
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_the_mean_length_of_20_episodes_ends_it(tmp_path: Path, name: str) -> None:
+    free = {"total_timesteps": None, "episodes": 45, "eval_frequency": 0}
+    lengths = summary(train(tmp_path / "whole", name, **free))["lengths"]
+    means = [sum(lengths[end - 20 : end]) / 20 for end in range(20, 46)]
+    result = summary(train(tmp_path / "stopped", name, **free, stop_at_length=max(means)))
+    assert result["complete"]
+    assert 20 < result["episodes"] == 20 + means.index(max(means)), "not the first ones that came"
+    assert result["lengths"] == lengths[: result["episodes"]]
+
+
+@pytest.mark.parametrize("name", ["ppo"])
+@pytest.mark.extras("stable_baselines3")
+def test_stable_baselines_needs_a_number_of_steps(tmp_path: Path, name: str) -> None:
+    with pytest.raises(WorkbenchError, match="ppo needs total_timesteps"):
+        train(tmp_path, name, total_timesteps=0, episodes=4)
+    stopped = summary(train(tmp_path / "run", name, episodes=4))
+    assert stopped["episodes"] == 4 and stopped["complete"]
