@@ -105,7 +105,7 @@ def test_dqn_comes_to_the_weights_of_the_library(
     assert_same_weights(target_network, checkpoint["target_net"])
 
 
-ROBOT = ["--algorithm", "gae", "--backend", "bullet"]
+ROBOT = ["--env-id", "cartpole/Balance-v0"]
 REINFORCE = {
     "as it comes": ["--episodes", "45", "--seed", "1"],
     "the robot, normalised": ["--episodes", "60", "--normalize-observations"],
@@ -129,7 +129,7 @@ def test_reinforce_comes_to_the_weights_of_the_library(
     # On the robot the file's defaults have to be those of config/pg.yaml.
     options = example.parse_args(flags)
     given = [*flags, *ROBOT] if options.env_id == example.ROBOT else every_flag(options)
-    _, summary = by_the_library("pg", given, tmp_path / "run")
+    _, summary = by_the_library("reinforce", given, tmp_path / "run")
     assert summary["steps"] >= LEAST
     assert returns == summary["returns"]
     for network, name in ((policy, "policy_network"), (value, "value_network")):
