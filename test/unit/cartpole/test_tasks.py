@@ -1,4 +1,4 @@
-"""The balancing task against the figures of the ROS policy-gradient document; the others against their own."""
+"""The balancing task against the figures of the ROS policy-gradient document; the others by their own."""
 
 import numpy as np
 import pytest
