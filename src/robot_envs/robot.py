@@ -98,8 +98,7 @@ class Robot(Generic[State]):
 
     def state_of(self, numbers: Iterable[float]) -> State:
         """The state with these numbers: position and velocity of each joint."""
-        make: Callable[..., State] = self.state
-        return make(*numbers)
+        return tuple.__new__(self.state, numbers)  # as its own _make, and twice as fast
 
     @property
     def over_ros(self) -> OverRos:

@@ -32,7 +32,7 @@ class Sensor(Generic[State]):
         noise: float | Sequence[float] | np.ndarray = 0.0,
         delay: int = 0,
     ) -> None:
-        self._make = robot.state_of
+        self._state_of = robot.state_of
         self._count = 2 * len(robot.joints)
         sizes = tuple(np.ravel(noise).tolist()) * (1 if np.ndim(noise) else self._count)
         fits = len(sizes) == self._count
@@ -57,7 +57,5 @@ class Sensor(Generic[State]):
 
     def _noisy(self, state: State, rng: np.random.Generator) -> State:
         errors = rng.standard_normal(self._count).tolist()
-        return self._make(
-            value + size * error
-            for value, size, error in zip(state, self._noise, errors, strict=True)
-        )
+        sized = zip(state, self._noise, errors, strict=True)
+        return self._state_of([value + size * error for value, size, error in sized])

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from operator import attrgetter
 from typing import Generic
 
 from bullet_gazebo.control.controllers.base import Controller
@@ -29,6 +30,8 @@ from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot, State
 from robot_envs.task import Command
 from robot_envs.variation import LinkFigures, Variation
+
+_numbers = attrgetter("position", "velocity")
 
 
 class InProcessRobot(Generic[State]):
@@ -58,7 +61,7 @@ class InProcessRobot(Generic[State]):
         height: float = 0.0,
         engine: str = DEFAULT_ENGINE,
     ) -> None:
-        self._robot = robot
+        self._robot, self._state_of = robot, robot.state_of
         self._ticks = ticks_per_action(control_period, PHYSICS_STEP)
         urdf = robot.urdf()
         self._sim = Simulator(World(make_engine(engine), time_step=PHYSICS_STEP), lockstep=True)
@@ -78,13 +81,13 @@ class InProcessRobot(Generic[State]):
         self._nominal: dict[str, LinkFigures] = {}
         self._damping: dict[str, float] = {}
 
-    def _start(self, hardware: RobotHardware) -> list[Callable[[float], None]]:
-        """Starts the robot's controllers in the world; returns what takes their commands."""
+    def _start(self, hardware: RobotHardware) -> list[tuple[int, Callable[[float], None]]]:
+        """Starts the robot's controllers in the world; returns what takes each number of a command."""
         robot, manager = self._robot, ControllerManager(hardware)
         self._sim.add_robot(ControlledRobot(self._model, hardware, manager))
         loaded = {name: manager.load(name, robot.parameters(name)) for name in robot.controllers}
         manager.switch(loaded, [], STRICT)
-        return [_receiver(loaded[name]) for name in robot.commanded]
+        return [(index, _receiver(loaded[name])) for index, name in enumerate(robot.commanded)]
 
     def reset(self, state: State) -> State:
         """See `RobotBackend.reset`; the state asked for is the state reached, within the joints' stops."""
@@ -103,17 +106,17 @@ class InProcessRobot(Generic[State]):
         Raises:
             SimulatorError: if the physics has come to something that isn't finite.
         """
-        for receive, value in zip(self._receivers, command, strict=True):
-            receive(value)
+        for index, receive in self._receivers:
+            receive(command[index])
         self._sim.advance(self._ticks)
         return self._state()
 
     def _state(self) -> State:
-        numbers: list[float] = []
+        numbers: tuple[float, ...] = ()
         for joint in self._joints:
-            numbers += (joint.position, joint.velocity)
-        state = self._robot.state_of(numbers)
-        if not math.isfinite(sum(numbers)):
+            numbers += _numbers(joint)
+        state = self._state_of(numbers)
+        if not math.isfinite(sum(state)):
             raise SimulatorError(f"the joint state isn't finite: {state}")
         return state
 
