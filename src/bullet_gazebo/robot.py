@@ -26,7 +26,8 @@ class Robot:
 
         `namespace` is the manager's, for those who look a controller up by its full name.
 
-        Errors: ControlError if the model lacks a joint that a transmission names.
+        Raises:
+            ControlError: if the model lacks a joint that a transmission names.
         """
         self.model = model
         self.hardware = hardware

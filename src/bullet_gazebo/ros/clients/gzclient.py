@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import rospy
 
-from bullet_gazebo.ros.wire.signals import Ending, init_node
+from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -26,7 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         _say_what_there_is_to_see()
         return 0
 
-    return Ending().run(work, interrupted=0)
+    return SignalHandler().run(work, interrupted=0)
 
 
 def _say_what_there_is_to_see() -> None:

@@ -17,7 +17,7 @@ BAD = slice(
 )  # the warnings of that kind
 
 
-class Motion(NamedTuple):
+class BodyArrays(NamedTuple):
     """State of one body, and what acts on it during the next step; each an array of MuJoCo's."""
 
     positions: np.ndarray
