@@ -34,9 +34,8 @@ class Robot:
         self.manager = manager
         self.namespace = namespace
         self._control_period = round(control_period * NANOSECONDS)
-        self._waited: int | None = (
-            None  # [ns] since the last control tick; None: the next step is one
-        )
+        # [ns] since the last control tick; None: the next step is one.
+        self._waited: int | None = None
         indices = {name: index for index, name in enumerate(model.joint_names)}
         missing = sorted(set(hardware.joints) - set(indices))
         if missing:

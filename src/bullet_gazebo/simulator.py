@@ -45,9 +45,8 @@ class Simulator:
         self.now = 0  # [ns] of simulated time
         self.robots: list[Robot] = []
         self.applied = AppliedForces()
-        self.listeners: list[
-            Callable[[int], None]
-        ] = []  # called with `now` before each physics step
+        # Called with `now` before each physics step.
+        self.listeners: list[Callable[[int], None]] = []
         self._period = round(world.time_step * NANOSECONDS)
         self._paused = False
         self._flowing = threading.Event()  # set while time runs by itself
@@ -152,9 +151,8 @@ class Simulator:
 
     def add_robot(self, robot: Robot) -> None:
         """Puts a robot under control; the caller holds the lock."""
-        robot.joints_moved(
-            self.now, relatch=False
-        )  # its controllers may start before time moves on
+        # Its controllers may start before time moves on.
+        robot.joints_moved(self.now, relatch=False)
         self.robots.append(robot)
 
     def remove_robot(self, robot: Robot) -> None:

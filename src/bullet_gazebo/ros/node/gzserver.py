@@ -109,9 +109,8 @@ def main(argv: list[str] | None = None) -> int:
     """Runs the node; returns its exit code."""
     args = parse_args(rospy.myargv(argv)[1:])
     init_node("gazebo", sys.argv if argv is None else argv, anonymous=False)
-    signals = (
-        SignalHandler()
-    )  # not before: while there is no master, a signal ends the process as such
+    # Not before: while there is no master, a signal ends the process as such.
+    signals = SignalHandler()
     if args.physics not in ENGINES:
         rospy.logwarn("Physics engine '%s' is not known; PyBullet is used", args.physics)
     if args.ignored:

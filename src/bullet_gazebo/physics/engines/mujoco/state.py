@@ -12,9 +12,8 @@ from bullet_gazebo.physics.pose import Pose
 
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
 LARGEST = 1e10  # of a position, velocity or acceleration: beyond that, MuJoCo warns
-BAD = slice(
-    int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1
-)  # the warnings of that kind
+# The warnings of that kind.
+BAD = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
 
 
 class BodyArrays(NamedTuple):
