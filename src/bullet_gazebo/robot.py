@@ -26,16 +26,16 @@ class Robot:
 
         `namespace` is the manager's, for those who look a controller up by its full name.
 
-        Errors: ControlError if the model lacks a joint that a transmission names.
+        Raises:
+            ControlError: if the model lacks a joint that a transmission names.
         """
         self.model = model
         self.hardware = hardware
         self.manager = manager
         self.namespace = namespace
         self._control_period = round(control_period * NANOSECONDS)
-        self._waited: int | None = (
-            None  # [ns] since the last control tick; None: the next step is one
-        )
+        # [ns] since the last control tick; None: the next step is one.
+        self._waited: int | None = None
         indices = {name: index for index, name in enumerate(model.joint_names)}
         missing = sorted(set(hardware.joints) - set(indices))
         if missing:

@@ -3,7 +3,8 @@
 import threading
 from collections.abc import Callable, Mapping
 
-from bullet_gazebo.jobs import Jobs
+from bullet_gazebo.applied_forces import AppliedForces
+from bullet_gazebo.fair_lock import FairLock
 from bullet_gazebo.pacing import Pacer
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import Model
@@ -11,13 +12,12 @@ from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.projection import place_link
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.robot import Robot
-from bullet_gazebo.turns import TurnLock
 
 NANOSECONDS = 1_000_000_000
 IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()
 
 
-class StepRefused(RuntimeError):
+class NotInLockstep(RuntimeError):
     """A step was asked of a world whose time runs by itself."""
 
 
@@ -38,16 +38,15 @@ class Simulator:
     ) -> None:
         """With `relatch`, controllers begin anew when a service moves joints or resets the world."""
         self.world = world
-        self.lock = TurnLock()
+        self.lock = FairLock()
         self.lockstep = lockstep
         self.max_update_rate = max_update_rate
         self.relatch = relatch
         self.now = 0  # [ns] of simulated time
         self.robots: list[Robot] = []
-        self.jobs = Jobs()
-        self.listeners: list[
-            Callable[[int], None]
-        ] = []  # called with `now` before each physics step
+        self.applied = AppliedForces()
+        # Called with `now` before each physics step.
+        self.listeners: list[Callable[[int], None]] = []
         self._period = round(world.time_step * NANOSECONDS)
         self._paused = False
         self._flowing = threading.Event()  # set while time runs by itself
@@ -115,10 +114,12 @@ class Simulator:
     def advance(self, ticks: int) -> None:
         """Moves time by `ticks` physics steps; the caller holds the lock.
 
-        Errors: StepRefused if time runs by itself; ValueError for less than one tick.
+        Raises:
+            NotInLockstep: if time runs by itself.
+            ValueError: for less than one tick.
         """
         if not self.lockstep:
-            raise StepRefused(
+            raise NotInLockstep(
                 "the world runs in real time; start it with lockstep:=true to step it"
             )
         if ticks < 1:
@@ -133,7 +134,8 @@ class Simulator:
 
         The lock is taken for each tick, so services are answered in between.
 
-        Errors: ValueError for less than one tick.
+        Raises:
+            ValueError: for less than one tick.
         """
         if ticks < 1:
             raise ValueError(f"ticks is {ticks}: at least 1 is needed")
@@ -149,9 +151,8 @@ class Simulator:
 
     def add_robot(self, robot: Robot) -> None:
         """Puts a robot under control; the caller holds the lock."""
-        robot.joints_moved(
-            self.now, relatch=False
-        )  # its controllers may start before time moves on
+        # Its controllers may start before time moves on.
+        robot.joints_moved(self.now, relatch=False)
         self.robots.append(robot)
 
     def remove_robot(self, robot: Robot) -> None:
@@ -191,8 +192,8 @@ class Simulator:
             self._joints_moved(model)
 
     def delete_model(self, model: Model) -> None:
-        """Takes a model out of the world, and its jobs with it; the caller holds the lock."""
-        self.jobs.forget(model)
+        """Takes a model out of the world, and what acts on it; the caller holds the lock."""
+        self.applied.forget(model)
         self.world.delete(model.name)
 
     def set_time_step(self, time_step: float) -> None:
@@ -240,9 +241,9 @@ class Simulator:
         """One physics step, in Gazebo's order: the state before the step carries the time after it."""
         self.now = now = self.now + self._period
         dt = self.world.time_step
-        jobs = self.jobs
-        if jobs.efforts or jobs.wrenches:
-            jobs.apply(now)
+        applied = self.applied
+        if applied.efforts or applied.wrenches:
+            applied.apply(now)
         for robot in self.robots:
             robot.update(now, dt)
         for listener in self.listeners:

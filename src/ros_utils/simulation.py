@@ -107,11 +107,9 @@ class Simulation:
         """
         if self._closed:  # the port may be somebody else's master's by now
             return True
-        if self.running or _is_up(self.master_uri):
-            with self.active():
-                self._closed = ros_node.ros_kill_all_processes()
-        else:
-            self._closed = True
+        with self.active():
+            anything = self.running or _master.is_up()
+            self._closed = not anything or ros_node.ros_kill_all_processes()
         return self._closed
 
     def __enter__(self) -> Simulation:
@@ -124,8 +122,3 @@ class Simulation:
         trace: TracebackType | None,
     ) -> None:
         self.close()
-
-
-def _is_up(master_uri: str) -> bool:
-    with _master.using(master_uri):
-        return _master.is_up()

@@ -88,9 +88,8 @@ class StepClient:
         request.joints = list(positions)
         request.positions = list(positions.values())
         request.velocities = [(velocities or {}).get(name, 0.0) for name in positions]
-        return self._answer(
-            request, self._call.call_idempotent
-        )  # the simulator may have been restarted
+        # The simulator may have been restarted since the last call.
+        return self._answer(request, self._call.call_idempotent)
 
     def send(self, request: StepWorldRequest) -> StepWorldResponse:
         """Sends a request as it is: the fast way for whoever keeps one and changes its fields."""

@@ -4,9 +4,9 @@ from bullet_gazebo.control.controllers import BUILT_IN
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.trajectory.goal import GoalRequest
-from bullet_gazebo.control.trajectory.plan import (
-    Plan,
-    PlanPoint,
+from bullet_gazebo.control.trajectory.message import (
+    Trajectory,
+    TrajectoryPoint,
 )
 
 MS, S = 1_000_000, 1_000_000_000  # [ns]
@@ -64,9 +64,9 @@ class Rig:
                     joint.velocity = (joint.command - joint.position) / DT
                     joint.position = joint.command
 
-    def pursue(self, plan, key="goal", **tolerances):
+    def pursue(self, trajectory, key="goal", **tolerances):
         listener = Listener()
-        self.controller.pursue(key, GoalRequest(plan, **tolerances), listener)
+        self.controller.pursue(key, GoalRequest(trajectory, **tolerances), listener)
         return listener
 
     def collect(self):
@@ -78,4 +78,6 @@ class Rig:
 def move(*points, names=("shoulder",), stamp=0):
     """Points are (time [s], positions) at rest."""
     rest = (0.0,) * len(names)
-    return Plan(names, [PlanPoint(round(t * S), p, rest, rest) for t, p in points], stamp)
+    return Trajectory(
+        names, [TrajectoryPoint(round(t * S), p, rest, rest) for t, p in points], stamp
+    )

@@ -52,7 +52,8 @@ class RobotDescription:
 def read_description(text: str) -> RobotDescription:
     """Reads URDF text (docs/contract/gazebo_ros_control.md 6.3, docs/contract/ros_control.md 3.0 and 5).
 
-    Errors: ControlError if it isn't XML, or a transmission names an interface that doesn't exist.
+    Raises:
+        ControlError: if it isn't XML, or a transmission names an interface that doesn't exist.
     """
     try:
         robot = ElementTree.fromstring(text)

@@ -28,7 +28,8 @@ class RobotHardware:
     ) -> None:
         """`gains` is the parameter tree `<ns>/gazebo_ros_control/pid_gains`: joints by name.
 
-        Errors: ControlError if a transmission's joint isn't in the description, or gains are wrong.
+        Raises:
+            ControlError: if a transmission's joint isn't in the description, or gains are wrong.
         """
         self.interfaces: dict[str, dict[str, JointHandle]] = {}
         for transmission in description.transmissions:
@@ -53,7 +54,8 @@ class RobotHardware:
     def joint(self, interface: str, name: str) -> JointHandle:
         """Returns joint `name` of `interface`.
 
-        Errors: ControlError if the robot has no such interface, or the joint isn't in it.
+        Raises:
+            ControlError: if the robot has no such interface, or the joint isn't in it.
         """
         joints = self.interfaces.get(interface)
         if joints is None:

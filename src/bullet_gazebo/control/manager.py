@@ -20,7 +20,7 @@ class Claim(NamedTuple):
     resources: tuple[str, ...]
 
 
-class Listed(NamedTuple):
+class ControllerInfo(NamedTuple):
     """An entry of list_controllers."""
 
     name: str
@@ -59,7 +59,11 @@ class ControllerManager:
         return list(self._controllers.values())
 
     def get(self, name: str) -> Controller:
-        """Returns controller `name`; ControlError if it isn't loaded."""
+        """Returns controller `name`.
+
+        Raises:
+            ControlError: if it isn't loaded.
+        """
         if name not in self._controllers:
             raise ControlError(f"No controller named '{name}' is loaded.")
         return self._controllers[name]
@@ -127,10 +131,10 @@ class ControllerManager:
         names = [c.name for c in self._running]
         self.switch(names, names)
 
-    def listed(self) -> list[Listed]:
+    def listed(self) -> list[ControllerInfo]:
         """Returns the loaded controllers in load order."""
         return [
-            Listed(
+            ControllerInfo(
                 c.name,
                 c.state,
                 c.type_name,

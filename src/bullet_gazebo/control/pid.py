@@ -23,7 +23,8 @@ class Gains:
     def from_params(cls, params: object, place: str) -> "Gains":
         """Reads gains from a parameter tree; `place` is where they stand, for the error text.
 
-        Errors: ControlError if `p` is missing or a gain is no finite number.
+        Raises:
+            ControlError: if `p` is missing or a gain is no finite number.
         """
         if not isinstance(params, Mapping) or "p" not in params:
             raise ControlError(f"No p gain specified for pid. Namespace: {place}")

@@ -9,7 +9,8 @@ from bullet_gazebo.control.errors import FAULTS, ControlError
 def find_type(type_name: str) -> type[Controller] | None:
     """Returns class `MyController` of module `my_package`; None if there is no such module.
 
-    Errors: ControlError if the module can't be imported, or has no such subclass of Controller.
+    Raises:
+        ControlError: if the module can't be imported, or has no such subclass of Controller.
     """
     package, _, name = type_name.partition("/")
     if not package.isidentifier() or not name.isidentifier():

@@ -127,9 +127,8 @@ class ModelDescription:
     world_joints: list[str] = field(default_factory=list)
     plugins: list[Plugin] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    left_out: list[str] = field(
-        default_factory=list
-    )  # sensors and the like, which nothing simulates
+    # Sensors and the like, which nothing simulates.
+    left_out: list[str] = field(default_factory=list)
     islands: dict[str, Pose] = field(default_factory=dict)
     initial_pose: Pose = Pose()
     static: bool = False

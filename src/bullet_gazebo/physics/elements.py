@@ -36,7 +36,11 @@ class _GuardedBuilder(TreeBuilder):
 
 
 def parse_xml(text: str) -> Element:
-    """Returns the root element. Errors: DescriptionError if it isn't well-formed or is a trap."""
+    """Returns the root element.
+
+    Raises:
+        DescriptionError: if it isn't well-formed or is a trap.
+    """
     parser = XMLParser(target=_GuardedBuilder())
     try:
         parser.feed(text)
@@ -58,7 +62,11 @@ def place(where: str) -> Iterator[None]:
 
 
 def finite(text: str, where: str) -> float:
-    """Returns the number in `text`. Errors: DescriptionError that begins with `where`."""
+    """Returns the number in `text`.
+
+    Raises:
+        DescriptionError: if it is none; the text begins with `where`.
+    """
     try:
         value = float(text)
     except ValueError as error:
@@ -83,8 +91,11 @@ def truth(text: str | None, default: bool = False) -> bool:
 
 
 def named(element: Element, what: str) -> str:
-    """Returns the attribute `name`. Errors: DescriptionError if it is missing, or too long for the
-    engine, which knows links and joints by it."""
+    """Returns the attribute `name`.
+
+    Raises:
+        DescriptionError: if it is missing, or too long for the engine, which knows links and joints by it.
+    """
     name = element.get("name", "")
     if not name:
         raise DescriptionError(f"a <{what}> has no name")
@@ -100,7 +111,11 @@ def shown(text: str) -> str:
 
 
 def positive(sizes: tuple[float, ...], where: str) -> tuple[float, ...]:
-    """Returns `sizes` [m]. Errors: DescriptionError if one of them is not above zero."""
+    """Returns `sizes` [m].
+
+    Raises:
+        DescriptionError: if one of them is not above zero.
+    """
     if min(sizes) <= 0.0:
         raise DescriptionError(f"{where}: sizes must be above 0, not {sizes}")
     return sizes

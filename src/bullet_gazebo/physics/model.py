@@ -44,7 +44,11 @@ class Model:
         return anchors + others
 
     def joint_index(self, name: str) -> int:
-        """Returns the place of a movable joint in the body's list; KeyError if there is none."""
+        """Returns the place of a movable joint in the body's list.
+
+        Raises:
+            KeyError: if there is no such joint.
+        """
         return self._joints[name]
 
     def collisions(self, link: str) -> dict[str, Shape]:

@@ -35,7 +35,8 @@ def set_link_properties(
 ) -> None:
     """Gives a link another inertia and gravity mode. A static one keeps them without effect.
 
-    Errors: PropertyError; the world is as it was then.
+    Raises:
+        PropertyError: if no body can have them; the world is as it was then.
     """
     if not is_positive_definite(inertia):
         raise PropertyError(
@@ -52,7 +53,8 @@ def set_joint_properties(
 ) -> None:
     """Changes a joint's damping, stops and motor, as far as `wanted` names them.
 
-    Errors: PropertyError; the joint is as it was then.
+    Raises:
+        PropertyError: if no joint can have them; the joint is as it was then.
     """
     if wanted.damping is not None and wanted.damping < 0.0:
         raise PropertyError(f"a damping of {wanted.damping} would drive the joint; it must be >= 0")

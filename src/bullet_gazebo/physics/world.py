@@ -56,7 +56,9 @@ class World:
     def spawn(self, name: str, description: ModelDescription, pose: Pose) -> Model:
         """Adds a model with its frame at `pose`.
 
-        Errors: NameTaken; DescriptionError if the engine can't take it.
+        Raises:
+            NameTaken: if there is a model of that name.
+            DescriptionError: if the engine can't take it.
         """
         if name in self.models:
             raise NameTaken(name)
@@ -72,7 +74,11 @@ class World:
         return model
 
     def delete(self, name: str) -> None:
-        """Takes model `name` out of the world; KeyError if there is none."""
+        """Takes model `name` out of the world.
+
+        Raises:
+            KeyError: if there is none.
+        """
         self.engine.remove(self.models.pop(name).body)
         self._index()
 
@@ -127,7 +133,8 @@ class World:
     def set_inertia(self, model: Model, link: str, inertia: Inertia) -> None:
         """Gives a link of `model` another inertia; poses and velocities stay.
 
-        Errors: DescriptionError if the engine can't take it; the model is as it was then.
+        Raises:
+            DescriptionError: if the engine can't take it; the model is as it was then.
         """
         record = model.description.links[link]
         old, record.inertia = record.inertia, inertia

@@ -8,13 +8,13 @@ from robots import cartpole_urdf
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
+from bullet_gazebo.fair_lock import FairLock
 from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.robot import Robot
-from bullet_gazebo.simulator import Simulator, StepRefused
-from bullet_gazebo.turns import TurnLock
+from bullet_gazebo.simulator import NotInLockstep, Simulator
 
 BOUND = 10.0  # [s]
 CART = {"type": "effort_controllers/JointPositionController", "joint": "stand_cart",
@@ -104,7 +104,7 @@ def test_less_than_one_tick_is_refused(sim, ticks):
 
 def test_a_world_that_runs_by_itself_cannot_be_stepped():
     sim = Simulator(World(BulletEngine()))
-    with sim.lock, pytest.raises(StepRefused, match="lockstep:=true"):
+    with sim.lock, pytest.raises(NotInLockstep, match="lockstep:=true"):
         sim.advance(1)
     sim.world.close()
 
@@ -175,7 +175,7 @@ def test_time_runs_by_itself_until_paused():
 
 
 def test_the_lock_is_handed_on_in_the_order_of_asking():
-    lock, order, waiting = TurnLock(), [], []
+    lock, order, waiting = FairLock(), [], []
 
     def take(name):
         waiting.append(name)
@@ -195,7 +195,7 @@ def test_the_lock_is_handed_on_in_the_order_of_asking():
 
 
 def test_a_busy_simulation_does_not_keep_others_out():
-    lock, done = TurnLock(), threading.Event()
+    lock, done = FairLock(), threading.Event()
 
     def spin():
         while not done.is_set():

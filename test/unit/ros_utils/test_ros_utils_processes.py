@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from ros_utils import ros_launch, ros_node
-from ros_utils._internal.processes import endings as _endings
 from ros_utils._internal.processes import processes as _processes
 from ros_utils._internal.processes import procfs as _procfs
 from ros_utils._internal.processes import registry as _registry
+from ros_utils._internal.processes import termination as _termination
 from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
 
 SLEEP = ["sleep", "1000"]
@@ -33,7 +33,9 @@ def place(tmp_path, monkeypatch):
     monkeypatch.setenv("ROS_HOME", str(tmp_path / "home"))
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
     monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.setattr(_endings, "LEFTOVERS", 0.3)  # a shell has its background jobs ignore SIGINT
+    monkeypatch.setattr(
+        _termination, "LEFTOVERS", 0.3
+    )  # a shell has its background jobs ignore SIGINT
     yield tmp_path
     _processes.end(_processes.started())
 
@@ -151,8 +153,8 @@ def test_names_of_this_machine_mean_the_same_master(monkeypatch):
     ("trap", "number"), [("INT", signal.SIGTERM), ("INT TERM", signal.SIGKILL)]
 )
 def test_a_stubborn_program_is_ended(place, monkeypatch, trap, number):
-    monkeypatch.setitem(_endings.PATIENCE, "node", 0.3)
-    monkeypatch.setattr(_endings, "AFTER_TERM", 0.3)
+    monkeypatch.setitem(_termination.PATIENCE, "node", 0.3)
+    monkeypatch.setattr(_termination, "AFTER_TERM", 0.3)
     code = "import signal; [signal.signal(getattr(signal, 'SIG' + n), signal.SIG_IGN)"
     code += f" for n in '{trap}'.split()]; open({str(place / 'pid')!r}, 'w').write('1\\n'); "
     handle = _processes.start([sys.executable, "-c", code + "signal.pause()"], "node", "stubborn")

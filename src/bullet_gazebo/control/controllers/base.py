@@ -67,7 +67,8 @@ class Controller(ABC):
     ) -> "Controller":
         """Makes the controller from its parameters `<ns>/<name>`.
 
-        Errors: ControlError if a parameter or a joint is missing or wrong.
+        Raises:
+            ControlError: if a parameter or a joint is missing or wrong.
         """
 
     def starting(self, now: int) -> None:
@@ -85,7 +86,11 @@ class Controller(ABC):
 
 
 def text_param(params: Mapping[str, object], key: str, place: str) -> str:
-    """Returns the string parameter `key`; ControlError if it is missing or no string."""
+    """Returns the string parameter `key`.
+
+    Raises:
+        ControlError: if it is missing or no string.
+    """
     value = params.get(key)
     if not isinstance(value, str) or not value:
         raise ControlError(f"parameter {place}/{key} is missing or is not a string: {value!r}")
@@ -93,7 +98,11 @@ def text_param(params: Mapping[str, object], key: str, place: str) -> str:
 
 
 def number_param(params: Mapping[str, object], key: str, place: str) -> float:
-    """Returns the numeric parameter `key`; ControlError if it is missing or no number."""
+    """Returns the numeric parameter `key`.
+
+    Raises:
+        ControlError: if it is missing or no finite number.
+    """
     value = params.get(key)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise ControlError(
@@ -105,7 +114,11 @@ def number_param(params: Mapping[str, object], key: str, place: str) -> float:
 def joint_param(
     params: Mapping[str, object], name: str, interface: str, hardware: RobotHardware
 ) -> JointHandle:
-    """Returns the joint that the parameter `joint` of controller `name` names; ControlError if none."""
+    """Returns the joint that the parameter `joint` of controller `name` names.
+
+    Raises:
+        ControlError: if there is none of that interface.
+    """
     return hardware.joint(interface, text_param(params, "joint", name))
 
 
@@ -114,7 +127,8 @@ def joints_param(
 ) -> list[JointHandle]:
     """Returns the joints that the parameter `joints` of controller `name` lists.
 
-    Errors: ControlError if it is no list of joints of that interface, is empty, or repeats itself.
+    Raises:
+        ControlError: if it is no list of joints of that interface, is empty, or repeats itself.
     """
     names = params.get("joints")
     if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):

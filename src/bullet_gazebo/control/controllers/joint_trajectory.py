@@ -18,11 +18,11 @@ from bullet_gazebo.control.trajectory.goal import (
     Outcome,
     TrajectorySample,
     check_tolerances,
-    watch,
+    monitored_joints,
 )
-from bullet_gazebo.control.trajectory.plan import (
+from bullet_gazebo.control.trajectory.message import (
     INVALID_GOAL,
-    Plan,
+    Trajectory,
     TrajectoryRefused,
     check_joints,
     check_points,
@@ -79,7 +79,7 @@ class JointTrajectoryController(Controller):
         for axis in self._axes:
             axis.update(uptime, dt)
         if self._goal is not None:
-            self._watch(self._goal)
+            self._monitor(self._goal)
         if self._settings.state_period and uptime >= self._next_state:
             self._next_state = max(self._next_state + self._settings.state_period, uptime)
             if self._state.sink is not None:
@@ -94,31 +94,34 @@ class JointTrajectoryController(Controller):
             self.joint_names,
             (positions, velocities, accelerations),
             (tuple(a.joint.position for a in axes), tuple(a.joint.velocity for a in axes)),
-            (tuple(a.off for a in axes), tuple(a.rate_off for a in axes)),
+            (tuple(a.position_error for a in axes), tuple(a.velocity_error for a in axes)),
         )
 
-    def follow(self, plan: Plan) -> str:
+    def follow(self, trajectory: Trajectory) -> str:
         """Takes a trajectory as the topic `command` would; one without points holds the joints.
 
-        Returns a warning for the log, mostly empty.
-        Errors: TrajectoryRefused if it can't be followed; then nothing changes.
+        Returns:
+            A warning for the log, mostly empty.
+
+        Raises:
+            TrajectoryRefused: if it can't be followed; then nothing changes.
         """
         self._check_running("take a trajectory")
-        if plan.points:
-            check_joints(plan.names, self.joint_names, self._settings.partial)
-        _, warning = self._lead(plan)
+        if trajectory.points:
+            check_joints(trajectory.names, self.joint_names, self._settings.partial)
+        _, warning = self._lead(trajectory)
         self._end_goal("a trajectory came by the command topic")
         return warning
 
     def pursue(self, key: str, request: GoalRequest, listener: GoalListener) -> str:
         """Takes a goal of follow_joint_trajectory; returns and raises as follow()."""
         self._check_running("take a goal")
-        check_joints(request.plan.names, self.joint_names, self._settings.partial)
+        check_joints(request.trajectory.names, self.joint_names, self._settings.partial)
         check_tolerances(request)
-        start, warning = self._lead(request.plan)
+        start, warning = self._lead(request.trajectory)
         self._end_goal("another goal came")
-        watched, late = watch(request, self._axes, self._settings.constraints)
-        self._goal = Goal(key, listener, watched, start, late)
+        monitored, late = monitored_joints(request, self._axes, self._settings.constraints)
+        self._goal = Goal(key, listener, monitored, start, late)
         self._next_report = self._uptime + self._settings.monitor_period
         return warning
 
@@ -131,11 +134,12 @@ class JointTrajectoryController(Controller):
     def query(self, time: int) -> list[State]:
         """Returns what is wanted of the joints at `time` [ns] of the clock, in order of joint_names.
 
-        Errors: TrajectoryRefused if the controller isn't running.
+        Raises:
+            TrajectoryRefused: if the controller isn't running.
         """
         self._check_running("sample its trajectory")
         uptime = self._uptime + time - self._now
-        return [axis.track.at(uptime) for axis in self._axes]
+        return [axis.spline.at(uptime) for axis in self._axes]
 
     def _check_running(self, what: str) -> None:
         if self.state != "running":
@@ -143,18 +147,21 @@ class JointTrajectoryController(Controller):
                 INVALID_GOAL, f"Controller '{self.name}' can't {what}: it is not running"
             )
 
-    def _lead(self, plan: Plan) -> tuple[int, str]:
-        """Puts the joints on the plan; returns the uptime at which it begins [ns], and a warning."""
+    def _lead(self, trajectory: Trajectory) -> tuple[int, str]:
+        """Puts the joints on the trajectory; returns the uptime at which it begins [ns], and a warning."""
         tick = self._uptime + self._period  # before the first tick its period isn't known: 0
-        if not plan.points:
+        if not trajectory.points:
             self._hold()
             return tick, ""
-        check_points(plan)
-        begins = self._uptime + plan.stamp - self._now if plan.stamp else tick
-        dropped, warning = dropped_points(plan, tick - begins)
+        check_points(trajectory)
+        begins = self._uptime + trajectory.stamp - self._now if trajectory.stamp else tick
+        dropped, warning = dropped_points(trajectory, tick - begins)
         start = max(tick, begins)
-        for index, name in enumerate(plan.names):
-            way = [(begins + point.time, point.waypoint(index)) for point in plan.points[dropped:]]
+        for index, name in enumerate(trajectory.names):
+            way = [
+                (begins + point.time, point.waypoint(index))
+                for point in trajectory.points[dropped:]
+            ]
             self._axes[self.joint_names.index(name)].follow(tick, start, way)
         return start, warning
 
@@ -162,10 +169,10 @@ class JointTrajectoryController(Controller):
         for axis in self._axes:
             axis.hold(self._uptime + self._period, self._settings.stop_duration)
 
-    def _watch(self, goal: Goal) -> None:
+    def _monitor(self, goal: Goal) -> None:
         """Aborts at once; tells of progress and success at the monitor's rate."""
         if goal.outcome is None:
-            goal.outcome = goal.outcome_at(self._uptime)
+            goal.outcome = goal.check(self._uptime)
             if goal.outcome is not None and goal.outcome.code:
                 self._end_goal("")
                 return

@@ -28,7 +28,11 @@ class Settings(NamedTuple):
 def read_settings(
     params: Mapping[str, object], joints: Sequence[JointHandle], name: str
 ) -> Settings:
-    """Reads the settings of controller `name`; ControlError if a parameter is of the wrong type."""
+    """Reads the settings of controller `name`.
+
+    Raises:
+        ControlError: if a parameter is of the wrong type.
+    """
     state_rate = _number(params, "state_publish_rate", 50.0, name)
     monitor_rate = _number(params, "action_monitor_rate", 20.0, name)
     if monitor_rate <= SLOWEST:
@@ -50,7 +54,8 @@ def read_settings(
 def read_axes(params: Mapping[str, object], joints: Sequence[JointHandle], name: str) -> list[Axis]:
     """Makes axes with a PID from `gains` and `velocity_ff`.
 
-    Errors: ControlError if a joint has no gains, or a parameter is of the wrong type.
+    Raises:
+        ControlError: if a joint has no gains, or a parameter is of the wrong type.
     """
     gains, feed = _tree(params, "gains", name), _tree(params, "velocity_ff", name)
     axes = []

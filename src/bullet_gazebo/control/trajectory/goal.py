@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from bullet_gazebo.control.trajectory.axis import Axis
-from bullet_gazebo.control.trajectory.plan import (
+from bullet_gazebo.control.trajectory.message import (
     GOAL_TOLERANCE_VIOLATED,
     INVALID_GOAL,
     PATH_TOLERANCE_VIOLATED,
     SUCCESSFUL,
-    Plan,
+    Trajectory,
     TrajectoryRefused,
 )
 from bullet_gazebo.control.trajectory.tolerances import Constraints, Tolerance
@@ -49,13 +49,13 @@ class GoalListener(Protocol):
 class GoalRequest(NamedTuple):
     """A goal as the client sent it; tolerances by joint, `goal_time` [ns]."""
 
-    plan: Plan
+    trajectory: Trajectory
     path: Mapping[str, Tolerance] = {}
     goal: Mapping[str, Tolerance] = {}
     goal_time: int = 0
 
 
-class Watched(NamedTuple):
+class MonitoredJoint(NamedTuple):
     """A joint of a goal, and its tolerances on the way and at the end."""
 
     axis: Axis
@@ -67,46 +67,59 @@ class Goal:
     """An accepted goal. `key` identifies it; `outcome` is a success that wasn't told yet."""
 
     def __init__(
-        self, key: str, listener: GoalListener, watched: list[Watched], start: int, late: int
+        self,
+        key: str,
+        listener: GoalListener,
+        monitored: list[MonitoredJoint],
+        start: int,
+        late: int,
     ) -> None:
         """It begins at uptime `start` [ns], and may end `late` [ns] after its last point."""
         self.key = key
         self.listener = listener
         self.outcome: Outcome | None = None
-        self._watched = watched
+        self._monitored = monitored
         self._start = start
         self._late = late
 
-    def outcome_at(self, uptime: int) -> Outcome | None:
+    def check(self, uptime: int) -> Outcome | None:
         """Returns the outcome, None while the joints are on their way."""
         reached = True
-        for axis, path, goal in self._watched:
-            if uptime < axis.track.end:
+        for axis, path, goal in self._monitored:
+            if uptime < axis.spline.end:
                 reached = False
-                fault = path.violation(axis.off, axis.rate_off) if uptime >= self._start else ""
+                fault = (
+                    path.violation(axis.position_error, axis.velocity_error)
+                    if uptime >= self._start
+                    else ""
+                )
                 if fault:
                     return _aborted(PATH_TOLERANCE_VIOLATED, axis, "path", fault)
-            elif fault := goal.violation(axis.off, axis.rate_off):
+            elif fault := goal.violation(axis.position_error, axis.velocity_error):
                 reached = False
-                if uptime >= axis.track.end + self._late:
+                if uptime >= axis.spline.end + self._late:
                     return _aborted(GOAL_TOLERANCE_VIOLATED, axis, "goal", fault)
         return Outcome(SUCCEEDED) if reached else None
 
 
 def check_tolerances(request: GoalRequest) -> None:
-    """Raises TrajectoryRefused for a tolerance that is no number, which no error would ever exceed."""
+    """Returns if all tolerances are numbers: no error would ever exceed what is none.
+
+    Raises:
+        TrajectoryRefused: if one isn't.
+    """
     for joint, tolerance in (*request.path.items(), *request.goal.items()):
         if any(math.isnan(value) for value in tolerance):
             raise TrajectoryRefused(INVALID_GOAL, f"A tolerance of joint '{joint}' is not a number")
 
 
-def watch(
+def monitored_joints(
     request: GoalRequest, axes: Sequence[Axis], constraints: Constraints
-) -> tuple[list[Watched], int]:
+) -> tuple[list[MonitoredJoint], int]:
     """Returns the goal's joints with their tolerances, and how late [ns] they may come."""
-    wanted = request.plan.names
-    watched = [
-        Watched(
+    wanted = request.trajectory.names
+    monitored = [
+        MonitoredJoint(
             axis,
             path.changed(request.path.get(axis.joint.name)),
             goal.changed(request.goal.get(axis.joint.name)),
@@ -115,8 +128,10 @@ def watch(
         if axis.joint.name in wanted
     ]
     late = max(0, request.goal_time) if request.goal_time else constraints.goal_time
-    return watched, late
+    return monitored, late
 
 
 def _aborted(code: int, axis: Axis, where: str, fault: str) -> Outcome:
-    return Outcome(ABORTED, code, f"{axis.joint.name} {where} error {axis.off:f} ({fault})")
+    return Outcome(
+        ABORTED, code, f"{axis.joint.name} {where} error {axis.position_error:f} ({fault})"
+    )

@@ -14,7 +14,11 @@ class EngineError(ValueError):
 
 
 def make_engine(name: str = BULLET[0]) -> Engine:
-    """Returns a new, empty engine. Errors: EngineError."""
+    """Returns a new, empty engine.
+
+    Raises:
+        EngineError: if there is none of that name, or it isn't installed.
+    """
     if name == MUJOCO:
         return _mujoco()
     if name not in ENGINES:

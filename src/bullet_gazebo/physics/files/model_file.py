@@ -5,7 +5,7 @@ from xml.etree.ElementTree import Element
 from bullet_gazebo.physics import elements
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
 from bullet_gazebo.physics.elements import parse_xml, shown
-from bullet_gazebo.physics.files.sdf.include import Origin, renamed
+from bullet_gazebo.physics.files.sdf.include import FileContext, renamed
 from bullet_gazebo.physics.files.sdf.models import first_entity, read_model, sdf_version
 from bullet_gazebo.physics.files.urdf import read_urdf
 from bullet_gazebo.physics.files.world_file import included, read_light
@@ -19,7 +19,9 @@ class UnknownFormat(DescriptionError):
 def read_entity(text: str, name: str, resources: Resources) -> ModelDescription | Light:
     """Returns the first model or light of `text`, under the given name.
 
-    Errors: UnknownFormat; DescriptionError with the place and the fault, in one line.
+    Raises:
+        UnknownFormat: if it is neither.
+        DescriptionError: if it can't be simulated: the place and the fault, in one line.
     """
     try:
         root = parse_xml(text)
@@ -30,16 +32,16 @@ def read_entity(text: str, name: str, resources: Resources) -> ModelDescription 
     if root.tag == "robot":
         with elements.place(f"model '{shown(name)}'"):
             return read_urdf(root, resources)
-    return _read_sdf(root, name, Origin(resources, sdf_version(root)))
+    return _read_sdf(root, name, FileContext(resources, sdf_version(root)))
 
 
-def _read_sdf(root: Element, name: str, origin: Origin) -> ModelDescription | Light:
+def _read_sdf(root: Element, name: str, context: FileContext) -> ModelDescription | Light:
     element = first_entity(root)
     if element.tag == "include":
-        found = included(element, origin)
+        found = included(element, context)
         if isinstance(found, (Light, ModelDescription)):
             found.name = name
             return found
-        element, origin = found
+        element, context = found
     element = renamed(element, name)
-    return read_light(element) if element.tag == "light" else read_model(element, origin)
+    return read_light(element) if element.tag == "light" else read_model(element, context)

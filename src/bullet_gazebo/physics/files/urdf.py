@@ -30,8 +30,10 @@ def parse_urdf(
 ) -> ModelDescription:
     """Returns the model that `text` describes, its fixed joints lumped as Gazebo does.
 
-    `resources` finds mesh files. Errors: DescriptionError with `source`, the place and the fault, in
-    one line.
+    `resources` finds mesh files.
+
+    Raises:
+        DescriptionError: if it can't be simulated: `source`, the place and the fault, in one line.
     """
     with elements.place(source):
         return read_urdf(parse_xml(text), resources or Resources())

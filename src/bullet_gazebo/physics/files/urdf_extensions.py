@@ -19,7 +19,10 @@ from bullet_gazebo.physics.elements import finite, truth
 def apply_extensions(model: ModelDescription, robot: Element) -> None:
     """Writes what the `<gazebo>` children of `robot` say into `model`, before its joints are lumped.
 
-    Errors: DescriptionError. A reference to nothing is a warning, as in Gazebo.
+    A reference to nothing is a warning, as in Gazebo.
+
+    Raises:
+        DescriptionError: if a value can't be read.
     """
     for block in robot.findall("gazebo"):
         reference = block.get("reference")

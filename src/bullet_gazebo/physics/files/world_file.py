@@ -10,7 +10,7 @@ from bullet_gazebo.physics.description import DescriptionError, Light, ModelDesc
 from bullet_gazebo.physics.elements import named, numbers, parse_xml, shown, truth
 from bullet_gazebo.physics.files.sdf.frames import read_pose
 from bullet_gazebo.physics.files.sdf.geometry import read_color, value
-from bullet_gazebo.physics.files.sdf.include import Origin, included_name, open_include
+from bullet_gazebo.physics.files.sdf.include import FileContext, included_name, open_include
 from bullet_gazebo.physics.files.sdf.models import read_model, sdf_version
 from bullet_gazebo.physics.meshes.mesh_files import Resources
 from bullet_gazebo.physics.pose import Pose, Vector
@@ -58,10 +58,10 @@ def sun() -> Light:
 
 
 def load_world(path: Path, resources: Resources) -> WorldDescription:
-    """Reads a world file.
+    """Reads a world file. A model that can't be read is left out, with a warning.
 
-    Errors: DescriptionError, in one line, if the file as a whole can't be used. A model that can't be
-    read is left out, with a warning.
+    Raises:
+        DescriptionError: in one line, if the file as a whole can't be used.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -74,7 +74,7 @@ def load_world(path: Path, resources: Resources) -> WorldDescription:
 def parse_world(text: str, resources: Resources, folder: Path | None = None) -> WorldDescription:
     """As load_world, from the text; relative names are looked up in `folder`."""
     root = parse_xml(text)
-    origin = Origin(resources, sdf_version(root), folder)
+    context = FileContext(resources, sdf_version(root), folder)
     element = root.find("world")
     if element is None:
         raise DescriptionError("there is no <world>")
@@ -82,14 +82,18 @@ def parse_world(text: str, resources: Resources, folder: Path | None = None) -> 
     _read_physics(world, element)
     for child in element:
         if child.tag in ("model", "include", "light"):
-            _add(world, child, origin)
+            _add(world, child, context)
         elif child.tag in NOT_SIMULATED:
             world.left_out.append(f"{child.tag} '{shown(child.get('name', ''))}'")
     return world
 
 
 def read_light(element: Element) -> Light:
-    """Returns the light of a `<light>` element. Errors: DescriptionError."""
+    """Returns the light of a `<light>` element.
+
+    Raises:
+        DescriptionError: if a value can't be read.
+    """
     name = named(element, "light")
     where = f"light '{shown(name)}'"
     pose, _ = read_pose(element, where)
@@ -110,24 +114,28 @@ def read_light(element: Element) -> Light:
     return light
 
 
-def _add(world: WorldDescription, element: Element, origin: Origin) -> None:
+def _add(world: WorldDescription, element: Element, context: FileContext) -> None:
     """One model or light; its faults leave out it alone."""
     try:
         if element.tag == "include":
-            found = included(element, origin)
+            found = included(element, context)
             if isinstance(found, (Light, ModelDescription)):
                 _keep(world, found)
                 return
-            element, origin = found
-        _keep(world, read_light(element) if element.tag == "light" else read_model(element, origin))
+            element, context = found
+        _keep(
+            world, read_light(element) if element.tag == "light" else read_model(element, context)
+        )
     except DescriptionError as error:
         world.warnings.append(f"{error}; it is left out")
 
 
-def included(include: Element, origin: Origin) -> Light | ModelDescription | tuple[Element, Origin]:
+def included(
+    include: Element, context: FileContext
+) -> Light | ModelDescription | tuple[Element, FileContext]:
     """What an `<include>` brings; ground_plane and sun are there without any file."""
     try:
-        return open_include(include, origin)
+        return open_include(include, context)
     except DescriptionError:
         name = included_name(include)
         if name not in ("ground_plane", "sun"):

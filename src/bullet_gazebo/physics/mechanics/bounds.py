@@ -15,7 +15,11 @@ STRONGEST = 1e12  # damping [N m s/rad, N s/m] and friction [N m, N]
 
 
 def check_bounds(model: ModelDescription) -> None:
-    """Errors: DescriptionError that names the place if `model` is beyond what the engine takes."""
+    """Refuses a model that no engine takes.
+
+    Raises:
+        DescriptionError: if `model` is beyond what the engine takes; it names the place.
+    """
     _check_counts(model)
     for link in model.links.values():
         _check_link(link, model.static)

@@ -14,7 +14,8 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
     The second result, by link name, holds the frames that were moved, as seen from the new ones; it is
     empty for a model that has that form already, as every URDF has.
 
-    Errors: DescriptionError if the engine can't compute with it.
+    Raises:
+        DescriptionError: if the engine can't compute with it.
     """
     if model.static:
         model = _rigid(model)

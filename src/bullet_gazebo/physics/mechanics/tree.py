@@ -12,7 +12,11 @@ Named = TypeVar("Named", Link, Joint)
 
 
 def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
-    """Returns `items` by name. Errors: DescriptionError for a name that is there twice."""
+    """Returns `items` by name.
+
+    Raises:
+        DescriptionError: for a name that is there twice.
+    """
     found: dict[str, Named] = {}
     for item in items:
         if item.name in found:
@@ -24,7 +28,8 @@ def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
 def find_roots(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
     """Returns the links that are nobody's child, in document order; all others hang from one of them.
 
-    Errors: DescriptionError for missing links, a link with two parents, and loops.
+    Raises:
+        DescriptionError: for missing links, a link with two parents, and loops.
     """
     if not links:
         raise DescriptionError("there is no <link>")

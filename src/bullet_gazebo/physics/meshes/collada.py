@@ -15,7 +15,8 @@ FACES = ("triangles", *POLYGONS)
 def triangulated(path: Path) -> bytes | None:
     """Returns the file with triangles instead of polygons; None if it holds no polygons.
 
-    Errors: DescriptionError if it isn't COLLADA or holds no faces.
+    Raises:
+        DescriptionError: if it isn't COLLADA or holds no faces.
     """
     try:
         text = path.read_text(encoding="utf-8")

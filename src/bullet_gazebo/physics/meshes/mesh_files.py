@@ -28,7 +28,7 @@ def _no_packages(name: str) -> str:
 class Resources:
     """Where the URIs of model files lead: folders of models, of media, and ROS packages by name.
 
-    `package` returns a package's folder; LookupError if there is none.
+    `package` returns a package's folder, or raises LookupError.
     """
 
     models: tuple[Path, ...] = ()
@@ -38,7 +38,8 @@ class Resources:
     def find(self, uri: str, folder: Path | None = None) -> Path:
         """Returns the existing file or folder of `uri`, relative names being looked up in `folder`.
 
-        Errors: DescriptionError that says where it was looked for.
+        Raises:
+            DescriptionError: if it isn't found; the text says where it was looked for.
         """
         tried = list(self._candidates(unquote(uri.strip()), folder))
         for path in tried:
@@ -82,7 +83,11 @@ class MeshFinder:
     warnings: list[str] = field(default_factory=list)
 
     def find(self, uri: str, where: str, needed: bool) -> str | None:
-        """Returns the file's path. Errors: DescriptionError if it is `needed` and can't be used."""
+        """Returns the file's path.
+
+        Raises:
+            DescriptionError: if it is `needed` and can't be used.
+        """
         try:
             if not uri.strip():
                 raise DescriptionError("the mesh has no file name")
@@ -95,7 +100,11 @@ class MeshFinder:
 
 
 def check_mesh(path: Path) -> Path:
-    """Returns `path` if the engine can make a mesh of it. Errors: DescriptionError."""
+    """Returns `path` if the engine can make a mesh of it.
+
+    Raises:
+        DescriptionError: if it can't.
+    """
     if path.suffix.lower() not in SUFFIXES:
         raise DescriptionError(f"mesh '{path}': only {', '.join(SUFFIXES)} files are read")
     if not path.is_file():  # reading a pipe would wait for ever
@@ -123,7 +132,8 @@ def _has_faces(path: Path) -> bool:
 def engine_mesh(path: Path, folder: Path) -> Path:
     """Returns `path`, or a file in `folder` with the same mesh in a form that the engine can read.
 
-    Errors: DescriptionError that names the file.
+    Raises:
+        DescriptionError: if it can't be read; the text names the file.
     """
     with place(f"mesh '{path}'"):
         data = _rewritten(path)

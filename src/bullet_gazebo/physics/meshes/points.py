@@ -20,7 +20,8 @@ UP_AXES = {  # of COLLADA, turned so that z is up
 def mesh_points(path: Path) -> np.ndarray:
     """Returns the different vertices (n, 3) [m] of an OBJ, STL or COLLADA file.
 
-    Errors: DescriptionError that names the file.
+    Raises:
+        DescriptionError: if it can't be read; the text names the file.
     """
     readers = {".obj": _obj, ".stl": _stl, ".dae": _collada}
     with place(f"mesh '{path}'"):

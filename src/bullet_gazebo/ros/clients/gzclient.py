@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import rospy
 
-from bullet_gazebo.ros.wire.signals import Ending, init_node
+from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -23,14 +23,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     def work() -> int:
         init_node("gazebo_gui", command_line, anonymous=False)
-        _say_what_there_is_to_see()
+        why = "there is no window yet"
+        if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+            why = "no display, so no window"
+        rospy.logwarn("gazebo_gui: %s; the simulation goes on without one.", why)
         return 0
 
-    return Ending().run(work, interrupted=0)
-
-
-def _say_what_there_is_to_see() -> None:
-    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
-        rospy.logwarn("gazebo_gui: there is no window yet; the simulation goes on without one.")
-    else:
-        rospy.logwarn("gazebo_gui: no display, so no window; the simulation goes on without one.")
+    return SignalHandler().run(work, interrupted=0)

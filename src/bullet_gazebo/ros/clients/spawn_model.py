@@ -15,7 +15,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import Empty
 
 from bullet_gazebo.ros.clients import gazebo_interface
-from bullet_gazebo.ros.wire.signals import Ending, init_node
+from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
 from ros_calls.service import ServiceClient, ServiceFailed
 from ros_calls.waiting import wait_until
 
@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             rospy.logerr("spawn_model: %s", fault)
             return 1
 
-    code = Ending().run(work, interrupted=INTERRUPTED)
+    code = SignalHandler().run(work, interrupted=INTERRUPTED)
     if code == INTERRUPTED:
         print("spawn_model: interrupted before it was done", file=sys.stderr)
         return 1

@@ -17,7 +17,7 @@ import yaml
 from std_msgs.msg import Bool
 
 from bullet_gazebo.ros.clients.manager_client import STRICT, ManagerClient
-from bullet_gazebo.ros.wire.signals import Ending, init_node
+from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
 from ros_calls.service import ServiceFailed
 from ros_calls.waiting import wait_until
 
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             rospy.logerr("Controller Spawner: %s", fault)
             return 1
 
-    return Ending().run(work, interrupted=0)
+    return SignalHandler().run(work, interrupted=0)
 
 
 def _work(manager: ManagerClient, options: argparse.Namespace) -> int:

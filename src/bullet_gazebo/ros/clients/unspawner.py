@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import rospy
 
 from bullet_gazebo.ros.clients.manager_client import BEST_EFFORT, ManagerClient
-from bullet_gazebo.ros.wire.signals import Ending, init_node
+from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
 from ros_calls.service import ServiceFailed
 
 PERIOD = 3.0  # [s], wall-clock: a simulated time that jumps back must not silence it
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         _inhibit(manager, controllers)
         return 0
 
-    return Ending().run(work, interrupted=0)
+    return SignalHandler().run(work, interrupted=0)
 
 
 def _inhibit(manager: ManagerClient, controllers: Sequence[str]) -> None:

@@ -1,6 +1,7 @@
 """libgazebo_ros_control.so: ros_control for a model (docs/contract/gazebo_ros_control.md 6.1 to 6.5)."""
 
 import threading
+import time
 
 import rosgraph
 import rospy
@@ -56,11 +57,10 @@ class ControlPlugin:
 
     def _wait_and_start(self) -> None:
         """Gazebo blocks the whole world for this; here only this model waits."""
-        waited = 0.0
+        reminder = time.monotonic() + REMIND
         while not self._gone.wait(POLL) and not rospy.is_shutdown() and not self._try_start():
-            waited += POLL
-            if waited >= REMIND:
-                waited = 0.0
+            if time.monotonic() >= reminder:
+                reminder += REMIND
                 rospy.logwarn(
                     "gazebo_ros_control of model '%s' still waits for the parameter '%s' (from %s up)",
                     self._context.model.name, self._parameter(), self._namespace,

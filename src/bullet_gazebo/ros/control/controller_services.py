@@ -27,7 +27,7 @@ from controller_manager_msgs.srv import (
 
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.manager import ControllerManager, Listed
+from bullet_gazebo.control.manager import ControllerInfo, ControllerManager
 from bullet_gazebo.control.user_types import find_type
 from bullet_gazebo.ros.control.controller_ports import ControllerPorts
 from bullet_gazebo.ros.wire.thinning import Thinner
@@ -168,7 +168,7 @@ def _report_fault(controller: Controller, error: BaseException) -> None:
     )  # fmt: skip
 
 
-def _state(entry: Listed) -> ControllerState:
+def _state(entry: ControllerInfo) -> ControllerState:
     claims = [
         HardwareInterfaceResources(c.hardware_interface, list(c.resources)) for c in entry.claims
     ]

@@ -14,7 +14,7 @@ from bullet_gazebo.control.trajectory.goal import (
     Outcome,
     TrajectorySample,
 )
-from bullet_gazebo.control.trajectory.plan import TrajectoryRefused
+from bullet_gazebo.control.trajectory.message import TrajectoryRefused
 from bullet_gazebo.ros.control.steady_action_server import SteadyActionServer
 from bullet_gazebo.ros.control.trajectory_conversions import to_feedback, to_request
 from bullet_gazebo.simulator import Simulator

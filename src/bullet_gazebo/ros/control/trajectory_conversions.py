@@ -14,24 +14,24 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from bullet_gazebo.control.trajectory.goal import GoalRequest, TrajectorySample
-from bullet_gazebo.control.trajectory.plan import Plan, PlanPoint
+from bullet_gazebo.control.trajectory.message import Trajectory, TrajectoryPoint
 from bullet_gazebo.control.trajectory.segment import State
 from bullet_gazebo.control.trajectory.tolerances import Tolerance
 from bullet_gazebo.ros.wire.conversions import to_time
 
 
-def to_plan(msg: JointTrajectory) -> Plan:
+def to_trajectory(msg: JointTrajectory) -> Trajectory:
     """Returns what the message wants; efforts are left out."""
     points = tuple(
-        PlanPoint(p.time_from_start.to_nsec(), p.positions, p.velocities, p.accelerations)
+        TrajectoryPoint(p.time_from_start.to_nsec(), p.positions, p.velocities, p.accelerations)
         for p in msg.points
     )
-    return Plan(tuple(msg.joint_names), points, msg.header.stamp.to_nsec())
+    return Trajectory(tuple(msg.joint_names), points, msg.header.stamp.to_nsec())
 
 
 def to_request(goal: FollowJointTrajectoryGoal) -> GoalRequest:
     return GoalRequest(
-        to_plan(goal.trajectory),
+        to_trajectory(goal.trajectory),
         _tolerances(goal.path_tolerance),
         _tolerances(goal.goal_tolerance),
         goal.goal_time_tolerance.to_nsec(),

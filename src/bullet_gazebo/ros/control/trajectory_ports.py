@@ -9,9 +9,9 @@ from control_msgs.srv import (
 from trajectory_msgs.msg import JointTrajectory
 
 from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryController
-from bullet_gazebo.control.trajectory.plan import TrajectoryRefused
+from bullet_gazebo.control.trajectory.message import TrajectoryRefused
 from bullet_gazebo.ros.control.trajectory_action import TrajectoryAction
-from bullet_gazebo.ros.control.trajectory_conversions import to_plan, to_query_response
+from bullet_gazebo.ros.control.trajectory_conversions import to_query_response, to_trajectory
 from bullet_gazebo.simulator import Simulator
 
 
@@ -40,10 +40,10 @@ class TrajectoryPorts:
         self._action.shutdown()
 
     def _follow(self, message: JointTrajectory) -> None:
-        plan = to_plan(message)
+        trajectory = to_trajectory(message)
         try:
             with self._sim.lock:
-                warning = self._controller.follow(plan)
+                warning = self._controller.follow(trajectory)
         except TrajectoryRefused as refusal:
             rospy.logerr("%s: %s", self._topic, refusal)
             return

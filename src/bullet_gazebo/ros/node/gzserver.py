@@ -25,7 +25,7 @@ from bullet_gazebo.ros.services.step_service import StepService
 from bullet_gazebo.ros.services.world_services import advertise_world_services
 from bullet_gazebo.ros.wire.rospy_patches import greet_clients_apart, hang_up_on_nonsense
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
-from bullet_gazebo.ros.wire.signals import Ending, init_node
+from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
 from bullet_gazebo.ros.wire.thinning import Thinner
 from bullet_gazebo.simulator import Simulator
 
@@ -72,12 +72,12 @@ class GazeboNode:
             *advertise_world_services(self.sim),
         ]
 
-    def run(self, ending: Ending) -> int:
+    def run(self, signals: SignalHandler) -> int:
         """Simulates until the node is shut down; returns the exit code."""
         # Called before the topics close, so that no tick publishes to a closed one.
         rospy.on_shutdown(self._stop)
         self._thread.start()
-        ending.wait()
+        signals.wait()
         self._stop()  # a shutdown that came before the hook was there doesn't call it
         return 1 if self._fault else 0
 
@@ -109,7 +109,8 @@ def main(argv: list[str] | None = None) -> int:
     """Runs the node; returns its exit code."""
     args = parse_args(rospy.myargv(argv)[1:])
     init_node("gazebo", sys.argv if argv is None else argv, anonymous=False)
-    ending = Ending()  # not before: while there is no master, a signal ends the process as such
+    # Not before: while there is no master, a signal ends the process as such.
+    signals = SignalHandler()
     if args.physics not in ENGINES:
         rospy.logwarn("Physics engine '%s' is not known; PyBullet is used", args.physics)
     if args.ignored:
@@ -120,4 +121,4 @@ def main(argv: list[str] | None = None) -> int:
     except EngineError as error:
         rospy.logfatal("%s", error)
         return 1
-    return GazeboNode(args, engine).run(ending)
+    return GazeboNode(args, engine).run(signals)

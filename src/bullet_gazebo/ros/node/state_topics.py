@@ -19,7 +19,7 @@ QUEUE = 10
 Publish = Callable[[Any], None]
 
 
-class Audience(rospy.SubscribeListener):
+class SubscriberCount(rospy.SubscribeListener):
     """Counts a topic's subscribers, so that nothing is made up for nobody."""
 
     def __init__(self) -> None:
@@ -41,17 +41,17 @@ class StateTopic(ThinnedTopic):
     def __init__(
         self, name: str, kind: type, sim: Simulator, thinner: Thinner, make: Callable[[], object]
     ) -> None:
-        self._audience = Audience()
+        self._subscribers = SubscriberCount()
         self._sim = sim
         self._make = make
         publisher = rospy.Publisher(
-            name, kind, subscriber_listener=self._audience, queue_size=QUEUE, tcp_nodelay=True
+            name, kind, subscriber_listener=self._subscribers, queue_size=QUEUE, tcp_nodelay=True
         )
         # A sample only says that there is news: states are many, and made up when they are sent.
         super().__init__(thinner, lambda now: publisher.publish(make()))
 
     def __call__(self, now: int) -> None:
-        if self._audience.size:
+        if self._subscribers.size:
             self.send(now)
 
     def flush(self) -> None:

@@ -17,14 +17,14 @@ from gazebo_msgs.srv import (
     JointRequestResponse,
 )
 
-from bullet_gazebo.jobs import EffortJob, Span, WrenchJob, in_world
+from bullet_gazebo.applied_forces import AppliedEffort, AppliedWrench, Interval, in_world
 from bullet_gazebo.ros.wire.checks import bad_number
 from bullet_gazebo.ros.wire.conversions import to_vector
 from bullet_gazebo.simulator import Simulator
 
 
 class ForceServices:
-    """Services that push joints and bodies for a time. They queue a job and answer at once."""
+    """Services that push joints and bodies for a time. They queue it and answer at once."""
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
@@ -43,8 +43,8 @@ class ForceServices:
             fault = bad_number(request)
             if fault:
                 return ApplyJointEffortResponse(False, f"ApplyJointEffort: {fault}")
-            span = self._span(request.start_time, request.duration)
-            self._sim.jobs.add_effort(EffortJob(*found, request.effort, span))
+            interval = self._interval(request.start_time, request.duration)
+            self._sim.applied.add_effort(AppliedEffort(*found, request.effort, interval))
         return ApplyJointEffortResponse(True, "ApplyJointEffort: effort set")
 
     def _apply_wrench(self, request: ApplyBodyWrenchRequest) -> ApplyBodyWrenchResponse:
@@ -65,22 +65,22 @@ class ForceServices:
                 found[0].link_state(found[1])[0],
                 None if world.is_world_frame(request.reference_frame) else frame[0],
             )
-            span = self._span(request.start_time, request.duration)
-            self._sim.jobs.add_wrench(WrenchJob(*found, wrench, span))
+            interval = self._interval(request.start_time, request.duration)
+            self._sim.applied.add_wrench(AppliedWrench(*found, wrench, interval))
         return ApplyBodyWrenchResponse(True, "")
 
-    def _span(self, start: genpy.Time, duration: genpy.Duration) -> Span:
+    def _interval(self, start: genpy.Time, duration: genpy.Duration) -> Interval:
         """A start in the past is now."""
-        return Span(max(start.to_nsec(), self._sim.now), duration.to_nsec())
+        return Interval(max(start.to_nsec(), self._sim.now), duration.to_nsec())
 
     def _clear_efforts(self, request: JointRequestRequest) -> JointRequestResponse:
         with self._sim.lock:
-            self._sim.jobs.clear_efforts(request.joint_name)
+            self._sim.applied.clear_efforts(request.joint_name)
         return JointRequestResponse()
 
     def _clear_wrenches(self, request: BodyRequestRequest) -> BodyRequestResponse:
         with self._sim.lock:
-            self._sim.jobs.clear_wrenches(request.body_name)
+            self._sim.applied.clear_wrenches(request.body_name)
         return BodyRequestResponse()
 
 

@@ -62,14 +62,11 @@ class SpawnServices:
         return self._spawn(request, request.model_xml)
 
     def _spawn(self, request: SpawnModelRequest, text: str) -> SpawnModelResponse:
-        with self._one_at_a_time:
-            return self._spawn_alone(request, text)
-
-    def _spawn_alone(self, request: SpawnModelRequest, text: str) -> SpawnModelResponse:
         try:
-            pose = self._checked_pose(request)
-            entity = read_entity(text, request.model_name, resources())
-            self._add(request, entity, pose.compose(entity_pose(entity)))
+            with self._one_at_a_time:
+                pose = self._checked_pose(request)
+                entity = read_entity(text, request.model_name, resources())
+                self._add(request, entity, pose.compose(entity_pose(entity)))
         except NameTaken:
             return SpawnModelResponse(False, TAKEN)
         except UnknownFormat as error:
@@ -117,16 +114,13 @@ class SpawnServices:
 
     def _delete(self, request: DeleteModelRequest) -> DeleteModelResponse:
         with self._one_at_a_time:
-            return self._delete_alone(request)
-
-    def _delete_alone(self, request: DeleteModelRequest) -> DeleteModelResponse:
-        with self._sim.lock:
-            model = self._sim.world.model(request.model_name)
-        if model is None:
-            return DeleteModelResponse(False, "DeleteModel: model does not exist")
-        self._plugins.unload(model)
-        with self._sim.lock:
-            self._sim.delete_model(model)
+            with self._sim.lock:
+                model = self._sim.world.model(request.model_name)
+            if model is None:
+                return DeleteModelResponse(False, "DeleteModel: model does not exist")
+            self._plugins.unload(model)
+            with self._sim.lock:
+                self._sim.delete_model(model)
         return DeleteModelResponse(True, "DeleteModel: successfully deleted model")
 
 

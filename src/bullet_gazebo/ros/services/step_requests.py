@@ -24,7 +24,11 @@ class StepPlan:
     """Joints to place, by model, commands to controllers, and those to joints, to be held."""
 
     def __init__(self, sim: Simulator, request: StepWorldRequest) -> None:
-        """The caller holds the simulator's lock. Errors: ControlError says what is wrong."""
+        """The caller holds the simulator's lock.
+
+        Raises:
+            ControlError: if the request can't be carried out; the text says why.
+        """
         self._sim = sim
         _check_ticks(request)
         self.placed = self._placing(request)

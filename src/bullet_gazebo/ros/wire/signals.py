@@ -24,7 +24,7 @@ SHUTDOWN = 14.0  # [s] at most; roslaunch sends SIGTERM after 15 s
 GRACE = 2.0  # [s] for interrupted work to notice that the node is down
 
 
-class Ending:
+class SignalHandler:
     """Notes a signal, and shuts the node down where that is safe.
 
     For the main thread; the node is to be initialised with ``disable_signals=True``.

@@ -23,7 +23,7 @@ from ros_utils._internal.gazebo.calls import (
 )
 
 
-class Target(NamedTuple):
+class SpawnOptions(NamedTuple):
     """What the spawn functions have in common: where the model goes, and how to call."""
 
     name: str
@@ -35,39 +35,39 @@ class Target(NamedTuple):
     verify: bool
 
 
-def spawn(kind: str, xml: str, target: Target) -> tuple[bool, str]:
+def spawn(kind: str, xml: str, options: SpawnOptions) -> tuple[bool, str]:
     """Spawn a model from XML text; `kind` is "urdf" or "sdf".
 
     Returns:
         Whether it was spawned (and, with `verify`, is in the world's list), and why not.
     """
-    name = f"{target.gazebo_ns.rstrip('/')}/spawn_{kind}_model"
+    name = f"{options.gazebo_ns.rstrip('/')}/spawn_{kind}_model"
     try:
-        check_finite(f"spawn {target.name}: its pose", *target.pose)
-        pose = make_pose(*target.pose)
-        request = (target.name, xml, target.namespace, pose, target.frame)
-        answer = wait_and_call(name, srv.SpawnModel, *request, timeout=target.timeout)
+        check_finite(f"spawn {options.name}: its pose", *options.pose)
+        pose = make_pose(*options.pose)
+        request = (options.name, xml, options.namespace, pose, options.frame)
+        answer = wait_and_call(name, srv.SpawnModel, *request, timeout=options.timeout)
     except (ServiceFailed, BadNumber) as fault:
         return _failed(str(fault))
     if not answer.success:
         return _failed(str(answer.status_message))
-    if target.verify and not _appears(target.name, True, target.timeout, target.gazebo_ns):
+    if options.verify and not _appears(options.name, True, options.timeout, options.gazebo_ns):
         return _failed(
-            f"{target.name} isn't in the world {target.timeout:g} s after it was spawned"
+            f"{options.name} isn't in the world {options.timeout:g} s after it was spawned"
         )
     return True, str(answer.status_message)
 
 
-def spawn_param(kind: str, param_name: str, target: Target) -> tuple[bool, str]:
+def spawn_param(kind: str, param_name: str, options: SpawnOptions) -> tuple[bool, str]:
     """Spawn a model from the text in parameter ``<namespace>/<param_name>``. See `spawn`."""
-    name = rosgraph.names.ns_join(target.namespace or "/", param_name)
+    name = rosgraph.names.ns_join(options.namespace or "/", param_name)
     try:
         xml = str(_params.get(name))
     except _master.MasterDown as fault:
         return _failed(f"parameter {name}: {fault}")
     except KeyError:
         return _failed(f"parameter {name} is not set: load the robot's description first")
-    return spawn(kind, xml, target)
+    return spawn(kind, xml, options)
 
 
 def gazebo_delete_model(

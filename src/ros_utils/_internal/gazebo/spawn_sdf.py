@@ -5,7 +5,7 @@ from __future__ import annotations
 from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages
 from ros_utils._internal.gazebo.calls import GAZEBO, TIMEOUT
-from ros_utils._internal.gazebo.spawn import Target, spawn, spawn_param
+from ros_utils._internal.gazebo.spawn import SpawnOptions, spawn, spawn_param
 
 
 def gazebo_spawn_sdf_path(
@@ -30,8 +30,10 @@ def gazebo_spawn_sdf_path(
     if xml is None:
         return False
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
-    return spawn("sdf", xml, place)[0]
+    options = SpawnOptions(
+        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
+    )
+    return spawn("sdf", xml, options)[0]
 
 
 def gazebo_spawn_sdf_pkg(
@@ -63,8 +65,10 @@ def gazebo_spawn_sdf_pkg(
     if xml is None:
         return False
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
-    return spawn("sdf", xml, place)[0]
+    options = SpawnOptions(
+        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
+    )
+    return spawn("sdf", xml, options)[0]
 
 
 def gazebo_spawn_sdf_string(
@@ -100,8 +104,10 @@ def gazebo_spawn_sdf_string(
         True if it was spawned; one value here, two for a URDF.
     """
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
-    return spawn("sdf", model_string, place)[0]
+    options = SpawnOptions(
+        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
+    )
+    return spawn("sdf", model_string, options)[0]
 
 
 def gazebo_spawn_sdf_param(
@@ -124,8 +130,10 @@ def gazebo_spawn_sdf_param(
     """Spawn the SDF text in parameter ``<robot_namespace>/<param_name>``. See
     `gazebo_spawn_sdf_string`."""
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
-    return spawn_param("sdf", param_name, place)[0]
+    options = SpawnOptions(
+        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
+    )
+    return spawn_param("sdf", param_name, options)[0]
 
 
 def _read(path: str) -> str | None:

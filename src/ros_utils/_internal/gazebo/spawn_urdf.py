@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ros_utils._internal.gazebo.calls import GAZEBO, TIMEOUT
-from ros_utils._internal.gazebo.spawn import Target, spawn, spawn_param
+from ros_utils._internal.gazebo.spawn import SpawnOptions, spawn, spawn_param
 from ros_utils._internal.urdf import urdf_parse_from_path, urdf_parse_from_pkg
 
 
@@ -32,8 +32,10 @@ def gazebo_spawn_urdf_path(
     if xml is None:
         return False, f"{model_path}: can't be read or expanded"
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
-    return spawn("urdf", xml, place)
+    options = SpawnOptions(
+        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
+    )
+    return spawn("urdf", xml, options)
 
 
 def gazebo_spawn_urdf_pkg(
@@ -62,8 +64,10 @@ def gazebo_spawn_urdf_pkg(
     if xml is None:
         return False, f"{file_name} in package {pkg_name}: can't be found, read or expanded"
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
-    return spawn("urdf", xml, place)
+    options = SpawnOptions(
+        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
+    )
+    return spawn("urdf", xml, options)
 
 
 def gazebo_spawn_urdf_string(
@@ -99,8 +103,10 @@ def gazebo_spawn_urdf_string(
         Whether it was spawned, and the simulator's text or what went wrong before.
     """
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
-    return spawn("urdf", model_string, place)
+    options = SpawnOptions(
+        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
+    )
+    return spawn("urdf", model_string, options)
 
 
 def gazebo_spawn_urdf_param(
@@ -123,5 +129,7 @@ def gazebo_spawn_urdf_param(
     """Spawn the URDF text in parameter ``<robot_namespace>/<param_name>``. See
     `gazebo_spawn_urdf_string`."""
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    place = Target(model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify)
-    return spawn_param("urdf", param_name, place)
+    options = SpawnOptions(
+        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
+    )
+    return spawn_param("urdf", param_name, options)

@@ -27,9 +27,9 @@ import rospkg
 
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
-from ros_utils._internal.processes import endings as _endings
 from ros_utils._internal.processes import procfs as _procfs
 from ros_utils._internal.processes import registry as _registry
+from ros_utils._internal.processes import termination as _termination
 
 # A caller that a shell put into the background ignores Ctrl-C, and so would all that it starts.
 LISTENING = ("env", "--default-signal=INT")
@@ -217,11 +217,11 @@ def end(entries: Sequence[_registry.Entry]) -> bool:
         True if nothing else of it is left.
     """
     gone = True
-    entries = [entry for entry in entries if not _endings.holds_caller(entry)]
+    entries = [entry for entry in entries if not _termination.holds_caller(entry)]
     for kind in ("node", "launch", "master"):
         wave = [entry for entry in entries if entry.kind == kind]
         if wave:
-            left = _endings.end(wave, reap)
+            left = _termination.end(wave, reap)
             gone = gone and not left
             ended = {entry.token for entry in wave} - left
             gone = _collect(ended) and gone
@@ -267,7 +267,7 @@ def _end_own() -> None:
         return
 
     def hurry(_number: int, _frame: FrameType | None) -> None:
-        _endings.hurry.set()
+        _termination.hurry.set()
 
     with contextlib.suppress(ValueError):  # not the main thread
         signal.signal(signal.SIGINT, hurry)

@@ -30,9 +30,8 @@ def stat(pid: int) -> Stat | None:
     reaped."""
     try:
         with open(f"/proc/{pid}/stat", encoding="utf-8", errors="replace") as file:
-            fields = (
-                file.read().rpartition(")")[2].split()
-            )  # the name before it may hold spaces and brackets
+            # The name before the bracket may hold spaces and brackets.
+            fields = file.read().rpartition(")")[2].split()
     except OSError:
         return None
     if fields[0] in "ZX":

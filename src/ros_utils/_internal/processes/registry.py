@@ -39,9 +39,8 @@ def path() -> str:
     """The file for the present master."""
     try:
         host, port = _master.host_and_port()
-        host = (
-            "localhost" if _master.is_local() else host
-        )  # one master, whatever name of this machine is used
+        # One master, whatever name of this machine is used.
+        host = "localhost" if _master.is_local() else host
         name = f"{host}_{port}"
     except _master.MasterDown:
         name = "unknown"
@@ -82,9 +81,8 @@ def _locked() -> Iterator[None]:
         yield  # nothing can be written there, so nothing can be disturbed
         return
     try:
-        fcntl.flock(
-            lock, fcntl.LOCK_EX
-        )  # held for milliseconds only, and freed by the kernel if its holder dies
+        # Held for milliseconds only, and freed by the kernel if its holder dies.
+        fcntl.flock(lock, fcntl.LOCK_EX)
         yield
     finally:
         os.close(lock)
@@ -94,12 +92,8 @@ def _read() -> list[Entry]:
     try:
         with open(path(), encoding="utf-8") as file:
             known = [Entry(**item) for item in json.load(file)]
-    except (
-        OSError,
-        ValueError,
-        TypeError,
-    ):  # absent, or not ours: there is nothing that could be ended safely
-        return []
+    except (OSError, ValueError, TypeError):
+        return []  # absent, or not ours: there is nothing that could be ended safely
     return [entry for entry in known if entry.boot == _procfs.boot_id()]
 
 

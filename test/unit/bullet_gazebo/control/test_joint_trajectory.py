@@ -11,10 +11,10 @@ from trajectory_rig import GAINS, KINDS, MS, Rig, S, move
 from bullet_gazebo.control.controllers import BUILT_IN
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.trajectory.goal import Outcome
-from bullet_gazebo.control.trajectory.plan import (
+from bullet_gazebo.control.trajectory.message import (
     INVALID_GOAL,
     INVALID_JOINTS,
-    Plan,
+    Trajectory,
     TrajectoryRefused,
 )
 from bullet_gazebo.control.trajectory.segment import Segment, Waypoint
@@ -141,7 +141,7 @@ def test_no_points_hold_the_joints_where_they_are():
     rig.controller.follow(move((1.0, (1.0,))))
     rig.run(500)
     rig.joints["shoulder"].position = 0.4
-    rig.controller.follow(Plan((), ()))
+    rig.controller.follow(Trajectory((), ()))
     rig.run()
     assert rig.controller.sample().desired == ((0.4,), (0.0,), (0.0,))
 
@@ -151,7 +151,7 @@ def test_a_ramp_goes_on_from_what_was_wanted():
     rig.controller.follow(move((1.0, (1.0,))))
     rig.run(501)
     (position,), (velocity,), _ = rig.controller.sample().desired
-    rig.controller.follow(Plan((), ()))
+    rig.controller.follow(Trajectory((), ()))
     rig.run(2000)
     assert rig.controller.sample().desired[0][0] == pytest.approx(
         position + 0.625 * velocity, abs=5e-3
@@ -247,11 +247,11 @@ def test_joints_may_come_in_another_order():
 
 
 def test_all_joints_are_needed_unless_some_are_allowed():
-    plan = move((1.0, (2.0,)), names=("rail",))
+    trajectory = move((1.0, (2.0,)), names=("rail",))
     rig = Rig(joints=("shoulder", "rail")).start()
     for act in (rig.controller.follow, rig.pursue):
         with pytest.raises(TrajectoryRefused) as refusal:
-            act(plan)
+            act(trajectory)
         assert refusal.value.code == INVALID_JOINTS
 
 

@@ -6,19 +6,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bullet_gazebo.control.trajectory.plan import (
+from bullet_gazebo.control.trajectory.message import (
     INVALID_GOAL,
     INVALID_JOINTS,
-    Plan,
-    PlanPoint,
+    Trajectory,
+    TrajectoryPoint,
     TrajectoryRefused,
     check_joints,
     check_points,
     dropped_points,
 )
 from bullet_gazebo.control.trajectory.segment import Segment, State, Waypoint, still, stop_ramp
+from bullet_gazebo.control.trajectory.spline import JointSpline
 from bullet_gazebo.control.trajectory.tolerances import Tolerance
-from bullet_gazebo.control.trajectory.track import Track
 
 S = 1_000_000_000  # [ns]
 values = st.floats(-10.0, 10.0)
@@ -115,7 +115,7 @@ def test_a_stop_ramp_slows_down_and_stands_after_five_eighths_of_the_way(positio
     st.integers(0, 3 * S),
 )
 def test_a_new_track_goes_on_smoothly_from_the_old_one(points, start):
-    old = Track([Segment(0, Waypoint(0.0, 0.0, 0.0), 3 * S, Waypoint(1.0, 0.5, 0.0))])
+    old = JointSpline([Segment(0, Waypoint(0.0, 0.0, 0.0), 3 * S, Waypoint(1.0, 0.5, 0.0))])
     way = [(4 * S + i * S, point) for i, point in enumerate(points)]
     new = old.continued(0, start, way, turns=False)
     assert all(near(a, b) for a, b in zip(old.at(start), new.at(start), strict=True))
@@ -127,10 +127,10 @@ def test_a_new_track_goes_on_smoothly_from_the_old_one(points, start):
 
 
 def test_the_past_of_a_track_is_forgotten():
-    track = Track([still(0, 0.0)])
+    spline = JointSpline([still(0, 0.0)])
     for tick in range(1, 1000):
-        track = track.continued(tick, tick, [(tick + 10, Waypoint(1.0))], turns=False)
-    assert len(track._segments) <= 3
+        spline = spline.continued(tick, tick, [(tick + 10, Waypoint(1.0))], turns=False)
+    assert len(spline._segments) <= 3
 
 
 @pytest.mark.parametrize(
@@ -143,19 +143,19 @@ def test_the_past_of_a_track_is_forgotten():
     ],
 )
 def test_a_continuous_joint_takes_the_short_way_round(at, to, wanted):
-    track = Track([still(0, at)]).continued(0, 0, [(S, Waypoint(to))], turns=True)
-    assert track.at(S).position == pytest.approx(wanted, abs=1e-4)
+    spline = JointSpline([still(0, at)]).continued(0, 0, [(S, Waypoint(to))], turns=True)
+    assert spline.at(S).position == pytest.approx(wanted, abs=1e-4)
 
 
 def test_whole_turns_are_added_to_all_points_alike():
     points = [(S, Waypoint(7.0)), (2 * S, Waypoint(12.0)), (3 * S, Waypoint(20.0))]
-    track = Track([still(0, 0.0)]).continued(0, 0, points, turns=True)
-    found = [track.at(time).position for time, _ in points]
+    spline = JointSpline([still(0, 0.0)]).continued(0, 0, points, turns=True)
+    found = [spline.at(time).position for time, _ in points]
     assert found == pytest.approx([p.position - 2 * math.pi for _, p in points])
 
 
 def point(time, *positions, **others):
-    return PlanPoint(round(time * S), positions, **others)
+    return TrajectoryPoint(round(time * S), positions, **others)
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def point(time, *positions, **others):
 )
 def test_bad_points_are_refused(points, text):
     with pytest.raises(TrajectoryRefused, match=text) as refusal:
-        check_points(Plan(("a",), points))
+        check_points(Trajectory(("a",), points))
     assert refusal.value.code == INVALID_GOAL
 
 
@@ -204,15 +204,17 @@ def test_joints_may_come_in_any_order_and_some_of_them_if_allowed():
 
 def test_past_points_are_dropped_with_a_warning_but_for_a_first_one_now():
     points = [point(0, 0.0), point(1, 0.0), point(2, 0.0)]
-    assert dropped_points(Plan(("a",), points), -1) == (0, "")
-    assert dropped_points(Plan(("a",), points), 0) == (1, "")
-    assert dropped_points(Plan(("a",), points, stamp=1), 0)[1].startswith("The first 1 of 3 points")
-    dropped, warning = dropped_points(Plan(("a",), points, stamp=1), S)
+    assert dropped_points(Trajectory(("a",), points), -1) == (0, "")
+    assert dropped_points(Trajectory(("a",), points), 0) == (1, "")
+    assert dropped_points(Trajectory(("a",), points, stamp=1), 0)[1].startswith(
+        "The first 1 of 3 points"
+    )
+    dropped, warning = dropped_points(Trajectory(("a",), points, stamp=1), S)
     assert (dropped, warning) == (2, "The first 2 of 3 points lie in the past: left out")
     with pytest.raises(
         TrajectoryRefused, match="All 3 points .* the last one by 1.0+ s"
     ) as refusal:
-        dropped_points(Plan(("a",), points), 3 * S)
+        dropped_points(Trajectory(("a",), points), 3 * S)
     assert refusal.value.code == INVALID_GOAL
 
 

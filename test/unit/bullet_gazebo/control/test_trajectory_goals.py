@@ -6,10 +6,10 @@ import pytest
 from trajectory_rig import Rig, S, move
 
 from bullet_gazebo.control.trajectory.goal import Outcome
-from bullet_gazebo.control.trajectory.plan import (
+from bullet_gazebo.control.trajectory.message import (
     GOAL_TOLERANCE_VIOLATED,
     PATH_TOLERANCE_VIOLATED,
-    Plan,
+    Trajectory,
     TrajectoryRefused,
 )
 from bullet_gazebo.control.trajectory.tolerances import Tolerance
@@ -167,7 +167,7 @@ def test_a_goal_without_points_holds_and_succeeds():
     rig = Rig().start()
     rig.controller.follow(move((1.0, (1.0,))))
     rig.run(1100)
-    told = rig.pursue(Plan(("shoulder",), ()))
+    told = rig.pursue(Trajectory(("shoulder",), ()))
     rig.run(100)
     assert told.outcomes == [Outcome("succeeded")]
 

@@ -7,7 +7,7 @@ from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
 from bullet_gazebo.control.trajectory.goal import GoalRequest, Outcome
-from bullet_gazebo.control.trajectory.plan import Plan, PlanPoint
+from bullet_gazebo.control.trajectory.message import Trajectory, TrajectoryPoint
 from bullet_gazebo.control.trajectory.tolerances import Tolerance
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
@@ -87,8 +87,8 @@ def start(sim, interface):
 def pursue(controller, points, path):
     told = Listener()
     tolerance = dict.fromkeys(JOINTS, Tolerance(path))
-    plan = Plan(JOINTS, points)
-    controller.pursue("goal", GoalRequest(plan, tolerance, tolerance), told)
+    trajectory = Trajectory(JOINTS, points)
+    controller.pursue("goal", GoalRequest(trajectory, tolerance, tolerance), told)
     return told
 
 
@@ -98,8 +98,8 @@ def pursue(controller, points, path):
 def test_a_quintic_is_followed_within_its_tolerances(sim, interface, path):
     robot, controller = start(sim, interface)
     points = [
-        PlanPoint(S, (0.5, 0.4), (0.4, -0.2), (0.0, 0.3)),
-        PlanPoint(2 * S, (0.8, -0.6), (0.0, 0.0), (0.0, 0.0)),
+        TrajectoryPoint(S, (0.5, 0.4), (0.4, -0.2), (0.0, 0.3)),
+        TrajectoryPoint(2 * S, (0.8, -0.6), (0.0, 0.0), (0.0, 0.0)),
     ]
     with sim.lock:
         sim.advance(1)
@@ -136,7 +136,9 @@ def test_a_way_too_fast_for_the_motors_aborts_the_goal(sim):
     _, controller = start(sim, "Effort")
     with sim.lock:
         sim.advance(1)
-        told = pursue(controller, [PlanPoint(S // 10, (1.5, 1.5), (0.0, 0.0), (0.0, 0.0))], 0.05)
+        told = pursue(
+            controller, [TrajectoryPoint(S // 10, (1.5, 1.5), (0.0, 0.0), (0.0, 0.0))], 0.05
+        )
         sim.advance(200)
     assert told.outcomes[0].kind == "aborted"
     assert "path error" in told.outcomes[0].text
@@ -146,7 +148,7 @@ def test_a_way_too_fast_for_the_motors_aborts_the_goal(sim):
 def test_after_a_reset_the_arm_hangs_where_it_was_put(sim, interface):
     robot, controller = start(sim, interface)
     with sim.lock:
-        told = pursue(controller, [PlanPoint(S, (1.0, -1.0))], 0.0)
+        told = pursue(controller, [TrajectoryPoint(S, (1.0, -1.0))], 0.0)
         sim.advance(500)
         sim.set_joint_positions(robot.model, {"shoulder": 0.0, "elbow": 0.0})
     assert [outcome.kind for outcome in told.outcomes] == ["canceled"]

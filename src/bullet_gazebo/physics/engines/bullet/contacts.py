@@ -47,7 +47,11 @@ def collides_with_itself(description: ModelDescription) -> bool:
 def check_meshes(
     client: int, body: int, links: Mapping[str, int], description: ModelDescription
 ) -> None:
-    """Errors: DescriptionError for a link whose meshes the engine has made nothing of, without a word."""
+    """Refuses what the engine has left out without a word.
+
+    Raises:
+        DescriptionError: for a link whose meshes the engine has made nothing of.
+    """
     for name, link in description.links.items():
         meshes = [shape.mesh for shape in link.collisions if shape.mesh]
         if name not in links or not meshes or len(meshes) < len(link.collisions):

@@ -22,7 +22,9 @@ def write_urdf(model: ModelDescription, folder: Path | None = None) -> str:
     """Returns URDF text with the numbers of `model` to the last digit.
 
     Meshes that the engine can't read as they are get rewritten into `folder`, if one is given.
-    Errors: DescriptionError for a mesh.
+
+    Raises:
+        DescriptionError: for a mesh that can't be read.
     """
     robot = Element("robot", name="model")
     for link in model.links.values():

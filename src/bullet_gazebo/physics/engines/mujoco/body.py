@@ -13,7 +13,7 @@ from bullet_gazebo.physics.description import (
 )
 from bullet_gazebo.physics.engine import Body, Twist
 from bullet_gazebo.physics.engines.mujoco.model import Elements, wxyz
-from bullet_gazebo.physics.engines.mujoco.state import Motion, MujocoState
+from bullet_gazebo.physics.engines.mujoco.state import BodyArrays, MujocoState
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, conjugate, rotate
 
 FREE_POSITIONS, FREE_VELOCITIES = 7, 6  # of a free base
@@ -78,13 +78,13 @@ class MujocoBody(Body):
             self.set_limits(index, joint.lower, joint.upper)
             self.set_motor(index, joint.speed, joint.effort)
 
-    def motion(self) -> Motion:
+    def motion(self) -> BodyArrays:
         """Returns a copy of its state, joint by joint and base last."""
         q, v = self._places()
         wrenches = self._state.data.xfrc_applied[list(self._ids.values())]
-        return Motion(self._qpos[q], self._qvel[v], self._qfrc[v], wrenches)
+        return BodyArrays(self._qpos[q], self._qvel[v], self._qfrc[v], wrenches)
 
-    def move(self, motion: Motion) -> None:
+    def move(self, motion: BodyArrays) -> None:
         """Takes over a state of its own from before the world was compiled anew."""
         q, v = self._places()
         self._qpos[q], self._qvel[v] = motion.positions, motion.velocities

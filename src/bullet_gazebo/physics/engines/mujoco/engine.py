@@ -72,7 +72,8 @@ class MujocoEngine(Engine):
     def _compile(self, fresh: dict[str, MujocoBody] | None = None) -> None:
         """Makes the model of the bodies and of `fresh` ones; what moves, goes on.
 
-        Errors: DescriptionError; the world is as it was then.
+        Raises:
+            DescriptionError: if MuJoCo can't take it; the world is as it was then.
         """
         bodies = self._bodies | (fresh or {})
         spec = mujoco.MjSpec()

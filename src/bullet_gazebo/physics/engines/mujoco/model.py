@@ -59,7 +59,11 @@ class ModelWriter:
         self._elements = Elements()
 
     def write(self, pose: Pose) -> Elements:
-        """Adds the model with its root link's frame at `pose`. Errors: DescriptionError for a mesh."""
+        """Adds the model with its root link's frame at `pose`.
+
+        Raises:
+            DescriptionError: for a mesh that can't be read.
+        """
         model = self._model
         base = self._add_link(self._spec.worldbody, model.root, pose)
         if not model.fixed_base:
@@ -180,7 +184,11 @@ def xyzw(q: np.ndarray) -> Quaternion:
 
 
 def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Returns the model. Errors: DescriptionError with MuJoCo's words."""
+    """Returns the model.
+
+    Raises:
+        DescriptionError: if MuJoCo refuses it, in its words.
+    """
     try:
         return spec.compile()
     except ValueError as error:

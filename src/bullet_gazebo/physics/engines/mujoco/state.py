@@ -12,12 +12,11 @@ from bullet_gazebo.physics.pose import Pose
 
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
 LARGEST = 1e10  # of a position, velocity or acceleration: beyond that, MuJoCo warns
-BAD = slice(
-    int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1
-)  # the warnings of that kind
+# The warnings of that kind.
+BAD = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
 
 
-class Motion(NamedTuple):
+class BodyArrays(NamedTuple):
     """State of one body, and what acts on it during the next step; each an array of MuJoCo's."""
 
     positions: np.ndarray

@@ -30,7 +30,11 @@ class Frames:
         self._given.setdefault(name, (pose, relative_to or MODEL))
 
     def resolve(self, name: str) -> Pose:
-        """Returns frame `name` seen from the model's. Errors: DescriptionError if unknown or circular."""
+        """Returns frame `name` seen from the model's.
+
+        Raises:
+            DescriptionError: if unknown or circular.
+        """
         chain: dict[str, Pose] = {}
         while name not in self._known:
             if name in chain:

@@ -14,7 +14,7 @@ NEWEST = (1, 7)
 
 
 @dataclass(frozen=True)
-class Origin:
+class FileContext:
     """Where an element of a model file comes from: what its URIs and its version mean."""
 
     resources: Resources
@@ -22,17 +22,18 @@ class Origin:
     folder: Path | None = None
 
 
-def open_include(include: Element, origin: Origin) -> tuple[Element, Origin]:
+def open_include(include: Element, context: FileContext) -> tuple[Element, FileContext]:
     """Returns the model or light that `include` names, with the include's name, pose and static flag.
 
-    Errors: DescriptionError if it isn't found or can't be read.
+    Raises:
+        DescriptionError: if it isn't found or can't be read.
     """
     uri = (include.findtext("uri") or "").strip()
     with place(f"<include> of '{shown(uri)}'"):
         if not uri:
             raise DescriptionError("<uri> is missing")
-        entity, source = _open(uri, origin)
-        return _overridden(entity, include), source
+        entity, inner = _open(uri, context)
+        return _overridden(entity, include), inner
 
 
 def included_name(include: Element) -> str:
@@ -41,8 +42,8 @@ def included_name(include: Element) -> str:
     return uri.removeprefix(BUILT_IN).strip("/") if uri.startswith(BUILT_IN) else ""
 
 
-def _open(uri: str, origin: Origin) -> tuple[Element, Origin]:
-    found = origin.resources.find(uri, origin.folder)
+def _open(uri: str, context: FileContext) -> tuple[Element, FileContext]:
+    found = context.resources.find(uri, context.folder)
     path = _model_file(found) if found.is_dir() else found
     if path.exists() and not path.is_file():  # reading a pipe would wait for ever
         raise DescriptionError(f"{path} is not a file")
@@ -57,7 +58,7 @@ def _open(uri: str, origin: Origin) -> tuple[Element, Origin]:
         for element in root:
             if element.tag in ("model", "light"):
                 version = _version(root.get("version", "1.4")) or (1, 4)
-                return element, replace(origin, version=version, folder=path.parent)
+                return element, replace(context, version=version, folder=path.parent)
         raise DescriptionError("there is no <model>")
 
 

@@ -25,7 +25,11 @@ class JointReader:
     warnings: list[str]
 
     def read(self, element: Element) -> Joint:
-        """Errors: DescriptionError, for joints of kinds that the engine hasn't too."""
+        """Reads one joint.
+
+        Raises:
+            DescriptionError: if it is broken, or of a kind that the engine hasn't.
+        """
         name = named(element, "joint")
         where = f"joint '{name}'"
         kind = element.get("type", "")

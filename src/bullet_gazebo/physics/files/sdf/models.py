@@ -20,7 +20,7 @@ from bullet_gazebo.physics.description import (
 from bullet_gazebo.physics.elements import named, parse_xml, shown, truth
 from bullet_gazebo.physics.files.sdf.frames import Frames, read_pose
 from bullet_gazebo.physics.files.sdf.geometry import ShapeReader, read_inertia
-from bullet_gazebo.physics.files.sdf.include import Origin, open_include
+from bullet_gazebo.physics.files.sdf.include import FileContext, open_include
 from bullet_gazebo.physics.files.sdf.joints import WORLD, JointReader, ends
 from bullet_gazebo.physics.files.urdf_extensions import name_sensor, read_plugin
 from bullet_gazebo.physics.mechanics.lumping import detach_from_world
@@ -50,19 +50,24 @@ def parse_sdf(
 ) -> ModelDescription:
     """Returns the first model of an SDF text, in the file's pose if it gives one (`initial_pose`).
 
-    Errors: DescriptionError with `source`, the place and the fault, in one line.
+    Raises:
+        DescriptionError: if it can't be simulated: `source`, the place and the fault, in one line.
     """
     with elements.place(source):
         root = parse_xml(text)
-        origin = Origin(resources or Resources(), sdf_version(root))
+        context = FileContext(resources or Resources(), sdf_version(root))
         model = first_entity(root)
         if model.tag == "include":
-            model, origin = open_include(model, origin)
-        return read_model(model, origin)
+            model, context = open_include(model, context)
+        return read_model(model, context)
 
 
 def sdf_version(root: Element) -> tuple[int, int]:
-    """Returns the version of an `<sdf>` or `<gazebo>` root. Errors: DescriptionError."""
+    """Returns the version of an `<sdf>` or `<gazebo>` root.
+
+    Raises:
+        DescriptionError: if it is another root, or another version.
+    """
     if root.tag not in ("sdf", "gazebo"):
         raise DescriptionError(f"the root element is <{shown(root.tag)}>, not <sdf>")
     match = VERSION.fullmatch(root.get("version", "1.4").strip())
@@ -84,13 +89,17 @@ def first_entity(root: Element) -> Element:
     raise DescriptionError("there is no <model>")
 
 
-def read_model(element: Element, origin: Origin) -> ModelDescription:
-    """Returns the model of a `<model>` element. Errors: DescriptionError."""
+def read_model(element: Element, context: FileContext) -> ModelDescription:
+    """Returns the model of a `<model>` element.
+
+    Raises:
+        DescriptionError: if it can't be simulated.
+    """
     name = named(element, "model")
     with elements.place(f"model '{shown(name)}'"):
         static = truth(element.findtext("static"))
-        parts = _read_parts(element, origin, static, MAX_NESTING)
-        if origin.version > NEWEST:
+        parts = _read_parts(element, context, static, MAX_NESTING)
+        if context.version > NEWEST:
             parts.warnings.append("written for a newer SDF than 1.7: what is new in it is ignored")
         model = _assemble(name, parts, static)
         model.initial_pose = read_pose(element, "model")[0]
@@ -118,12 +127,12 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
     return model
 
 
-def _read_parts(model: Element, origin: Origin, static: bool, depth: int) -> _Parts:
+def _read_parts(model: Element, context: FileContext, static: bool, depth: int) -> _Parts:
     """`depth` models may still be nested in this one."""
     if depth == 0:
         raise DescriptionError(f"models are nested more than {MAX_NESTING} deep")
     parts, frames = _Parts(), Frames()
-    nested = list(_nested(model, origin, static, depth))
+    nested = list(_nested(model, context, static, depth))
     _name_frames(model, frames)
     for name, element, inner in nested:
         frames.add(name, *read_pose(element, f"model '{name}'"))
@@ -131,30 +140,30 @@ def _read_parts(model: Element, origin: Origin, static: bool, depth: int) -> _Pa
             frames.add(f"{name}::{link}", pose, name)
     collide = truth(model.findtext("self_collide"))
     for element in model.findall("link"):
-        read = _read_link(element, origin, frames, parts, static)
+        read = _read_link(element, context, frames, parts, static)
         read.self_collide = truth(element.findtext("self_collide"), default=collide)
         parts.links.append(read)
     for name, _, inner in nested:
         _take_over(parts, inner, name)
     parts.poses = {link.name: frames.resolve(link.name) for link in parts.links}
-    joints = JointReader(frames, origin.version, parts.warnings)
+    joints = JointReader(frames, context.version, parts.warnings)
     parts.joints += [joints.read(element) for element in model.findall("joint")]
     parts.plugins += [read_plugin(element) for element in model.findall("plugin")]
     return parts
 
 
 def _nested(
-    model: Element, origin: Origin, static: bool, depth: int
+    model: Element, context: FileContext, static: bool, depth: int
 ) -> Iterator[tuple[str, Element, _Parts]]:
     for element in model:
         if element.tag not in ("model", "include"):
             continue
-        inner, source = element, origin
+        inner, inner_context = element, context
         if element.tag == "include":
-            inner, source = open_include(element, origin)
+            inner, inner_context = open_include(element, context)
         name = named(inner, "model")
         with elements.place(f"model '{shown(name)}'"):
-            yield name, inner, _read_parts(inner, source, static, depth - 1)
+            yield name, inner, _read_parts(inner, inner_context, static, depth - 1)
 
 
 def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
@@ -190,11 +199,11 @@ def _name_frames(model: Element, frames: Frames) -> None:
 
 
 def _read_link(
-    element: Element, origin: Origin, frames: Frames, parts: _Parts, static: bool
+    element: Element, context: FileContext, frames: Frames, parts: _Parts, static: bool
 ) -> Link:
     name = named(element, "link")
     where = f"link '{name}'"
-    meshes = MeshFinder(origin.resources, origin.folder, parts.warnings)
+    meshes = MeshFinder(context.resources, context.folder, parts.warnings)
     shapes = ShapeReader(meshes, frames, parts.warnings)
     link = Link(name, read_inertia(element, where, static))
     link.collisions = list(shapes.read(element, "collision", where))

@@ -7,7 +7,7 @@ from bullet_gazebo.control.angles import shortest_distance
 from bullet_gazebo.control.trajectory.segment import Segment, State, Waypoint
 
 
-class Track:
+class JointSpline:
     """Segments in order of time; the last one's end is held for ever. Times are uptime [ns]."""
 
     __slots__ = ("_segments", "_starts", "end")
@@ -24,8 +24,8 @@ class Track:
 
     def continued(
         self, now: int, start: int, points: Iterable[tuple[int, Waypoint]], turns: bool
-    ) -> "Track":
-        """Returns a track that leaves this one at `start`, for points that all lie after `now`.
+    ) -> "JointSpline":
+        """Returns a spline that leaves this one at `start`, for points that all lie after `now`.
 
         What lies before `now` is forgotten. With `turns` the joint is continuous: the points are moved by
         whole turns, so that the first one is the nearest to where the joint then is.
@@ -42,4 +42,4 @@ class Track:
             target = point._replace(position=point.position + shift)
             segments.append(Segment(before, waypoint, time, target))
             before, waypoint = time, target
-        return Track(segments)
+        return JointSpline(segments)

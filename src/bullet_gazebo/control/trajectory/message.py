@@ -1,4 +1,4 @@
-"""What a client wants of the joints, and what of it can't be done (docs/contract/ros_control.md 3.5)."""
+"""A trajectory as a client sends it, and what of it can't be done (docs/contract/ros_control.md 3.5)."""
 
 import math
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ class TrajectoryRefused(ControlError):
         self.code = code
 
 
-class PlanPoint(NamedTuple):
+class TrajectoryPoint(NamedTuple):
     """trajectory_msgs/JointTrajectoryPoint: `time` is time_from_start [ns]; values in order of joints."""
 
     time: int
@@ -30,7 +30,7 @@ class PlanPoint(NamedTuple):
     accelerations: Sequence[float] = ()
 
     def waypoint(self, index: int) -> Waypoint:
-        """Returns the point of the joint with that place in the plan."""
+        """Returns the point of the joint with that place in the trajectory."""
         return Waypoint(
             self.positions[index],
             self.velocities[index] if self.velocities else None,
@@ -38,16 +38,20 @@ class PlanPoint(NamedTuple):
         )
 
 
-class Plan(NamedTuple):
+class Trajectory(NamedTuple):
     """trajectory_msgs/JointTrajectory; it begins at `stamp` [ns], or with the next tick if that is 0."""
 
     names: Sequence[str]
-    points: Sequence[PlanPoint]
+    points: Sequence[TrajectoryPoint]
     stamp: int = 0
 
 
 def check_joints(names: Sequence[str], joints: Sequence[str], partial: bool) -> None:
-    """Raises TrajectoryRefused unless `names` are `joints` in any order, or with `partial` some of them."""
+    """Returns if `names` are `joints` in any order, or with `partial` some of them.
+
+    Raises:
+        TrajectoryRefused: if they aren't.
+    """
     unknown = [name for name in names if name not in joints]
     missing = [joint for joint in joints if joint not in names]
     fault = ""
@@ -69,11 +73,15 @@ def _shortened(names: Sequence[str]) -> str:
     return str(list(names[:MOST_NAMED])) + (f" and {rest} more" if rest > 0 else "")
 
 
-def check_points(plan: Plan) -> None:
-    """Raises TrajectoryRefused unless all points are whole, finite, and later than the one before."""
+def check_points(trajectory: Trajectory) -> None:
+    """Returns if all points are whole, finite, and later than the one before.
+
+    Raises:
+        TrajectoryRefused: if one isn't.
+    """
     before = -1
-    for number, point in enumerate(plan.points):
-        fault = _fault(point, len(plan.names))
+    for number, point in enumerate(trajectory.points):
+        fault = _fault(point, len(trajectory.names))
         if not fault and point.time <= before:
             fault = (
                 f"time_from_start is {point.time / NANOSECONDS} s: it must be more than "
@@ -84,12 +92,13 @@ def check_points(plan: Plan) -> None:
         before = point.time
 
 
-def dropped_points(plan: Plan, elapsed: int) -> tuple[int, str]:
-    """Returns how many points come too late, `elapsed` [ns] after the plan begins, and a warning.
+def dropped_points(trajectory: Trajectory, elapsed: int) -> tuple[int, str]:
+    """Returns how many points come too late, `elapsed` [ns] after the trajectory begins, and a warning.
 
-    Errors: TrajectoryRefused if all of them do.
+    Raises:
+        TrajectoryRefused: if all of them do.
     """
-    points = plan.points
+    points = trajectory.points
     dropped = sum(point.time <= elapsed for point in points)
     if dropped == len(points):
         late = (elapsed - points[-1].time) / NANOSECONDS
@@ -98,12 +107,12 @@ def dropped_points(plan: Plan, elapsed: int) -> tuple[int, str]:
             f"All {dropped} points of the trajectory lie in the past, the last one by {late:f} s",
         )
     # Most clients begin with a point "now", so it is no news that it is over.
-    if not dropped or (dropped == 1 and not plan.stamp and not points[0].time):
+    if not dropped or (dropped == 1 and not trajectory.stamp and not points[0].time):
         return dropped, ""
     return dropped, f"The first {dropped} of {len(points)} points lie in the past: left out"
 
 
-def _fault(point: PlanPoint, joints: int) -> str:
+def _fault(point: TrajectoryPoint, joints: int) -> str:
     """Returns what is wrong with the point, or nothing."""
     if not point.positions:
         return "it has no positions"

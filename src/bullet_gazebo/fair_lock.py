@@ -5,7 +5,7 @@ from collections import deque
 from types import TracebackType
 
 
-class TurnLock:
+class FairLock:
     """First come, first served.
 
     threading.Lock lets a thread that releases and re-acquires it in a loop, as the simulation does, keep

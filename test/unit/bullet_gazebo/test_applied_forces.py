@@ -8,7 +8,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from bullet_gazebo.jobs import EffortJob, Jobs, Span, WrenchJob, in_world
+from bullet_gazebo.applied_forces import (
+    AppliedEffort,
+    AppliedForces,
+    AppliedWrench,
+    Interval,
+    in_world,
+)
 from bullet_gazebo.physics.pose import Pose
 
 TICK = 1_000_000  # [ns]
@@ -49,20 +55,20 @@ class FakeModel:
         return 0.0, self.speed
 
 
-def ticks(job, count=20, now=0):
+def ticks(each, count=20, now=0):
     """On which ticks after `now` an effort acts."""
-    jobs, acted = Jobs(), []
-    jobs.add_effort(job)
+    applied, acted = AppliedForces(), []
+    applied.add_effort(each)
     for tick in range(1, count + 1):
-        job.model.body.efforts.clear()
-        jobs.apply(now + tick * TICK)
-        if job.model.body.efforts:
+        each.model.body.efforts.clear()
+        applied.apply(now + tick * TICK)
+        if each.model.body.efforts:
             acted.append(tick)
-    return acted, jobs
+    return acted, applied
 
 
 def effort(start=0, duration=-1, joint="a", value=1.0, model=None):
-    return EffortJob(model or FakeModel(), joint, value, Span(start, duration))
+    return AppliedEffort(model or FakeModel(), joint, value, Interval(start, duration))
 
 
 @pytest.mark.parametrize(
@@ -78,86 +84,86 @@ def effort(start=0, duration=-1, joint="a", value=1.0, model=None):
         (18 * TICK, -1, [18, 19, 20]),
     ],
 )
-def test_when_a_job_acts(start, duration, acted):
-    found, jobs = ticks(effort(start, duration))
+def test_when_an_effort_acts(start, duration, acted):
+    found, applied = ticks(effort(start, duration))
     assert found == acted
-    assert bool(jobs.efforts) == (duration < 0)
+    assert bool(applied.efforts) == (duration < 0)
 
 
 def test_efforts_add_up_each_clamped_to_the_joint():
-    model, jobs = FakeModel(), Jobs()
+    model, applied = FakeModel(), AppliedForces()
     for value in (1.0, 5.0, -9.0):
-        jobs.add_effort(effort(joint="b", value=value, model=model))
-    jobs.apply(TICK)
+        applied.add_effort(effort(joint="b", value=value, model=model))
+    applied.apply(TICK)
     assert model.body.efforts == [(1, 1.0), (1, 2.0), (1, -2.0)]
 
 
-@pytest.mark.parametrize("speed, value, applied", [(8.0, 1.0, 0.0), (8.0, -1.0, -1.0),
+@pytest.mark.parametrize("speed, value, expected", [(8.0, 1.0, 0.0), (8.0, -1.0, -1.0),
                                                    (-8.0, -1.0, 0.0), (7.0, 1.0, 1.0)])  # fmt: skip
-def test_no_effort_beyond_the_velocity_limit(speed, value, applied):
-    model, jobs = FakeModel(), Jobs()
+def test_no_effort_beyond_the_velocity_limit(speed, value, expected):
+    model, applied = FakeModel(), AppliedForces()
     model.speed = speed
-    jobs.add_effort(effort(joint="b", value=value, model=model))
-    jobs.apply(TICK)
-    assert model.body.efforts == [(1, applied)]
+    applied.add_effort(effort(joint="b", value=value, model=model))
+    applied.apply(TICK)
+    assert model.body.efforts == [(1, expected)]
 
 
 def test_an_effort_on_a_fixed_joint_does_nothing():
-    model, jobs = FakeModel(), Jobs()
-    jobs.add_effort(effort(joint="fixed", model=model))
-    jobs.apply(TICK)
+    model, applied = FakeModel(), AppliedForces()
+    applied.add_effort(effort(joint="fixed", model=model))
+    applied.apply(TICK)
     assert model.body.efforts == []
 
 
 def wrench(model, force, link="cart", duration=-1):
-    return WrenchJob(model, link, (force, NOTHING), Span(0, duration))
+    return AppliedWrench(model, link, (force, NOTHING), Interval(0, duration))
 
 
 def test_the_wrench_queued_last_counts():
-    model, jobs = FakeModel(), Jobs()
-    jobs.add_wrench(wrench(model, (1.0, 0.0, 0.0)))
-    jobs.add_wrench(wrench(model, (2.0, 0.0, 0.0), duration=TICK))
-    jobs.add_wrench(wrench(model, (3.0, 0.0, 0.0), link="pole"))
-    jobs.apply(TICK)
-    jobs.apply(2 * TICK)
+    model, applied = FakeModel(), AppliedForces()
+    applied.add_wrench(wrench(model, (1.0, 0.0, 0.0)))
+    applied.add_wrench(wrench(model, (2.0, 0.0, 0.0), duration=TICK))
+    applied.add_wrench(wrench(model, (3.0, 0.0, 0.0), link="pole"))
+    applied.apply(TICK)
+    applied.apply(2 * TICK)
     forces = [(link, force[0]) for link, force, _ in model.body.wrenches]
     assert forces == [("cart", 2.0), ("pole", 3.0), ("cart", 1.0), ("pole", 3.0)]
 
 
 def test_joint_forces_are_cleared_by_plain_name_in_all_models():
-    jobs = Jobs()
+    applied = AppliedForces()
     one, other = FakeModel("one"), FakeModel("other")
     for model in (one, other):
-        jobs.add_effort(effort(model=model))
-    jobs.clear_efforts("one::a")
-    jobs.apply(TICK)
-    jobs.clear_efforts("a")
-    jobs.apply(2 * TICK)
+        applied.add_effort(effort(model=model))
+    applied.clear_efforts("one::a")
+    applied.apply(TICK)
+    applied.clear_efforts("a")
+    applied.apply(2 * TICK)
     assert one.body.efforts == other.body.efforts == [(0, 1.0)]
-    assert jobs.efforts == []
+    assert applied.efforts == []
 
 
 def test_wrenches_are_cleared_by_scoped_name():
-    jobs = Jobs()
+    applied = AppliedForces()
     one, other = FakeModel("one"), FakeModel("other")
     for model in (one, other):
-        jobs.add_wrench(wrench(model, (1.0, 0.0, 0.0)))
-    jobs.clear_wrenches("cart")
-    jobs.clear_wrenches("one::cart")
-    jobs.apply(TICK)
+        applied.add_wrench(wrench(model, (1.0, 0.0, 0.0)))
+    applied.clear_wrenches("cart")
+    applied.clear_wrenches("one::cart")
+    applied.apply(TICK)
     assert one.body.wrenches == []
     assert len(other.body.wrenches) == 1
 
 
-def test_a_deleted_model_takes_its_jobs_along():
+def test_a_deleted_model_takes_what_acts_on_it_along():
     """As in Gazebo, efforts on equally named joints of other models as well."""
-    jobs = Jobs()
+    applied = AppliedForces()
     one, other = FakeModel("one"), FakeModel("other")
     for model in (one, other):
-        jobs.add_effort(effort(model=model))
-        jobs.add_wrench(wrench(model, (1.0, 0.0, 0.0)))
-    jobs.forget(one)
-    jobs.apply(TICK)
+        applied.add_effort(effort(model=model))
+        applied.add_wrench(wrench(model, (1.0, 0.0, 0.0)))
+    applied.forget(one)
+    applied.apply(TICK)
     assert one.body.wrenches == one.body.efforts == other.body.efforts == []
     assert len(other.body.wrenches) == 1
 
