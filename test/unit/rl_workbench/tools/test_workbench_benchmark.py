@@ -205,7 +205,7 @@ def test_a_failed_training_stays_in_the_table(tmp_path: Path) -> None:
     )
     row = examined(one)
     assert row.score is None and row.fault.startswith("the loss is nan")
-    assert row.avg20 == pytest.approx(20.0)
+    assert row.avg20 == row.training_mean == pytest.approx(20.0)
 
 
 def test_figures_that_cannot_be_read_are_faults(tmp_path: Path) -> None:
