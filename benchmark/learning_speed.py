@@ -18,9 +18,10 @@ import reporting
 import torch
 from stable_baselines3 import DQN
 
-from rl_workbench.training.dqn.run import DQNTraining
-from rl_workbench.training.dqn.settings import choose
+from rl_workbench.training.algorithms import algorithm
+from rl_workbench.training.options.training_options import choose
 from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.training import Training
 
 ENV_ID = "CartPole-v1"
 # What both know, by our names; the first is the tutorial's, the second the tuned one's.
@@ -53,13 +54,14 @@ def bare(steps: int) -> float:
 
 
 def ours(options: dict[str, Any], steps: int) -> float:
-    """dqn_train.py without evaluations."""
+    """dqn_train.py with one greedy episode at its end."""
     same = {"preset": "tutorial", "double": False, "loss": "huber", "epsilon_schedule": "linear",
-            "episodes": 0, "eval_frequency": 0}  # fmt: skip
+            "episodes": 0, "eval_frequency": 0, "eval_episodes": 1,
+            "confirm_episodes": 0}  # fmt: skip
     texts = {name: _text(value) for name, value in {**same, **options}.items()}
-    choice = choose([], {**texts, "total_timesteps": str(steps)})
+    chosen = choose(algorithm("dqn"), [], {**texts, "total_timesteps": str(steps)})
     with tempfile.TemporaryDirectory() as folder:
-        training = DQNTraining(choice, Path(folder), Interrupt())
+        training = Training(chosen, Path(folder), Interrupt())
         began = time.perf_counter()
         training.run()
         return steps / (time.perf_counter() - began)

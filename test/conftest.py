@@ -39,7 +39,8 @@ def new_engine(request: pytest.FixtureRequest) -> Callable:
 @pytest.fixture
 def signals() -> Iterator[None]:
     """Gives signals back after a command that takes them over, as if in a process of its own."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    taken = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.getsignal(number) for number in taken}
     yield
     for number, handler in before.items():
         signal.signal(number, handler)

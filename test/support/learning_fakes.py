@@ -81,7 +81,9 @@ class Pole(gymnasium.Env):
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        x, angle = self.np_random.uniform(-self._noise, self._noise, 2) if self._noise else (0.0, 0.0)
+        x, angle = (
+            self.np_random.uniform(-self._noise, self._noise, 2) if self._noise else (0.0, 0.0)
+        )
         self._state, self._set_point = (x, 0.0, angle, 0.0), x
         return np.array(self._state, np.float32), {}
 

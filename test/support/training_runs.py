@@ -80,12 +80,13 @@ SMALL: dict[str, dict[str, Any]] = {
     "sac": _EVERYWHERE
     | {
         "env_id": "Pendulum-v1",
+        "env_kwargs": {"max_episode_steps": 20},
         "total_timesteps": 260,
         "learning_starts": 50,
         "buffer_size": 100,
         "batch_size": 8,
         "net_arch": "8",
-        "eval_frequency": 0,
+        "eval_frequency": 100,
         "checkpoint_frequency": 50,
     },
 }

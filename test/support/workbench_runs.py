@@ -14,9 +14,7 @@ def dqn(folder: Path, **changed: object) -> Path:
     return train(folder, "dqn", **changed)
 
 
-def policy_gradient(
-    folder: Path, algorithm: str = "reinforce-document", **changed: object
-) -> Path:
+def policy_gradient(folder: Path, algorithm: str = "reinforce-document", **changed: object) -> Path:
     few = {"env_id": "CartPole-v1", "env_kwargs": None, "episodes": 4, "save_every": 2}
     return train(folder, algorithm, **{**few, **changed})
 

@@ -1,17 +1,12 @@
 """Interrupted anywhere and resumed: a training ends with the bits with which it would have ended."""
 
-import json
 import shutil
 import sys
-from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 
 import pytest
-import torch
 from learning_fakes import Dicing, OnlyOne, register_with
 from training_runs import (
-    ALL,
     EXACT,
     OTHERS,
     InterruptAfter,
@@ -27,10 +22,9 @@ from training_runs import (
     train,
 )
 
-from rl_workbench.agents.pg.two_networks import TwoNetworks
-from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.run import checkpoints as run_checkpoints
 from rl_workbench.training.run.environments import CheckedEnvironment
+
 
 class Killed(Exception):
     """Nobody catches it, as nobody catches kill -9."""

@@ -82,8 +82,9 @@ def test_the_record_says_what_was_trained_and_with_what(whole, name: str) -> Non
     assert set(found["hyperparameters"]) == set(options.record()["hyperparameters"])
     assert found["began"] > 1e9
     assert {"python", "numpy", "torch", "gymnasium", "machine", "command"} <= set(found["versions"])
-    assert checkpoint(whole(name))["config"]["hyperparameters"] == (
-        options.record()["hyperparameters"]
+    assert (
+        checkpoint(whole(name))["config"]["hyperparameters"]
+        == (options.record()["hyperparameters"])
     )
     assert summary(whole(name))["hyperparameters"] == found["hyperparameters"]
 
@@ -204,7 +205,7 @@ def test_a_number_of_episodes_or_of_steps(tmp_path: Path, name: str) -> None:
     few = train(tmp_path / "few", name, episodes=4)
     assert summary(few)["episodes"] == 4 and summary(few)["complete"]
     short = summary(train(tmp_path / "short", name, total_timesteps=50))
-    assert short["complete"] and 50 <= short["steps"]
+    assert short["complete"] and short["steps"] >= 50
     assert short["steps"] == 50 if name == "dqn" else sum(short["lengths"][:-1]) < 50
 
 

@@ -9,11 +9,8 @@ from rl_workbench.training.run.interrupt import Interrupt
 
 
 @pytest.fixture
-def interrupt() -> Interrupt:
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield Interrupt().install()
-    for number, handler in before.items():
-        signal.signal(number, handler)
+def interrupt(signals) -> Interrupt:
+    return Interrupt().install()
 
 
 def test_while_starting_it_ends_any_wait(interrupt: Interrupt) -> None:
@@ -46,7 +43,17 @@ def test_one_that_was_deferred_is_not_forgotten(interrupt: Interrupt) -> None:
         interrupt.at_once()
 
 
-def test_sigterm_has_its_own_code(interrupt: Interrupt) -> None:
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_other_signals_have_codes_of_their_own(
+    interrupt: Interrupt, number: int, code: int
+) -> None:
     interrupt.defer()
-    os.kill(os.getpid(), signal.SIGTERM)
-    assert interrupt.exit_code == 143
+    os.kill(os.getpid(), number)
+    assert interrupt.requested() and interrupt.exit_code == code
+
+
+def test_a_closed_terminal_that_is_to_be_ignored_is_ignored(signals) -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    interrupt = Interrupt().install()
+    os.kill(os.getpid(), signal.SIGHUP)
+    assert not interrupt.requested()
