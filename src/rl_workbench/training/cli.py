@@ -42,19 +42,18 @@ def choose_training(
     """
     parser, parameters = _parser(prog), dict(parameters or {})
     known, rest = parser.parse_known_args(argv)
-    named = known.algo or parameters.pop("algo", None) or None
-    resumed = known.resume or parameters.get("resume")
-    if known.resume:
-        rest += ["--resume", known.resume]
+    named = getattr(known, "algo", None) or parameters.pop("algo", None) or None
+    resumed = _resume_flag().parse_known_args(rest)[0].resume or parameters.get("resume")
+    parents = [parser, *([parent] if parent else [])]
     if named is None and resumed:
-        return choose(recorded_kind(Path(resumed)), rest, parameters, prog, env_id, parent)
+        return choose(recorded_kind(Path(resumed)), rest, parameters, prog, env_id, parents)
     if named is None and default is None:
         _without_algorithm(parser, rest)
     try:
         kind: AlgorithmKind = algorithm(named or str(default))
     except WorkbenchError as error:
         parser.error(str(error))
-    return choose(kind, rest, parameters, prog, env_id, parent)
+    return choose(kind, rest, parameters, prog, env_id, parents)
 
 
 def _parser(prog: str) -> argparse.ArgumentParser:
@@ -65,9 +64,17 @@ def _parser(prog: str) -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
         add_help=False,  # --algo NAME --help is the algorithm's
+        argument_default=argparse.SUPPRESS,
     )
-    result.add_argument("--algo", metavar="NAME", help=f"one of {', '.join(ALGORITHMS)}")
-    result.add_argument("--resume", metavar="RUN", help="go on with the training in a run folder")
+    names = ", ".join(ALGORITHMS)
+    result.add_argument("--algo", metavar="NAME", help=f"one of {names}; each has flags of its own")
+    return result
+
+
+def _resume_flag() -> argparse.ArgumentParser:
+    """Finds the training that goes on, whose algorithm needn't be named."""
+    result = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    result.add_argument("--resume", nargs="?")
     return result
 
 

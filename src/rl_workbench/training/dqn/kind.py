@@ -5,7 +5,7 @@ from rl_workbench.training.options.kind import AlgorithmKind
 
 DQN = AlgorithmKind(
     name="dqn",
-    about="an agent by DQN, single actions",
+    about="an agent by DQN in any Gymnasium environment with single actions",
     config="dqn.yaml",
     implementation="rl_workbench.training.dqn.algorithm",
     hyperparameters=lambda: DQNSettings,

@@ -2,6 +2,7 @@
 
 import argparse
 import shlex
+from collections.abc import Sequence
 from typing import Any
 
 from rl_workbench.errors import WorkbenchError
@@ -13,11 +14,11 @@ RENAMED = {  # flags that earlier versions had
     "--stop-at": "--stop-at-length",
 }
 DESCRIPTION = """\
-Trains {about} in a Gymnasium environment.
+Trains {about}.
 
-What isn't given comes from config/{config}. {ros}--params wins over the file{over}, and a flag
-over all of them.
-Ctrl-C saves everything and exits with 130 (SIGTERM: 143, SIGHUP: 129); --resume goes on from there.
+What isn't given comes from config/{config}, the environment's section, else it is the default.
+--params wins over the file, {ros}and a flag over all of them.
+Ctrl-C saves everything and exits with 130 (SIGTERM: 143, SIGHUP: 129); {resume}.
 Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
 
 
@@ -33,7 +34,8 @@ class CommandLine:
         kind: the algorithm.
         options: all of its options; each gets a flag, and a ROS parameter.
         prog: the command, for --help.
-        parent: has further flags, for --help.
+        env_id: the environment, if it isn't given.
+        parents: have further flags, for --help.
     """
 
     def __init__(
@@ -41,7 +43,8 @@ class CommandLine:
         kind: AlgorithmKind,
         options: Options,
         prog: str,
-        parent: argparse.ArgumentParser | None = None,
+        env_id: str,
+        parents: Sequence[argparse.ArgumentParser] = (),
     ) -> None:
         self._options = options
         self._special = ("config", "params", "resume", *(("preset",) if kind.presets else ()))
@@ -52,15 +55,13 @@ class CommandLine:
             description=DESCRIPTION.format(
                 about=kind.about,
                 config=kind.config,
-                ros="Under roslaunch every flag is a private ROS parameter, too. "
-                if is_node
-                else "",
-                over=", a ROS parameter over --params" if is_node else "",
+                resume=kind.resuming,
+                ros="under roslaunch a private ROS parameter over --params, " if is_node else "",
             ),
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
             argument_default=argparse.SUPPRESS,
-            parents=[parent] if parent else [],
+            parents=list(parents),
         )
         add = self.parser.add_argument
         add("--config", metavar="FILE", help=f"options in YAML (config/{kind.config})")
@@ -68,7 +69,8 @@ class CommandLine:
             add("--preset", metavar="NAME", help="a section of that file, as in: tutorial")
         add("--params", metavar="KEY=VALUE", nargs="+", help="options by name")
         add("--resume", metavar="RUN_DIR", help="go on with an interrupted training")
-        options.add_flags(self.parser)
+        defaults = {"exp_name": kind.name, **kind.defaults, "env_id": env_id}
+        options.add_flags(self.parser, defaults)
 
     def given(
         self, flags: list[str], parameters: dict[str, Any]

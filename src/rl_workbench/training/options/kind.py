@@ -21,6 +21,7 @@ class AlgorithmKind:
         hyperparameters: gives the dataclass of the algorithm's own options.
         defaults: of common options, where they are this algorithm's own.
         presets: whether the file has sections that no environment is called after.
+        resuming: for --help: what --resume comes to.
         package: the extra that it needs, as (module, name); None if none.
     """
 
@@ -32,6 +33,9 @@ class AlgorithmKind:
     section: str = "{env_id}"
     defaults: Mapping[str, Any] = field(default_factory=dict)
     presets: bool = False
+    resuming: str = (
+        "--resume goes on from there,\nto the same bits as a training that was never interrupted"
+    )
     package: tuple[str, str] | None = None
 
     def check_installed(self) -> None:

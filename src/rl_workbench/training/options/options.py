@@ -62,11 +62,18 @@ class Options:
         own = {each.name for each in fields(owner)}
         return owner(**{name: value for name, value in values.items() if name in own})
 
-    def add_flags(self, parser: argparse._ActionsContainer) -> None:
-        """A flag for each option; those that aren't given don't appear in the result."""
+    def add_flags(
+        self, parser: argparse._ActionsContainer, defaults: Mapping[str, Any] | None = None
+    ) -> None:
+        """A flag for each option; those that aren't given don't appear in the result.
+
+        Args:
+            defaults: where they aren't those of the dataclasses.
+        """
+        known = defaults or {}
         for name, each in self._fields.items():
             flag = f"--{name.replace('_', '-')}"
-            text = f"{each.metadata['help']} ({_default(each)})".replace("%", "%%")
+            text = f"{each.metadata['help']} ({_default(each, known)})".replace("%", "%%")
             if self._types[name] is bool:
                 action = argparse.BooleanOptionalAction
                 parser.add_argument(flag, action=action, default=argparse.SUPPRESS, help=text)
@@ -112,8 +119,8 @@ def key_values(texts: list[str], origin: str) -> dict[str, str]:
     return pairs
 
 
-def _default(each: Field[Any]) -> str:
-    value = each.default if each.default is not MISSING else None
+def _default(each: Field[Any], known: Mapping[str, Any]) -> str:
+    value = known.get(each.name, None if each.default is MISSING else each.default)
     return "no default" if value is None or value == "" else f"default {value}"
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -89,7 +90,7 @@ def choose(
     parameters: dict[str, Any] | None = None,
     prog: str = "rl-workbench train",
     env_id: str | None = None,
-    parent: argparse.ArgumentParser | None = None,
+    parents: Sequence[argparse.ArgumentParser] = (),
 ) -> TrainingOptions:
     """Defaults, overridden by the file, --params, rosparams and flags, in this order.
 
@@ -98,20 +99,21 @@ def choose(
         parameters: ROS parameters of the node that trains, if it is one.
         prog: the command, for --help.
         env_id: the environment if none is given.
-        parent: has further flags, which were read already; --help shows them.
+        parents: have further flags, which were read already; --help shows them.
 
     Raises:
         SystemExit: with code 2 and a usage line, if a flag is wrong; with 0 after --help.
         WorkbenchError: if a name is unknown or a value wrong anywhere else.
     """
     options = known_options(kind)
-    given, special = CommandLine(kind, options, prog, parent).given(flags, parameters or {})
+    default = env_id or kind.defaults.get("env_id", RunOptions.env_id)
+    line = CommandLine(kind, options, prog, default, parents)
+    given, special = line.given(flags, parameters or {})
     if "resume" in special:
         return resumed(kind, Path(special["resume"]), given, special)
     origin = f"--config {special['config']}" if "config" in special else f"config/{kind.config}"
     path = Path(special["config"]) if "config" in special else default_file(kind.config)
     preset = special.get("preset")
-    default = env_id or kind.defaults.get("env_id", RunOptions.env_id)
     wanted = given.get("env_id", None if preset else default)
     section = read_section(path, wanted and kind.section.format(env_id=wanted), preset)
     merged = ({"env_id": wanted} if wanted else {}) | options.read(section, origin) | given

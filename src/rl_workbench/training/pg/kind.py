@@ -29,7 +29,8 @@ _EPISODIC = {"episodes": 600, "eval_frequency": 0, "eval_episodes": 20}
 
 REINFORCE = AlgorithmKind(
     name="reinforce",
-    about="a policy by REINFORCE with a fitted baseline and generalised advantages, single actions",
+    about="a policy by REINFORCE with a fitted baseline and generalised advantages\n"
+    "in any Gymnasium environment with single actions",
     config="pg.yaml",
     implementation="rl_workbench.training.pg.algorithm",
     hyperparameters=lambda: ReinforceOptions,
@@ -37,7 +38,8 @@ REINFORCE = AlgorithmKind(
 )
 REINFORCE_DOCUMENT = AlgorithmKind(
     name="reinforce-document",
-    about="a linear policy as the ROS policy-gradient document's script does, 2 actions, 4 observations",
+    about="a linear policy by the algorithm of the ROS policy-gradient document,\n"
+    "in an environment with 4 observations and 2 actions",
     config="pg.yaml",
     section="reinforce-document {env_id}",
     implementation="rl_workbench.training.pg.algorithm",

@@ -12,8 +12,9 @@ def _kind(name: str) -> AlgorithmKind:
     env_id = "Pendulum-v1" if name in _CONTINUOUS else "CartPole-v1"
     return AlgorithmKind(
         name=name,
-        about=f"an agent by Stable-Baselines3's {CLASSES[name]}; resumed with a new episode and other "
-        "random numbers, so not to the same bits,",
+        about=f"an agent by Stable-Baselines3's {CLASSES[name]} in any Gymnasium environment that fits it",
+        resuming="--resume goes on from there\nwith networks, optimizers, replay buffer and figures, "
+        "but a new episode and other random numbers",
         config="sb3.yaml",
         section=f"{name} {{env_id}}",
         implementation="rl_workbench.training.sb3.algorithm",
