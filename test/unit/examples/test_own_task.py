@@ -1,0 +1,61 @@
+"""examples/own_task.py: short, an environment like any other, and a workbench that knows it."""
+
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from gymnasium.utils.env_checker import check_env
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+LONGEST = 40  # [lines]
+LIMIT = 300.0  # [s] for a process
+
+
+@pytest.fixture
+def own_task(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(EXAMPLES)
+    return importlib.import_module("own_task")
+
+
+def test_it_is_short() -> None:
+    assert len((EXAMPLES / "own_task.py").read_text(encoding="utf-8").splitlines()) <= LONGEST
+
+
+def test_it_makes_an_environment_like_any_other(own_task: Any) -> None:
+    env = own_task.make(render_mode="rgb_array")
+    check_env(env, skip_render_check=True)
+    env.close()
+
+
+def test_the_reward_draws_towards_the_place(own_task: Any) -> None:
+    env = own_task.make(place=-0.1)
+    state = env.task.start
+    rewards = [env.task.reward(state._replace(cart_position=x)) for x in (-0.3, -0.1, 0.15, 0.4)]
+    assert rewards == pytest.approx([0.6, 1.0, 0.5, 0.0])
+    start, _ = env.reset(seed=0)
+    after, reward, *_ = env.step(0)  # towards the place
+    assert abs(start[0]) <= 0.05 and after[0] < start[0]
+    assert reward == pytest.approx(1.0 - abs(float(after[0]) + 0.1) / 0.5)
+    env.close()
+
+
+def run(folder: Path, *words: str) -> str:
+    ended = subprocess.run(
+        [sys.executable, str(EXAMPLES / "own_task.py"), *words], cwd=folder, timeout=LIMIT,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    return ended.stdout
+
+
+@pytest.mark.slow
+def test_it_is_a_workbench_that_knows_the_task(tmp_path: Path) -> None:
+    run(tmp_path, "train", "--algo", "reinforce", "--env-id", "StandAt-v0", "--episodes", "5",
+        "--env-kwargs", "place=-0.1", "--run-dir", "mine")  # fmt: skip
+    agent = torch.load(tmp_path / "mine" / "last.pt", weights_only=True)["agent"]
+    assert any(weights.any() for weights in agent["policy"].values())  # they start at zero
+    assert "over 2 greedy episodes" in run(tmp_path, "eval", "mine", "--episodes", "2")
