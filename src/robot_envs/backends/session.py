@@ -64,6 +64,11 @@ class RosSession(Generic[State]):
             RobotEnvError: if something can't be started, or what runs doesn't fit; what was
                 started before that is for `close()` to end.
         """
+        if rospy.core.is_initialized() and rospy.is_shutdown():
+            raise RobotEnvError(
+                "this process's ROS node has ended, and a process becomes one only once; keep a "
+                "session until the end, or begin another process"
+            )
         own_simulator = not (node.master_is_up() and bring_up.simulator_answers())
         if own_simulator:
             say("starting the simulator")

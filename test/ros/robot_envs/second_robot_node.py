@@ -20,6 +20,7 @@ from gymnasium.utils.env_checker import data_equivalence as same
 from pendulum import FILES, PACKAGE, PENDULUM, PendulumState, make_pendulum
 
 from robot_envs.backends.session import RosSession
+from robot_envs.errors import RobotEnvError
 from ros_utils import ros_gazebo
 
 BACKEND = next((argument for argument in sys.argv if argument in ("ros", "ros-realtime")), "ros")
@@ -80,9 +81,12 @@ class SecondRobot(unittest.TestCase):
         second.close()
         self.assertEqual(simulator(), self.simulator)
 
-    def test_z_closing_ends_the_simulator(self):
+    def test_z_closing_ends_the_simulator_and_the_node(self):
         """The last one by its name."""
         self.session.close()
+        self.assertIsNone(simulator())
+        with self.assertRaisesRegex(RobotEnvError, "a process becomes one only once"):
+            make_pendulum(BACKEND)
         self.assertIsNone(simulator())
 
 

@@ -170,6 +170,13 @@ def test_files_that_are_nowhere_are_an_error_that_says_where_they_were_sought(
         ROBOT.parameters(CONTROLLER)
 
 
+def test_also_where_there_is_no_ros_to_ask(tmp_path, monkeypatch):
+    monkeypatch.setattr(robot, "TREE", tmp_path)
+    monkeypatch.setitem(sys.modules, "rospkg", None)
+    with pytest.raises(RobotEnvError, match="'cartpole' is neither beside"):
+        ROBOT.urdf()
+
+
 def test_parameters_of_an_unknown_controller_are_an_error():
     with pytest.raises(RobotEnvError, match="has no controller 'elbow'"):
         ROBOT.parameters("elbow")
