@@ -43,7 +43,6 @@ class StateTopic(ThinnedTopic):
     ) -> None:
         self._subscribers = SubscriberCount()
         self._sim = sim
-        self._make = make
         publisher = rospy.Publisher(
             name, kind, subscriber_listener=self._subscribers, queue_size=QUEUE, tcp_nodelay=True
         )
