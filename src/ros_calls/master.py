@@ -85,9 +85,9 @@ def is_up_or_startable() -> bool:
             raise
         if not down.port_is_free:
             raise MasterDown(
-                f"{uri()}: the port is in use, and not by a ROS master:"
+                f"{uri()}: the port is in use, and not by a ROS master ({down.__cause__}):"
                 " set ROS_MASTER_URI to a free port"
-            ) from None
+            ) from down
         return False
     return True
 

@@ -5,6 +5,7 @@ import io
 import socket
 import struct
 import threading
+from functools import partial
 from xmlrpc.server import SimpleXMLRPCServer
 
 import rosgraph
@@ -14,25 +15,29 @@ LOOPBACK = "127.0.0.1"
 
 
 class FakeMaster:
-    """Knows services by name and address."""
+    """Knows services and nodes by name and address, and parameters. It answers as a node, too."""
 
     def __init__(self):
         self.services = {}
+        self.nodes = {}
         self.params = {}
         self.questions = []
         self._server = SimpleXMLRPCServer((LOOPBACK, 0), logRequests=False)
         self._server.register_function(lambda caller: [1, "", 1], "getPid")
-        self._server.register_function(self._lookup, "lookupService")
+        for method, known in (
+            ("lookupService", self.services),
+            ("lookupNode", self.nodes),
+            ("getParam", self.params),
+        ):
+            self._server.register_function(partial(self._lookup, known), method)
         self._server.register_function(lambda caller, name: "nonsense", "nonsense")
         self.uri = f"http://{LOOPBACK}:{self._server.server_address[1]}"
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.01,))
         self._thread.start()
 
-    def _lookup(self, caller, name):
+    def _lookup(self, known, caller, name):
         self.questions.append(name)
-        if name in self.services:
-            return [1, "", self.services[name]]
-        return [-1, "no provider", ""]
+        return [1, "", known[name]] if name in known else [-1, "unknown", ""]
 
     def close(self):
         self._server.shutdown()

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import sys
-import time
 from collections.abc import Callable
 
 import rospy
@@ -14,6 +13,7 @@ from robot_envs.backends import node
 from robot_envs.backends.service import ServiceClient
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorHangs
 from robot_envs.robot import Robot, State
+from ros_calls.waiting import wait_until
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
 
 WORLD_SERVICE = "/gazebo/get_world_properties"
@@ -151,7 +151,7 @@ def spawn_command(robot: Robot[State], argv: list[str]) -> int:
     except RobotEnvError as error:
         print(f"spawn_robot: {error}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, rospy.ROSInterruptException):
         return 130
     finally:
         with contextlib.suppress(Exception):
@@ -159,11 +159,8 @@ def spawn_command(robot: Robot[State], argv: list[str]) -> int:
 
 
 def _wait_for_simulator() -> None:
-    deadline = time.monotonic() + SIMULATOR_TIMEOUT
-    while not simulator_answers():
-        if time.monotonic() > deadline:
-            raise RobotEnvError(
-                f"no simulator offered {WORLD_SERVICE} within {SIMULATOR_TIMEOUT:g} s; "
-                "start one with roslaunch gazebo_ros empty_world.launch"
-            )
-        time.sleep(0.2)
+    if not wait_until(simulator_answers, SIMULATOR_TIMEOUT, "a simulator"):
+        raise RobotEnvError(
+            f"no simulator offered {WORLD_SERVICE} within {SIMULATOR_TIMEOUT:g} s; "
+            "start one with roslaunch gazebo_ros empty_world.launch"
+        )

@@ -1,17 +1,14 @@
 """This process as a ROS node: its arguments, its parameters, its master; nothing waits for ever."""
 
 import os
-import xmlrpc.client
 from typing import Any
 
 import rosgraph
 import rospy
 
-from robot_envs.backends.service import run_limited
 from robot_envs.errors import RobotEnvError
-
-MASTER_TIMEOUT = 3.0  # [s]
-_CALLER = "/robot_envs"
+from ros_calls import master, xmlrpc
+from ros_calls.xmlrpc import NoAnswer, Refused
 
 
 def plain_arguments(argv: list[str]) -> list[str]:
@@ -33,50 +30,39 @@ def master_is_up() -> bool:
         RobotEnvError: if it neither answers nor could be started here: another machine's, or
             the port belongs to something else.
     """
-    uri = rosgraph.get_master_uri()
     try:
-        _ask_master("getPid")
-        return True
-    except ConnectionRefusedError:
-        if _is_local(uri):
-            return False
-        reason = "connection refused"
-    except TimeoutError:
-        reason = f"no answer within {MASTER_TIMEOUT:g} s"
-    except Exception as error:  # noqa: BLE001 - a foreign server can break XML-RPC in many ways
-        reason = f"something else answers there ({type(error).__name__}: {error})"
-    raise RobotEnvError(
-        f"no ROS master at {uri}: {reason}; start roscore there, or set ROS_MASTER_URI to a "
-        "free port of this machine"
-    )
-
-
-def _is_local(uri: str) -> bool:
-    host, _ = rosgraph.network.parse_http_host_and_port(uri)
-    return bool(rosgraph.network.is_local_address(host))
-
-
-def _ask_master(method: str, *arguments: Any) -> Any:
-    master = rosgraph.Master(_CALLER)
-    with master.handle:  # its connection would stay open
-        return run_limited(lambda: getattr(master, method)(*arguments), MASTER_TIMEOUT)
+        return master.is_up_or_startable()
+    except master.MasterDown as error:
+        raise RobotEnvError(str(error)) from error
 
 
 def service_is_registered(name: str) -> bool:
-    """Whether the master knows somebody who offers the service."""
-    try:
-        return bool(_ask_master("lookupService", name))
-    except rosgraph.MasterException:
-        return False
+    """Whether the master knows somebody who offers the service.
+
+    Raises:
+        RobotEnvError: if the master doesn't answer.
+    """
+    return _ask_master("lookupService", name) is not None
 
 
 def private_parameters(name: str) -> dict[str, Any]:
-    """The parameters below a node's name; none if there are none, or no master."""
-    try:
-        found = _ask_master("getParam", name) if master_is_up() else {}
-    except rosgraph.MasterException:
-        found = {}
+    """The parameters below a node's name; none if there are none, or no master.
+
+    Raises:
+        RobotEnvError: see `master_is_up`.
+    """
+    found = _ask_master("getParam", name) if master_is_up() else None
     return found if isinstance(found, dict) else {}
+
+
+def _ask_master(method: str, name: str) -> Any:
+    """What the master knows of a name; None if nothing."""
+    try:
+        return master.call(method, name)
+    except Refused:
+        return None
+    except NoAnswer as error:
+        raise RobotEnvError(f"the ROS master at {master.uri()}: {error}") from error
 
 
 def command_line_parameters(argv: list[str]) -> dict[str, Any]:
@@ -96,15 +82,16 @@ def refuse_twin(name: str) -> None:
     """Makes sure that no living node has this name: ROS would shut down the older one.
 
     Raises:
-        RobotEnvError: if there is one.
+        RobotEnvError: if there is one, or the master doesn't answer.
     """
+    address = _ask_master("lookupNode", name)
+    if address is None:
+        return
     try:
-        uri = _ask_master("lookupNode", name)
-        node = xmlrpc.client.ServerProxy(uri)
-        run_limited(lambda: node.getPid(_CALLER), MASTER_TIMEOUT)
-    except (rosgraph.MasterException, OSError):  # unknown, or registered by one that died
+        xmlrpc.call(address, "getPid")
+    except (NoAnswer, Refused):  # registered by one that died
         return
     raise RobotEnvError(
-        f"a node {name} runs at {rosgraph.get_master_uri()} already; end it, or set "
+        f"a node {name} runs at {master.uri()} already; end it, or set "
         "ROS_MASTER_URI to a free port to run beside it"
     )
