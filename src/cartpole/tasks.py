@@ -186,7 +186,7 @@ def _bell(x: float) -> float:
     return 0.1 ** (x * x)
 
 
-TASKS: dict[str, type[BalanceTask] | type[SwingUpTask]] = {
+TASKS: dict[str, type[CartPoleTask]] = {
     "balance": BalanceTask,
     "classic": ClassicTask,
     "swing-up": SwingUpTask,

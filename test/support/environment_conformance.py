@@ -15,7 +15,9 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 from gymnasium.utils.env_checker import data_equivalence as same
 
-IDS = ("cartpole/Balance-v0", "cartpole/Classic-v0", "cartpole/SwingUp-v0")
+from cartpole import registration
+
+IDS = tuple(f"{registration.NAMESPACE}/{name}-v{registration.VERSION}" for name in registration.IDS)
 RICH = {
     "sensor_noise": [0.001, 0.01, 0.001, 0.01],
     "sensor_delay": 2,

@@ -16,8 +16,7 @@ from typing import NamedTuple
 
 import pytest
 
-from rl_workbench import cli
-from rl_workbench.training.dqn import cli as dqn_cli
+from cartpole import dqn_train, workbench
 
 pytestmark = pytest.mark.usefixtures("signals")
 
@@ -41,7 +40,7 @@ SHORTER = {  # command: flags behind its own
 MADE = ["cartpole_training.png", "episode.gif", "episode.mp4", "policy.png", "last.json", "compare.png",
         "compare.json", "both.png", "runs/sweep/trials.json", "robot.gif", "swing_up.gif",
         "gamma.png"]  # fmt: skip
-MAINS = {"dqn_train.py": dqn_cli.main, "workbench.py": cli.main}
+MAINS = {"dqn_train.py": dqn_train.main, "workbench.py": workbench.main}
 
 
 class Block(NamedTuple):
