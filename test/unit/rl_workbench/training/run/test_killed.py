@@ -1,0 +1,177 @@
+"""The command line, killed, interrupted and started twice: resumed, it ends where it would have ended."""
+
+import random
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+from training_runs import (
+    EXACT,
+    OTHERS,
+    SMALL,
+    assert_no_doubles,
+    assert_same_run,
+    flags,
+    summary,
+    train,
+)
+
+pytestmark = pytest.mark.slow
+
+FREQUENT = {"env_id": "CartPole-v1", "env_kwargs": None}
+LONG = {
+    "dqn": {"total_timesteps": 6000, "eval_frequency": 1000, "checkpoint_frequency": 250},
+    "reinforce": {"episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
+    "reinforce-document": {"episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
+    "ppo": {"total_timesteps": 20_000, "eval_frequency": 2000, "checkpoint_frequency": 500},
+}
+COMMAND = [sys.executable, "-m", "rl_workbench", "train"]
+Start = Callable[..., subprocess.Popen]
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Start]:
+    """Starts the command with arguments; or by way of another one, such as nohup."""
+    started: list[subprocess.Popen] = []
+
+    def begin(*arguments: str, by: str = "") -> subprocess.Popen:
+        command = [*shlex.split(by), *COMMAND, *arguments]
+        started.append(
+            subprocess.Popen(
+                command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=tmp_path
+            )
+        )
+        return started[-1]
+
+    yield begin
+    for each in started:
+        if each.poll() is None:
+            each.kill()
+            each.communicate()
+
+
+def new(name: str, run: Path) -> list[str]:
+    """The arguments of a training that takes some seconds; no file's options count."""
+    (run.parent / "none.yaml").write_text("{}")
+    options = {**SMALL[name], **FREQUENT, **LONG[name], "run_dir": run}
+    chosen = {key: value for key, value in options.items() if value is not None}
+    return ["--algo", name, "--config", str(run.parent / "none.yaml"), *flags(chosen)]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The same, in this process, and never interrupted."""
+    folder = tmp_path_factory.mktemp("whole")
+    return cache(lambda name: train(folder / name, name, **{**FREQUENT, **LONG[name]}))
+
+
+def ended(process: subprocess.Popen, code: int = 0) -> str:
+    output, _ = process.communicate(timeout=120)
+    assert process.returncode == code, output
+    assert "Traceback" not in output
+    return output
+
+
+def newer_checkpoint(run: Path, process: subprocess.Popen) -> None:
+    """Waits for one: starting up takes longer than all the rest."""
+
+    def written() -> int:
+        return (run / "last.pt").stat().st_mtime_ns if (run / "last.pt").exists() else 0
+
+    before, deadline = written(), time.monotonic() + 120
+    while written() == before and process.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+MORE = [pytest.param(name, seed, marks=pytest.mark.long) for seed in (1, 2, 3) for name in EXACT]
+
+
+@pytest.mark.parametrize(("name", "seed"), [*((name, 0) for name in EXACT), *MORE])
+def test_killed_at_random_moments(
+    start: Start, whole, tmp_path: Path, name: str, seed: int
+) -> None:
+    run, moments, killed = tmp_path / "run", random.Random(seed), 0
+    process = start(*new(name, run))
+    for _ in range(3):
+        newer_checkpoint(run, process)
+        time.sleep(moments.uniform(0, 0.4))  # anywhere: in a step, an evaluation, a checkpoint
+        process.kill()
+        process.communicate()
+        killed += process.returncode == -signal.SIGKILL
+        process = start("--resume", str(run))
+    ended(process)
+    assert killed
+    assert_same_run(whole(name), run)
+    assert_no_doubles(run)
+
+
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [("dqn", signal.SIGINT), ("dqn", signal.SIGTERM), ("reinforce", signal.SIGHUP),
+     ("reinforce-document", signal.SIGINT)],
+)  # fmt: skip
+def test_a_signal_saves_and_tells_how_to_go_on(
+    start: Start, whole, tmp_path: Path, name: str, number: int
+) -> None:
+    run = tmp_path / "a run"
+    process = start(*new(name, run))
+    newer_checkpoint(run, process)
+    process.send_signal(number)
+    told = ended(process, 128 + number)
+    found = re.search(r"everything lies in .*; --resume (.*) goes on from the last", told)
+    assert found and shlex.split(found[1]) == [str(run)]
+    assert summary(run)["interrupted"]
+    ended(start("--resume", str(run)))
+    assert_same_run(whole(name), run)
+
+
+@pytest.mark.parametrize("name", OTHERS[:1])
+def test_one_to_stable_baselines(start: Start, tmp_path: Path, name: str) -> None:
+    run = tmp_path / "run"
+    process = start(*new(name, run))
+    newer_checkpoint(run, process)
+    process.send_signal(signal.SIGINT)
+    assert f"--resume {run} goes on" in ended(process, 130)
+    before = summary(run)
+    assert before["interrupted"] and 0 < before["steps"] < 20_000
+    ended(start("--resume", str(run)))
+    assert summary(run)["complete"]
+
+
+def test_a_closed_terminal_under_nohup_is_ignored(start: Start, whole, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    process = start(*new("dqn", run), by="nohup")
+    newer_checkpoint(run, process)
+    process.send_signal(signal.SIGHUP)
+    ended(process)
+    assert_same_run(whole("dqn"), run)
+
+
+def test_two_trainings_in_one_folder(start: Start, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    process = start(*new("dqn", run), "--total-timesteps=1000000")
+    newer_checkpoint(run, process)
+    assert f"a training is running in {run}" in ended(start("--resume", str(run)), 1)
+    assert "is running in" in ended(start(*new("dqn", run)), 1)
+    assert process.poll() is None
+    process.send_signal(signal.SIGTERM)
+    ended(process, 143)
+
+
+def test_two_trainings_started_into_a_new_folder_at_once(start: Start, tmp_path: Path) -> None:
+    """The loser says so in one line, and leaves the winner's alone."""
+    few = ["--total-timesteps=300", "--learning-starts=400"]
+    both = [start(*new("dqn", tmp_path / "run"), *few) for _ in range(2)]
+    told = {each.wait(120): each.stdout.read() for each in both}
+    assert set(told) == {0, 1}
+    assert re.search(r"is running in|isn't empty|was removed just now", told[1])
+    assert "Traceback" not in told[1] and len(told[1].splitlines()) == 1
+    assert summary(tmp_path / "run")["complete"]
