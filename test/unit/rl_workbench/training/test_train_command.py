@@ -1,0 +1,215 @@
+"""`train`: one command line for every algorithm; what the user sees, and one line for what goes wrong."""
+
+import argparse
+import json
+import re
+from pathlib import Path
+
+import pytest
+from training_runs import OTHERS, SMALL, flags, record, summary
+
+from rl_workbench.training import cli
+from rl_workbench.training.algorithms import ALGORITHMS
+from rl_workbench.training.cli import choose_training, main
+from rl_workbench.training.run.folder import held
+
+pytestmark = pytest.mark.usefixtures("signals")
+
+SHORT = {"total_timesteps": 60, "eval_episodes": 1, "confirm_episodes": 0}
+DQN = ["--algo=dqn", *flags(SMALL["dqn"] | SHORT)]
+REINFORCE = ["--algo=reinforce", *flags({"episodes": 2, "eval_episodes": 1})]
+NAMES = ", ".join(ALGORITHMS)
+
+
+@pytest.fixture(autouse=True)
+def _here(monkeypatch, tmp_path: Path) -> None:
+    """Where runs/ is made."""
+    monkeypatch.chdir(tmp_path)
+
+
+def failed(capsys, *arguments: str, code: int = 1) -> str:
+    """Runs the command; returns its one line."""
+    capsys.readouterr()
+    assert main(list(arguments)) == code
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1 and lines[0].startswith("rl-workbench train: ")
+    return lines[0]
+
+
+def told_and_left(capsys, *arguments: str) -> tuple[int, str, str]:
+    """Exit code, standard output and error of wrong arguments, or of --help."""
+    with pytest.raises(SystemExit) as ended:
+        main(list(arguments))
+    return (ended.value.code, *capsys.readouterr())
+
+
+# What it does.
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [("dqn", SMALL["dqn"]), ("reinforce", {"episodes": 22}), ("reinforce-document", {"episodes": 22}),
+     pytest.param("a2c", {"total_timesteps": 600},
+                  marks=pytest.mark.extras("stable_baselines3"))],
+)  # fmt: skip
+def test_a_training_from_the_command_line(
+    tmp_path: Path, capsys, name: str, options: dict
+) -> None:
+    given = flags(options | {"eval_episodes": 1, "confirm_episodes": 0})
+    arguments = [f"--algo={name}", "--env-id=CartPole-v1", *given]
+    assert main([*arguments, "--seed=5"]) == 0
+    (run,) = (tmp_path / "runs").iterdir()
+    assert re.fullmatch(rf"CartPole-v1__{name}__5__\d+", run.name)
+    output = capsys.readouterr()
+    assert str(run) in output.out and "trained" in output.out
+    last = r"ε: 0\.\d{3}" if name == "dqn" else r"\d+ steps/s"
+    line = rf"^Episode   20 \| Reward: +\d+ \| Avg\(20\): +[\d.]+ \| {last}$"
+    assert re.search(line, output.err, re.MULTILINE)
+
+
+def test_what_was_named_names_the_folder(tmp_path: Path) -> None:
+    assert main([*DQN, "--env-id=gymnasium:CartPole-v1", "--exp-name=mine"]) == 0
+    (run,) = (tmp_path / "runs").iterdir()
+    assert run.name.startswith("gymnasium-CartPole-v1__mine__3__")
+
+
+def test_resumed_by_its_folder_alone(tmp_path: Path, capsys) -> None:
+    assert main([*REINFORCE, "--run-dir=run"]) == 0
+    steps = summary(tmp_path / "run")["steps"]
+    assert main(["--resume=run", "--episodes=3"]) == 0
+    told = capsys.readouterr().out
+    assert f"going on at step {steps} after episode 2 of 3: {tmp_path / 'run'}" in told
+    assert main([*DQN, "--run-dir=other"]) == main(["--resume=other"]) == 0
+    assert "going on at step 60 of 60" in capsys.readouterr().out
+
+
+def test_other_observations_are_flattened() -> None:
+    """FrozenLake observes one number of 16."""
+    for arguments in (DQN, REINFORCE):
+        assert main([*arguments, "--env-id=FrozenLake-v1"]) == 0
+
+
+def test_parameters_of_a_node(tmp_path: Path) -> None:
+    parameters = {"gamma": 0.5, "seed": 4, "dueling": True, "run_dir": "run", "algo": "dqn"}
+    assert main([*DQN[1:], "--seed=3"], parameters, "node.py") == 0
+    found = record(tmp_path / "run")
+    assert (found["hyperparameters"]["gamma"], found["hyperparameters"]["dueling"]) == (0.5, True)
+    assert found["run"]["seed"] == 3
+    assert main([], {"resume": str(tmp_path / "run")}, "node.py") == 0
+
+
+def test_a_node_may_have_defaults() -> None:
+    options = choose_training([], {}, default="reinforce", env_id="Acrobot-v1")
+    assert (options.kind.name, options.run.env_id) == ("reinforce", "Acrobot-v1")
+    options = choose_training(["--algo=dqn", "--env-id=A-v0"], {}, default="reinforce", env_id="B-v0")
+    assert (options.kind.name, options.run.env_id) == ("dqn", "A-v0")
+
+
+# Wrong arguments: exit code 2.
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], f"--algo is missing, one of {NAMES}"),
+        (["--seed=1"], "--algo is missing"),
+        (["--algo=dqm"], "unknown algorithm 'dqm'; did you mean dqn?"),
+        (["--algo=pg"], "the algorithm pg is called reinforce now"),
+        (["--algo=gae"], "the algorithm gae is called reinforce now"),
+        (["--algo=document"], "the algorithm document is called reinforce-document now"),
+        (["--algo=reinforce", "--algorithm=gae"], "--algorithm is called --algo now"),
+        (["--algo=dqn", "--gama=1"], "unknown flag '--gama'; did you mean --gamma?"),
+        (["--algo"], "expected one argument"),
+    ],
+)
+def test_wrong_words(capsys, arguments: list[str], words: str) -> None:
+    code, _, told = told_and_left(capsys, *arguments)
+    assert code == 2 and words in told and "Traceback" not in told
+
+
+def test_help_names_all_algorithms_and_theirs_what_they_know(capsys) -> None:
+    code, told, _ = told_and_left(capsys, "--help")
+    names = "dqn, reinforce, reinforce-document, ppo, a2c, sac, td3, ddpg, dqn-sb3"
+    assert code == 0 and names in " ".join(told.split()) and "--algo NAME --help" in told
+    code, told, _ = told_and_left(capsys, "--algo=dqn", "--help")
+    assert code == 0 and "--dueling" in told
+
+
+def test_help_shows_the_flags_of_a_command_around_it(capsys) -> None:
+    parent = argparse.ArgumentParser(add_help=False)
+    parent.add_argument("--backend")
+    with pytest.raises(SystemExit):
+        choose_training(["--help"], {}, "node.py", "dqn", parent=parent)
+    told = capsys.readouterr().out
+    assert "--backend" in told and "--dueling" in told and "node.py" in told
+
+
+# What goes wrong: exit code 1, one line.
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--env-id=CartPol-v1"], "unknown environment 'CartPol-v1'; did you mean CartPole-v1?"),
+        (["--env-id=Pendulum-v1"], "needs a choice of single actions, Discrete(n); Pendulum-v1 has Box"),
+        (["--env-kwargs=wheels=4"], "can't make CartPole-v1"),
+        (["--train-env-kwargs=wheels=4"], "can't make CartPole-v1"),
+        (["--eval-env-kwargs=wheels=4"], "can't make CartPole-v1"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("algorithm", [DQN, REINFORCE])
+def test_an_environment_that_does_not_do_leaves_no_folder(
+    capsys, tmp_path: Path, algorithm: list[str], arguments: list[str], words: str
+) -> None:
+    assert words in failed(capsys, *algorithm, *arguments, "--run-dir=run")
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_one_for_stable_baselines(capsys, tmp_path: Path, name: str) -> None:
+    assert "did you mean CartPole-v1?" in failed(
+        capsys, f"--algo={name}", "--env-id=CartPol-v1", "--run-dir=run"
+    )
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_document_needs_its_own_observations(capsys) -> None:
+    line = failed(capsys, "--algo=reinforce-document", "--env-id=Acrobot-v1")
+    assert "is made for 4 observations and 2 actions; Acrobot-v1 has 6 and 3: --algo" in line
+
+
+def test_a_scale_for_other_observations(capsys) -> None:
+    line = failed(capsys, *REINFORCE, "--observation-scale=1,2")
+    assert "observation_scale has 2 numbers, the observations of CartPole-v1 4" in line
+
+
+def test_a_device_that_is_not_there(capsys) -> None:
+    assert "torch can't use the device 'cda'" in failed(capsys, *DQN, "--device=cda")
+
+
+def test_a_run_folder_in_use(capsys, tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "mine").write_text("")
+    assert "isn't empty" in failed(capsys, *DQN, "--run-dir=run")
+    assert (tmp_path / "run" / "mine").exists()
+
+
+def test_what_cannot_be_resumed(capsys, tmp_path: Path) -> None:
+    assert "is no run folder" in failed(capsys, f"--resume={tmp_path}")
+    assert main([*REINFORCE, "--run-dir=run"]) == 0
+    with held(tmp_path / "run"):
+        assert "a training is running in" in failed(capsys, "--resume=run")
+    assert "--resume allows no --seed" in failed(capsys, "--resume=run", "--seed=1")
+    line = failed(capsys, "--resume=run", "--algo=dqn")
+    assert "run/config.json is of a training by reinforce, not by dqn" in line
+    content = json.loads(Path("run/config.json").read_text())
+    Path("run/config.json").write_text(json.dumps(content | {"algorithm": "pg"}))
+    assert "the algorithm pg is called reinforce now" in failed(capsys, "--resume=run")
+
+
+def test_ctrl_c_before_the_training(capsys, monkeypatch) -> None:
+    def interrupted(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "train", interrupted)
+    assert failed(capsys, *DQN, code=130).endswith("interrupted before the training began")
