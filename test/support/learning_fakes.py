@@ -8,6 +8,9 @@ import pytest
 import torch
 
 from cartpole.tasks import CartPoleState
+from rl_workbench.agents.pg.document import PolicyGradientAgent
+from rl_workbench.agents.pg.reinforce import ReinforceAgent
+from rl_workbench.training.pg.episodes import run_episode
 from robot_envs.errors import SimulatorError
 from robot_envs.variation import Variation
 
@@ -106,6 +109,16 @@ class Pole(gymnasium.Env):
 
 POLE = "fakes/Pole-v0"
 gymnasium.register(POLE, Pole, max_episode_steps=3000, disable_env_checker=True)
+
+
+def learned_lengths(agent: PolicyGradientAgent | ReinforceAgent, episodes: int) -> list[int]:
+    """Lets a policy gradient learn to hold the pole; returns how long it did, episode by episode."""
+    env, lengths = gymnasium.make(POLE), []
+    for _ in range(episodes):
+        episode = run_episode(env, agent, lambda: False)
+        agent.learn(episode)
+        lengths.append(episode.length)
+    return lengths
 
 
 class Spoilt(gymnasium.Env):

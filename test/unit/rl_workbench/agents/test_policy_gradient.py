@@ -5,10 +5,9 @@ import random
 import numpy as np
 import pytest
 import torch
-from learning_fakes import FakePlant
+from learning_fakes import learned_lengths
 from torch import nn
 
-from cartpole.environment import CartPoleEnv
 from rl_workbench.agents.pg.document import (
     Episode,
     PolicyGradientAgent,
@@ -16,9 +15,10 @@ from rl_workbench.agents.pg.document import (
     ValueNetwork,
     discounted_returns,
 )
+from rl_workbench.agents.pg.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.pg.loop import run_episode, train
-from rl_workbench.training.run.history import History
+
+RANDOM = DocumentSettings(random_weights=True)
 
 
 def document_future_reward(rewards: list[float], index: int) -> float:
@@ -73,13 +73,14 @@ def weights(agent: PolicyGradientAgent) -> list[torch.Tensor]:
 def test_returns_equal_the_documents_loop(length: int) -> None:
     rewards = [random.Random(length).uniform(-10, 1) for _ in range(length)]
     slow = [document_future_reward(rewards, index) for index in range(length)]
-    assert discounted_returns(rewards) == pytest.approx(slow, rel=1e-12, abs=1e-12)
+    assert discounted_returns(rewards, 0.99) == pytest.approx(slow, rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.parametrize("random_weights", [False, True])
 @pytest.mark.parametrize("length", [1, 5, 300])
 def test_updates_equal_the_documents(length: int, random_weights: bool) -> None:
-    ours, theirs = (PolicyGradientAgent(1, random_weights) for _ in range(2))
+    settings = DocumentSettings(random_weights=random_weights)
+    ours, theirs = (PolicyGradientAgent(1, settings) for _ in range(2))
     for seed in range(5):
         episode = random_episode(length, seed)
         assert tuple(ours.learn(episode)) == pytest.approx(
@@ -106,7 +107,7 @@ def test_probability_survives_huge_observations() -> None:
 
 
 def test_actions_follow_the_probability() -> None:
-    agent = PolicyGradientAgent(5, random_weights=True)
+    agent = PolicyGradientAgent(5, RANDOM)
     observation = np.array([0.3, -1.0, 0.2, 0.5], np.float32)
     share = np.mean([agent.act(observation) == 0 for _ in range(20000)])
     assert share == pytest.approx(agent.probability_of_zero(observation), abs=0.015)
@@ -136,7 +137,7 @@ def test_same_seed_gives_the_same_weights_whatever_else_is_random() -> None:
     def trained(seed: int) -> list[torch.Tensor]:
         torch.rand(random.randrange(1, 9))  # somebody else's use of the global generator
         agent = PolicyGradientAgent(seed)
-        train(CartPoleEnv(FakePlant()), agent, 10, History(), [])
+        learned_lengths(agent, 10)
         return weights(agent)
 
     first, second, other = trained(3), trained(3), trained(4)
@@ -155,7 +156,7 @@ def test_a_random_weights_is_torchs_own() -> None:
     torch.manual_seed(6)
     policy, value = PolicyNetwork(), ValueNetwork()
     expected = [p for net in (policy, value) for p in net.parameters()]
-    drawn = weights(PolicyGradientAgent(6, random_weights=True))
+    drawn = weights(PolicyGradientAgent(6, RANDOM))
     assert all(torch.equal(mine, its) for mine, its in zip(drawn, expected, strict=True))
 
 
@@ -166,9 +167,21 @@ def test_seeding_leaves_torchs_global_generator_alone() -> None:
 
 
 def test_it_learns() -> None:
-    history = History()
-    train(CartPoleEnv(FakePlant()), PolicyGradientAgent(2), 200, history, [])
-    assert np.mean(history.lengths[-20:]) > 2 * np.mean(history.lengths[:20])
+    lengths = learned_lengths(PolicyGradientAgent(2), 200)
+    assert np.mean(lengths[-20:]) > 2 * np.mean(lengths[:20])
+
+
+def test_its_rates_and_its_discount_are_options() -> None:
+    settings = DocumentSettings(gamma=0.5, policy_learning_rate=0.2, value_learning_rate=0.3)
+    plain, other = PolicyGradientAgent(1), PolicyGradientAgent(1, settings)
+    rates = [each.param_groups[0]["lr"] for agent in (plain, other)
+             for each in (agent.policy_optimizer, agent.value_optimizer)]  # fmt: skip
+    assert rates == [0.01, 0.1, 0.2, 0.3]
+    episode = random_episode(5, 0)
+    # From a value of 0 everywhere the value's loss is the mean of the squared returns.
+    for agent, gamma in ((plain, 0.99), (other, 0.5)):
+        wanted = np.mean(discounted_returns(episode.rewards, gamma) ** 2)
+        assert agent.learn(episode).value == pytest.approx(wanted, rel=1e-5)
 
 
 def test_a_loss_that_is_no_number_leaves_the_weights_alone() -> None:
@@ -178,7 +191,3 @@ def test_a_loss_that_is_no_number_leaves_the_weights_alone() -> None:
     with pytest.raises(WorkbenchError, match="loss is nan"):
         agent.learn(episode)
     assert all(torch.equal(old, new) for old, new in zip(before, weights(agent), strict=True))
-
-
-def test_an_episode_broken_off_is_dropped() -> None:
-    assert run_episode(CartPoleEnv(FakePlant()), PolicyGradientAgent(0), lambda: True) is None

@@ -3,22 +3,17 @@
 import copy
 import math
 
-import gymnasium
 import numpy as np
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from learning_fakes import FakePlant
+from learning_fakes import learned_lengths
 
-from cartpole.environment import CartPoleEnv
-from cartpole.tasks import BalanceTask
 from rl_workbench.agents.pg.document import Episode
 from rl_workbench.agents.pg.reinforce import ReinforceAgent, generalised_advantages
 from rl_workbench.agents.pg.settings import ReinforceSettings
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.pg.loop import is_complete, run_episode, train
-from rl_workbench.training.run.history import History
 
 numbers = st.floats(-10.0, 10.0)
 
@@ -246,38 +241,12 @@ def test_an_episode_that_is_not_over_is_refused():
         ReinforceAgent(0).learn(episode)
 
 
-def test_it_learns_on_a_fake_plant_and_stops_when_it_is_done():
-    history = History()
+def test_it_learns() -> None:
     torch.set_num_threads(1)
-    train(CartPoleEnv(FakePlant()), ReinforceAgent(1), 60, history, [], stop_at=2000.0)
-    first, last = np.mean(history.lengths[:20]), np.mean(history.lengths[-20:])
-    assert last > 1.2 * first
+    lengths = learned_lengths(ReinforceAgent(1), 60)
+    assert np.mean(lengths[-20:]) > 1.2 * np.mean(lengths[:20])
 
 
-def test_it_is_done_when_twenty_episodes_in_a_row_lasted_long_enough():
-    assert not is_complete(History(lengths=[300] * 19), 600, 10.0)
-    assert is_complete(History(lengths=[1] * 9 + [10] * 20), 600, 10.0)
-    assert not is_complete(History(lengths=[300] * 20 + [9] * 20), 600, 10.0)
-    assert is_complete(History(lengths=[1] * 600), 600, 10.0)
-
-
-def test_the_loop_tells_how_an_episode_ended():
-    episode = run_episode(CartPoleEnv(FakePlant()), ReinforceAgent(0), lambda: False)
-    assert episode.terminated
-    assert episode.final_observation.shape == (4,)
-    short = CartPoleEnv(FakePlant(), BalanceTask(max_steps=3))
-    assert not run_episode(short, ReinforceAgent(0), lambda: False).terminated
-
-
-def test_the_loop_keeps_observations_that_an_environment_writes_over():
-    class Writing(gymnasium.ObservationWrapper):
-        def observation(self, observation):
-            self.array = getattr(self, "array", observation.copy())
-            self.array[:] = observation
-            return self.array
-
-    env = CartPoleEnv(FakePlant())
-    plain, written = (
-        run_episode(each, ReinforceAgent(0), lambda: False) for each in (env, Writing(env))
-    )
-    assert np.array_equal(plain.states(), written.states())
+def test_a_scale_is_positive() -> None:
+    with pytest.raises(WorkbenchError, match="observation_scale is positive"):
+        ReinforceSettings(observation_scale=(1.0, -1.0))
