@@ -16,7 +16,8 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.record import CONFIG_RECORD, read_record
 from rl_workbench.training.run.files import as_json, write_atomically
 
-LIBRARIES = ("python", "numpy", "torch", "gymnasium")  # a training's bits depend on them
+EXTRA = "stable_baselines3"
+LIBRARIES = ("python", "numpy", "torch", "gymnasium", EXTRA)  # a training's bits depend on them
 
 
 @contextlib.contextmanager
@@ -115,8 +116,8 @@ def other_versions(before: Mapping[str, str]) -> str:
         before: what `versions` gave then.
     """
     now = versions()
-    names = [name for name in LIBRARIES if name in before and before[name] != now[name]]
-    return ", ".join(f"{name} {before[name]} is now {now[name]}" for name in names)
+    names = [name for name in LIBRARIES if name in before and before[name] != now.get(name)]
+    return ", ".join(f"{name} {before[name]} is now {now.get(name)}" for name in names)
 
 
 def versions() -> dict[str, str]:
@@ -130,6 +131,7 @@ def versions() -> dict[str, str]:
         "numpy": numpy.__version__,
         "torch": torch.__version__,
         "gymnasium": gymnasium.__version__,
+        **({EXTRA: sys.modules[EXTRA].__version__} if EXTRA in sys.modules else {}),  # if it trains
         "machine": platform.platform(),
         "command": shlex.join(sys.argv),
     }

@@ -86,7 +86,7 @@ def options_class(name: str) -> type:
     return dataclasses.make_dataclass(
         f"{CLASSES[name]}Options",
         [
-            (key, Any, _field(default, about))
+            (key, bool if isinstance(default, bool) else Any, _field(default, about))
             for key, default in (own | dict.fromkeys(NETWORK)).items()
         ],
         bases=(SB3Options,),

@@ -1,0 +1,107 @@
+"""Options of Stable-Baselines3's algorithms, their limits, and the models made of them."""
+
+from pathlib import Path
+
+import pytest
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.algorithms import ALGORITHMS
+from rl_workbench.training.options.training_options import TrainingOptions, choose
+
+pytestmark = pytest.mark.extras("stable_baselines3")
+
+
+def chosen(algorithm: str, *flags: str) -> TrainingOptions:
+    return choose(ALGORITHMS[algorithm], ["--env-id=CartPole-v1", *flags])
+
+
+def model(algorithm: str, *flags: str):
+    from rl_workbench.training.sb3.model import make_model
+
+    made = make_model(chosen(algorithm, *flags))
+    made.get_env().close()
+    return made
+
+
+def test_options_are_flags_and_a_small_number_may_be_written_as_people_do() -> None:
+    flags = ["--learning-rate=1e-3", "--use-sde", "--no-normalize-advantage", "--n-epochs", "2"]
+    own = chosen("ppo", *flags, "--params", "gamma=9e-1", "batch_size=5e1").record()
+    own = own["hyperparameters"]
+    assert (own["learning_rate"], own["gamma"], own["n_epochs"]) == (1e-3, 0.9, 2)
+    assert own["batch_size"] == 50 and isinstance(own["batch_size"], int)
+    assert own["use_sde"] is True and own["normalize_advantage"] is False
+    assert (own["gae_lambda"], own["clip_range"]) == (0.95, 0.2), "what nobody gave is there, too"
+
+
+def test_networks() -> None:
+    for text in ("--net-arch=8,9", "--net-arch=[8, 9]"):
+        layers = model("ppo", text).policy.mlp_extractor.policy_net
+        assert [each.out_features for each in layers if hasattr(each, "out_features")] == [8, 9]
+    continuous = ["--env-id=Pendulum-v1", "--log-std-init=-1.5"]
+    assert model("ppo", *continuous).policy.log_std.item() == -1.5
+
+
+def test_a_linear_rate_falls_from_the_algorithms_own() -> None:
+    made = model("a2c", "--lr-schedule=linear")
+    assert made.lr_schedule(1.0) == pytest.approx(7e-4) and made.lr_schedule(0.0) == 0.0
+
+
+def test_how_often_it_learns_may_be_told_in_episodes() -> None:
+    made = model("sac", "--env-id=Pendulum-v1", "--params", "train_freq=[1, episode]")
+    assert (made.train_freq.frequency, made.train_freq.unit.value) == (1, "episode")
+
+
+def test_noise_of_actions_is_a_standard_deviation() -> None:
+    made = model("td3", "--env-id=Pendulum-v1", "--action-noise=0.2")
+    assert made.action_noise._sigma.tolist() == [0.2]
+
+
+@pytest.mark.parametrize(
+    ("flags", "told"),
+    [
+        (["--params", "learning_rat=1"], "unknown option 'learning_rat'; did you mean learning_rate?"),
+        (["--params", "gamma"], "isn't KEY=VALUE"),
+        (["--params", "batch_size=hello"], "batch_size is a whole number from 1 on, not 'hello'"),
+        (["--params", "batch_size=1.5"], "batch_size is a whole number from 1 on, not 1.5"),
+        (["--gamma=5"], "gamma is a number from 0 to 1, not 5"),
+        (["--gamma=true"], "gamma is a number from 0 to 1, not True"),
+        (["--n-epochs=0"], "n_epochs is a whole number from 1 on, not 0"),
+        (["--params", "gamma=["], "--params: gamma must be a YAML value, not '['"),
+        (["--params", "use_sde=3"], "--params: use_sde must be true or false, not '3'"),
+        (["--n-envs=0"], "n_envs lies between 1 and 1024, not 0"),
+        (["--learning-rate=hello"], "ppo can't be made: "),
+        (["--lr-schedule=linear", "--learning-rate=x"], "learning_rate is a number, not 'x'"),
+        (["--net-arch=64,wide"], "net_arch is whole numbers, as in 64,64, not '64,wide'"),
+        (["--device=nonsense"], "ppo can't be made: "),
+    ],
+)  # fmt: skip
+def test_wrong_options_are_one_line(flags: list[str], told: str) -> None:
+    with pytest.raises(WorkbenchError) as raised:
+        model("ppo", *flags)
+    assert told in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_a_section_that_names_an_unknown_option(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text("ppo CartPole-v1: {gama: 0.9}")
+    with pytest.raises(WorkbenchError, match="did you mean gamma"):
+        chosen("ppo", f"--config={tmp_path / 'a.yaml'}")
+
+
+@pytest.mark.parametrize("algorithm", ["sac", "td3", "ddpg"])
+def test_an_algorithm_that_does_not_fit_names_those_that_do(algorithm: str) -> None:
+    with pytest.raises(WorkbenchError) as raised:
+        model(algorithm)
+    words = "can't choose from Discrete(2), the actions of CartPole-v1; ppo, a2c, dqn-sb3, dqn, "
+    assert f"{algorithm} {words}reinforce fit it" in str(raised.value)
+
+
+def test_single_actions_do_not_fit_a_pendulum() -> None:
+    with pytest.raises(WorkbenchError, match="Pendulum-v1; ppo, a2c, sac, td3, ddpg fit it"):
+        model("dqn-sb3", "--env-id=Pendulum-v1")
+
+
+def test_where_the_library_is_missing_it_is_said_how_to_get_it(monkeypatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    words = "the algorithm ppo needs Stable-Baselines3, an extra: ./ws extras installs it"
+    with pytest.raises(WorkbenchError, match=words):
+        chosen("ppo")

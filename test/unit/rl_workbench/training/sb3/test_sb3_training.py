@@ -1,0 +1,196 @@
+"""What is Stable-Baselines3's own in a training: what is saved, gone on with, and goes wrong."""
+
+import json
+import shutil
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from training_runs import (
+    InterruptAfter,
+    assert_no_doubles,
+    assert_same,
+    checkpoint,
+    options_of,
+    record,
+    resume,
+    run,
+    small,
+    summary,
+    train,
+)
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.algorithms import recorded_options
+from rl_workbench.training.run.environments import make_environment
+from rl_workbench.training.run.policy import load_policy
+
+pytestmark = pytest.mark.extras("stable_baselines3")
+
+OFF_POLICY = {"total_timesteps": 200, "learning_starts": 50, "buffer_size": 500, "batch_size": 16,
+              "eval_frequency": 100, "eval_episodes": 1, "net_arch": "8"}  # fmt: skip
+CONTINUOUS = {"env_id": "Pendulum-v1", "env_kwargs": {"max_episode_steps": 20}}
+
+
+def weights(path: Path) -> dict[str, torch.Tensor]:
+    return torch.load(path, weights_only=True)["policy"]
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "options"),
+    [("td3", OFF_POLICY | CONTINUOUS), ("ddpg", OFF_POLICY | CONTINUOUS), ("dqn-sb3", OFF_POLICY),
+     ("a2c", {"total_timesteps": 200, "n_steps": 16, "eval_frequency": 100}),
+     ("ppo", {"total_timesteps": 200, "n_steps": 50, "batch_size": 100, "n_envs": 2,
+              "eval_frequency": 100})],
+)  # fmt: skip
+def test_every_algorithm_trains_and_its_policy_is_the_librarys(
+    tmp_path: Path, algorithm: str, options: dict
+) -> None:
+    import stable_baselines3
+
+    folder = run(options_of(algorithm, options), tmp_path)
+    result = summary(folder)
+    assert result["complete"] and result["steps"] >= 200 and result["episodes"] > 0
+    assert [step for step, _ in result["evaluations"]][:2] == [100, 200]
+    content = torch.load(folder / "last.pt", weights_only=True)
+    chosen = recorded_options(content["config"], "here")
+    env = make_environment(chosen.run.env_id)
+    policy = load_policy(chosen, content, env, "here")
+    name = {"dqn-sb3": "DQN"}.get(algorithm, algorithm.upper())
+    model = getattr(stable_baselines3, name).load(folder / "model.zip")
+    for seed in range(20):
+        observation, _ = env.reset(seed=seed)
+        wanted = model.predict(observation, deterministic=True)[0]
+        assert np.array_equal(policy.act(observation), wanted)
+    env.close()
+
+
+def test_checkpoints_every_so_many_steps_and_the_newest_are_kept(tmp_path: Path) -> None:
+    train(tmp_path, "sac", keep_checkpoints=2, eval_frequency=0)
+    names = sorted(path.name for path in (tmp_path / "checkpoints").iterdir())
+    assert names == ["step_000000250.pt", "step_000000260.pt"]
+
+
+def test_of_several_environments_the_step_that_passes_a_multiple_counts(tmp_path: Path) -> None:
+    options = {"n_envs": 3, "n_steps": 20, "batch_size": 60, "keep_checkpoints": 0}
+    train(tmp_path, "ppo", **options, eval_frequency=0, total_timesteps=180)
+    steps = [int(path.stem[5:]) for path in sorted((tmp_path / "checkpoints").iterdir())]
+    assert steps == [0, 72, 141, 180]
+
+
+def test_the_record_says_with_which_version(whole) -> None:
+    import stable_baselines3
+
+    assert record(whole("ppo"))["versions"]["stable_baselines3"] == stable_baselines3.__version__
+
+
+def test_another_version_is_told(whole, tmp_path: Path, capsys) -> None:
+    folder = Path(shutil.copytree(whole("ppo"), tmp_path / "run"))
+    content = record(folder)
+    content["versions"]["stable_baselines3"] = "1.0"
+    (folder / "config.json").write_text(json.dumps(content))
+    resume(folder)
+    assert "stable_baselines3 1.0 is now " in capsys.readouterr().out
+
+
+# --resume
+
+
+def test_a_resumed_training_goes_on_with_figures_and_networks(whole, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(whole("ppo"), tmp_path / "run"))
+    before, state = summary(folder), checkpoint(folder)
+    resume(folder, total_timesteps=512)
+    after, later = summary(folder), checkpoint(folder)
+    assert after["steps"] == 512 and after["complete"]
+    assert after["returns"][: len(before["returns"])] == before["returns"]
+    assert [step for step, _ in after["evaluations"]] == [100, 200, 300, 400, 500, 512]
+    assert_no_doubles(folder)
+    optimizers = [each["optimizers"]["policy.optimizer"]["state"][0]["step"]
+                  for each in (state, later)]  # fmt: skip
+    assert optimizers[1] == 2 * optimizers[0] > 0
+    assert record(folder)["run"]["total_timesteps"] == 512
+
+
+def test_the_state_comes_back_whole(whole) -> None:
+    from rl_workbench.training.sb3.model import make_model
+    from rl_workbench.training.sb3.state import restore, state_of
+
+    saved = torch.load(whole("sac") / "last.pt", weights_only=True)
+    model = make_model(small("sac"))
+    restore(model, saved, 7)
+    again = state_of(model)
+    assert saved["buffer"]["full"] and saved["entropy"] is not None
+    for name in again:
+        mine, other = saved[name], again[name]
+        assert_same(*(dict(each) if isinstance(each, dict) else each for each in (mine, other)))
+    model.get_env().close()
+
+
+def test_a_resumed_one_explores_other_episodes(whole, tmp_path: Path) -> None:
+    first = gymnasium.make("Pendulum-v1").reset(seed=3)[0]
+
+    def has_begun_with_it(folder: Path) -> bool:
+        seen = checkpoint(folder)["buffer"]["arrays"]["observations"].numpy().reshape(100, -1)
+        return bool(np.isclose(seen, first).all(axis=1).any())
+
+    assert has_begun_with_it(train(tmp_path / "new", "sac", total_timesteps=100))
+    folder = Path(shutil.copytree(whole("sac"), tmp_path / "run"))
+    assert not has_begun_with_it(resume(folder, total_timesteps=300))
+
+
+def test_what_is_learned_after_the_last_step_is_saved(tmp_path: Path) -> None:
+    """On-policy it learns from its last rollout once all steps are done."""
+    from stable_baselines3 import PPO
+
+    folder = train(tmp_path, "ppo", eval_frequency=0, checkpoint_frequency=256)
+    model = dict(PPO.load(folder / "model.zip").policy.state_dict())
+    for name in ("last.pt", "best.pt"):
+        assert_same(dict(weights(folder / name)), model)
+
+
+# What goes wrong on the way: one line, and nothing lost.
+
+
+def test_a_rate_that_blows_up(tmp_path: Path) -> None:
+    with pytest.raises(WorkbenchError) as raised:
+        train(tmp_path, "ppo", learning_rate=1e30, total_timesteps=640, eval_frequency=64)
+    line = str(raised.value)
+    assert "no numbers any more: a smaller learning_rate may help" in line
+    assert "goes on from the last checkpoint" in line and "\n" not in line
+    assert summary(tmp_path)["failure"] and not summary(tmp_path)["complete"]
+    assert all(torch.isfinite(each).all() for each in weights(tmp_path / "last.pt").values())
+
+
+def test_a_rate_that_torch_refuses(tmp_path: Path) -> None:
+    options = {"learning_rate": 1e38, "learning_starts": 10, "buffer_size": 50}
+    with pytest.raises(WorkbenchError, match=r"^dqn-sb3 failed: [^\n]*--resume"):
+        run(options_of("dqn-sb3", options), tmp_path)
+    assert summary(tmp_path)["failure"]
+
+
+def test_a_loss_that_is_none() -> None:
+    from rl_workbench.training.sb3.algorithm import _check_finite
+
+    for value in (float("nan"), float("inf")):
+        with pytest.raises(WorkbenchError, match=r"losses/value_loss is .*learning_rate"):
+            _check_finite("losses/value_loss", value)
+
+
+def test_many_environments_of_training_are_one_when_playing(tmp_path: Path, recwarn) -> None:
+    folder = train(tmp_path, "ppo", n_envs=8, n_steps=1, batch_size=8)
+    recwarn.clear()
+    content = torch.load(folder / "best.pt", weights_only=True)
+    options = recorded_options(content["config"], "here")
+    load_policy(options, content, make_environment("CartPole-v1"), "here")
+    assert not [each for each in recwarn if "mini-batch" in str(each.message)]
+
+
+@pytest.mark.parametrize("asked", [2, 30, 130])
+def test_ctrl_c_anywhere(tmp_path: Path, asked: int) -> None:
+    train(tmp_path, "ppo", InterruptAfter(asked))
+    before = summary(tmp_path)
+    assert before["interrupted"] and before["steps"] < 256
+    assert checkpoint(tmp_path)["steps"] == before["steps"]
+    assert summary(resume(tmp_path))["complete"]
