@@ -6,8 +6,8 @@ NAMESPACE = "cartpole"
 VERSION = 0
 ENTRY_POINT = "cartpole.making:make_environment"
 IDS = {"Balance": "balance", "Classic": "classic", "SwingUp": "swing-up"}  # name: task
-# Of up to 1500, all 3000 steps with the cart near the middle; of 500 steps, as for CartPole-v1; and of 1250, of
-# which swinging up takes 200 and more.
+# Of up to 1500: all 3000 steps, the cart near the middle; of 500 steps, as for CartPole-v1; of 1250, of which
+# swinging up takes 200 and more.
 SOLVED = {"balance": 1200.0, "classic": 475.0, "swing-up": 1000.0}
 
 

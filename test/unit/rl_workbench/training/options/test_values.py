@@ -133,7 +133,9 @@ def test_every_section_belongs_to_an_algorithm() -> None:
 def test_every_section_is_valid_and_counts(algorithm: str, name: str) -> None:
     kind = ALGORITHMS[algorithm]
     section = yaml.safe_load(default_file(kind.config).read_text())[name]
-    chosen = ["--preset=tutorial"] if name == "tutorial" else [f"--env-id={name.split()[-1]}"]
+    chosen = (
+        ["--preset=tutorial"] if name == "tutorial" else [f"--env-id={name.rsplit(maxsplit=1)[-1]}"]
+    )
     options = choose(kind, chosen)
     found = options.record()["run"] | options.record()["hyperparameters"]
     wanted = known_options(kind).read(section, name)
