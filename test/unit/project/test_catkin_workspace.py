@@ -10,6 +10,8 @@ import subprocess
 import pytest
 
 CATKIN_MAKE = ["/usr/bin/catkin_make", "-DPYTHON_EXECUTABLE=/usr/bin/python3"]
+# Built once: the tests of a group run in one process.
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("catkin")]
 MODULES = (
     "import bullet_gazebo_msgs.srv, cartpole.tasks, robot_envs.robot, rl_workbench.cli,"
     " gazebo_msgs.srv, ros_utils, bullet_gazebo.control,"
@@ -39,7 +41,7 @@ def workspace(root, tmp_path_factory):
     shutil.copytree(
         root,
         workspace / "src/cartpole",
-        ignore=shutil.ignore_patterns(".*", "__pycache__", "companions"),
+        ignore=shutil.ignore_patterns(".*", "__pycache__", "companions", "runs"),
     )
     shutil.copytree(root / "companions", workspace / "src/companions")
     result = run([*CATKIN_MAKE, "install"], workspace)
@@ -47,7 +49,6 @@ def workspace(root, tmp_path_factory):
     return workspace
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("space", ["devel", "install"])
 def test_built_workspace(workspace, space):
     def inside(*command):
@@ -65,7 +66,6 @@ def test_built_workspace(workspace, space):
     inside("roslaunch", "--files", "gazebo_ros", "empty_world.launch")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("space", ["devel", "install"])
 def test_scripts_have_the_builds_interpreter(workspace, space):
     folders = [*(workspace / space / "lib").glob("*"), workspace / space / "bin"]
