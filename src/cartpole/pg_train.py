@@ -5,7 +5,6 @@ import contextlib
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from importlib.util import find_spec
 from typing import Any
 
 from cartpole.registration import NAMESPACE
@@ -18,6 +17,7 @@ from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell
+from robot_envs.backends.choice import has_ros, need_ros
 from robot_envs.errors import RobotEnvError
 
 NODE = "pg_train"
@@ -61,7 +61,7 @@ class RobotOptions:
         """What it comes to as options of the environment."""
         noise = {"noise": self.start_noise} if self.start_noise else {}
         if not self.realtime:
-            installed = "ros" if find_spec("rospy") else "bullet"
+            installed = "ros" if has_ros() else "bullet"
             return {"backend": self.backend or installed, **noise}
         # The newest joint state, without waiting for another one: as the existing script does.
         return {"backend": "ros-realtime", "control_period": None, **noise}
@@ -162,6 +162,7 @@ def session(options: TrainingOptions, name: str, argv: list[str], gui: bool) -> 
     if backend == "bullet" or not options.run.env_id.startswith(f"{NAMESPACE}/"):
         yield
         return
+    need_ros(f"the backend {backend}")
     from cartpole.robot import ROBOT
     from robot_envs.backends.session import RosSession
 

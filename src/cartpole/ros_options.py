@@ -3,6 +3,7 @@
 import os
 from typing import Any
 
+from robot_envs.backends.choice import need_ros
 from robot_envs.errors import RobotEnvError
 
 REMAPPING = ":="  # in every argument of ROS's: __name:=pg_train, _gamma:=0.9, old:=new
@@ -23,12 +24,13 @@ def ros_options(argv: list[str], default_name: str) -> tuple[list[str], dict[str
         the master; the node's full name.
 
     Raises:
-        RobotEnvError: if a private parameter isn't YAML, or the master doesn't answer a node that
-            roslaunch started.
+        RobotEnvError: if ROS isn't there, a private parameter isn't YAML, or the master doesn't
+            answer a node that roslaunch started.
     """
     if not any(REMAPPING in argument for argument in argv):
         namespace = os.environ.get("ROS_NAMESPACE", "").strip("/")
         return list(argv), {}, "/".join(["", *filter(None, [namespace, default_name])])
+    need_ros(f"an argument with {REMAPPING}")
     from robot_envs.backends import node
 
     name = node.full_name(argv, default_name)

@@ -4,6 +4,8 @@ import importlib.util
 
 from rl_workbench.errors import WorkbenchError
 
+HOW = "./ws extras installs it, or, without a workspace, pip install '.[extras]'"
+
 
 def need(module: str, package: str, what: str) -> None:
     """Makes sure that an extra package is installed.
@@ -12,4 +14,4 @@ def need(module: str, package: str, what: str) -> None:
         WorkbenchError: if it isn't.
     """
     if not importlib.util.find_spec(module):
-        raise WorkbenchError(f"{what} needs {package}, an extra: ./ws extras installs it")
+        raise WorkbenchError(f"{what} needs {package}, an extra: {HOW}")

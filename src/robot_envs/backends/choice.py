@@ -1,15 +1,33 @@
 """Backends by name, as the option `backend` of an environment has them."""
 
+from importlib.util import find_spec
+
 from robot_envs.backends.backend import (
     DEFAULT_ENGINE,
     PHYSICS_STEP,
     RobotBackend,
     ticks_per_action,
 )
+from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot, State
 
 IN_PROCESS, LOCKSTEP, REALTIME = "bullet", "ros", "ros-realtime"
 BACKENDS = (IN_PROCESS, LOCKSTEP, REALTIME)
+
+
+def has_ros() -> bool:
+    """Whether ROS's Python packages are there to be imported."""
+    return find_spec("rospy") is not None
+
+
+def need_ros(what: str) -> None:
+    """Makes sure of it, before something imports them.
+
+    Raises:
+        RobotEnvError: if they aren't there.
+    """
+    if not has_ros():
+        raise RobotEnvError(f"{what} needs ROS, and there is no rospy: ./ws installs and finds it")
 
 
 def make_backend(
@@ -33,7 +51,7 @@ def make_backend(
     Raises:
         ValueError: if there is no such backend or engine, or the control period is no whole number
             of physics steps.
-        RobotEnvError: if the robot can't be brought up.
+        RobotEnvError: if ROS isn't there, or the robot can't be brought up.
     """
     if backend not in BACKENDS:
         raise ValueError(f"there is no backend {backend!r}; there are {', '.join(BACKENDS)}")
@@ -48,6 +66,7 @@ def make_backend(
         )
     if control_period is not None or backend == LOCKSTEP:
         ticks_per_action(control_period, PHYSICS_STEP)  # before a simulator is started for it
+    need_ros(f"the backend {backend}")
     from robot_envs.backends.session import running_session
 
     return running_session(robot, backend == REALTIME).connect(control_period, height)

@@ -102,6 +102,13 @@ def test_an_engine_that_is_not_installed_is_named_with_the_command_that_installs
         gymnasium.make("cartpole/Balance-v0", engine="mujoco")
 
 
+@pytest.mark.parametrize("backend", ["ros", "ros-realtime"])
+def test_a_backend_over_ros_says_that_ros_is_not_there(monkeypatch, backend):
+    monkeypatch.setitem(sys.modules, "rospy", None)  # as where it isn't installed
+    with pytest.raises(RobotEnvError, match=f"the backend {backend} needs ROS, .*: ./ws installs"):
+        gymnasium.make("cartpole/Balance-v0", backend=backend)
+
+
 @pytest.mark.extras("mujoco")
 class TestMujoco(EnvironmentConformance):
     identifier = "cartpole/Classic-v0"

@@ -18,6 +18,12 @@ def _no_master(monkeypatch):
     monkeypatch.delenv("ROS_NAMESPACE", raising=False)
 
 
+def test_ross_options_without_ros_are_an_error_in_one_line(monkeypatch):
+    monkeypatch.setitem(sys.modules, "rospy", None)
+    with pytest.raises(RobotEnvError, match="an argument with := needs ROS"):
+        ros_options(["__name:=learner"], "learner")
+
+
 def test_without_ross_options_the_arguments_are_the_flags_and_ros_is_not_loaded():
     script = (
         "import sys; from cartpole.ros_options import ros_options;"

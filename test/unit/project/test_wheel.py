@@ -21,6 +21,13 @@ ROS = ("rospy", "roslib", "rosgraph", "rospkg", "catkin_pkg", "gazebo_msgs", "bu
 
 def run(*command: str | Path, cwd: Path) -> str:
     """Runs a command of somebody who has sourced nothing; returns what it printed."""
+    code, printed = outcome(*command, cwd=cwd)
+    assert code == 0, printed[-3000:]
+    return printed
+
+
+def outcome(*command: str | Path, cwd: Path) -> tuple[int, str]:
+    """The same, with the exit code."""
     done = subprocess.run(
         command,
         cwd=cwd,
@@ -32,8 +39,7 @@ def run(*command: str | Path, cwd: Path) -> str:
         check=False,
         timeout=300,
     )
-    assert done.returncode == 0, done.stdout[-3000:]
-    return done.stdout
+    return done.returncode, done.stdout
 
 
 def pip(python: Path, *arguments: str | Path, cwd: Path) -> None:
@@ -100,6 +106,14 @@ def test_rl_workbench_trains(python: Path, tmp_path: Path) -> None:
     summary = json.loads((tmp_path / "run/summary.json").read_text())
     assert summary["steps"] == 600
     assert "mean" in run(command, "eval", "run", "--episodes", "2", cwd=tmp_path)
+
+
+def test_what_needs_ros_says_so_in_one_line(python: Path, tmp_path: Path) -> None:
+    command = (python.with_name("cartpole-pg"), "--backend", "ros", "--episodes", "1")
+    code, printed = outcome(*command, cwd=tmp_path)
+    assert code == 1
+    assert printed.startswith("pg_train.py: the backend ros needs ROS")
+    assert len(printed.splitlines()) == 1
 
 
 def test_cartpole_pg_trains(python: Path, tmp_path: Path) -> None:

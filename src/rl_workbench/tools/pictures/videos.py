@@ -1,6 +1,5 @@
 """One greedy episode as a GIF or an MP4; needs no display."""
 
-import importlib.util
 import math
 import shutil
 import tempfile
@@ -12,6 +11,7 @@ import numpy as np
 from PIL import Image
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.extras import need
 from rl_workbench.tools.runs.episodes import greedy_steps
 from rl_workbench.tools.runs.policies import LearnedPolicy
 from rl_workbench.training.run.files import write_file
@@ -39,8 +39,8 @@ def check_format(path: Path) -> None:
     """
     if path.suffix.lower() not in FORMATS:
         raise WorkbenchError(f"a video's name ends in {' or '.join(FORMATS)}: not {path}")
-    if path.suffix.lower() == ".mp4" and not importlib.util.find_spec("imageio_ffmpeg"):
-        raise WorkbenchError("MP4 needs imageio-ffmpeg: ./ws extras installs it; GIF needs nothing")
+    if path.suffix.lower() == ".mp4":
+        need("imageio_ffmpeg", "imageio-ffmpeg", "MP4, unlike GIF,")
 
 
 def record_episode(policy: LearnedPolicy, seed: int, fastest: float, longest: int = 0) -> Video:

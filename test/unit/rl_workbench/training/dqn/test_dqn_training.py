@@ -22,7 +22,7 @@ from rl_workbench.agents.dqn.schedules import Epsilon
 def test_a_checkpoint_has_the_documents_keys_and_no_more_than_its_weights(whole) -> None:
     content = checkpoint(whole("dqn"))
     assert {"q_net", "target_net", "epsilon", "optimizer", "replay"} <= set(content)
-    assert "net.0.weight" in content["q_net"], "the document's QNetwork loads it"
+    assert "net.0.weight" in content["q_net"], "the DQN tutorial's QNetwork loads it"
     assert content["q_net"]["net.0.weight"].untyped_storage().nbytes() == 16 * 4 * 4
     assert content["config"]["hyperparameters"]["hidden_sizes"] == (16, 16)
 
