@@ -12,21 +12,17 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import recorded_options
 from rl_workbench.training.run.checkpoints import read
 from rl_workbench.training.run.environments import make_environment
-from rl_workbench.training.run.policy import Policy, load_policy
+from rl_workbench.training.run.policy import load_policy
 
 MEANINGS = {"dqn": "Q(right) - Q(left)", "sac": "action"}
 
 
-def loaded(run: Path, name: str = "best.pt", env_id: str = "") -> tuple[Policy, gymnasium.Env]:
-    content = read(run / name)
-    options = recorded_options(content["config"], name)
-    env = make_environment(env_id or options.run.env_id, options.run.policy_environment)
-    return load_policy(options, content, env, str(run / name)), env
-
-
 @pytest.mark.parametrize("name", ALL)
 def test_the_policy_acts_by_what_it_prefers(whole: Callable[[str], Path], name: str) -> None:
-    policy, env = loaded(whole(name))
+    content = read(whole(name) / "best.pt")
+    options = recorded_options(content["config"], "best.pt")
+    env = make_environment(options.run.env_id, options.run.training_environment)
+    policy = load_policy(options, content, env, "best.pt")
     size = env.observation_space.shape[0]
     observations = np.random.default_rng(0).normal(size=(50, size)).astype(np.float32)
     preferred = policy.preference(observations)
