@@ -1,4 +1,4 @@
-"""The robot moves as it did in version 0.1.0, to the bit: 20,000 observations and rewards of each environment."""
+"""The robot moves as it did in version 0.1.0, to the bit: 20,000 observations of each environment."""
 
 import hashlib
 from typing import Any
