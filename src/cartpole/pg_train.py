@@ -4,7 +4,7 @@ import argparse
 import contextlib
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from cartpole.registration import NAMESPACE
@@ -68,6 +68,7 @@ class RobotOptions:
 
 
 ROBOT_OPTIONS = Options(RobotOptions)
+_ANYWHERE = (False, 0.0, "bullet")  # what goes for other environments, too
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -107,17 +108,20 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOption
 
     Raises:
         SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
-        WorkbenchError: if a name is unknown or a value wrong.
     """
     parser = argparse.ArgumentParser(
-        PROG, add_help=False, allow_abbrev=False, argument_default=argparse.SUPPRESS
+        PROG,
+        usage=f"{PROG} [--help] [--OPTION VALUE ...]",
+        add_help=False,
+        allow_abbrev=False,
+        argument_default=argparse.SUPPRESS,
     )
     ROBOT_OPTIONS.add_flags(parser.add_argument_group("the robot"))
     known, rest = parser.parse_known_args(flags)
     own = {key: value for key, value in parameters.items() if key in ROBOT_OPTIONS.names}
     others = {key: value for key, value in parameters.items() if key not in own}
-    given = ROBOT_OPTIONS.read(own, "rosparam") | vars(known)
     try:
+        given = ROBOT_OPTIONS.read(own, "rosparam") | vars(known)
         robot = ROBOT_OPTIONS.make(RobotOptions, given)
         options = choose_training(rest, others, PROG, "reinforce", ENV_ID, parser)
         return _joined(options, robot, given), robot
@@ -137,9 +141,11 @@ def _joined(
         return options
     run = options.run
     if not run.env_id.startswith(f"{NAMESPACE}/"):
-        if given:
-            name = next(each.name for each in fields(RobotOptions) if each.name in given)
-            raise WorkbenchError(f"{flag(name)} is of the robot: not with --env-id {run.env_id}")
+        robots = [key for key in recorded + ["gui"] if getattr(robot, key) not in _ANYWHERE]
+        if robots:
+            raise WorkbenchError(
+                f"{flag(robots[0])} is of the robot: not with --env-id {run.env_id}"
+            )
         return options
     return options._replace(
         run=replace(run, train_env_kwargs=run.train_env_kwargs | robot.environment)

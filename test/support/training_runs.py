@@ -122,7 +122,8 @@ class InterruptAfter(Interrupt):
 def options_of(name: str, values: dict[str, Any]) -> TrainingOptions:
     """What isn't named, or None, keeps the algorithm's default; no file is read."""
     kind = algorithm(name)
-    return make_options(kind, known_options(kind).read(values, "a test"))
+    given = {key: value for key, value in values.items() if value is not None}
+    return make_options(kind, known_options(kind).read(given, "a test"))
 
 
 def small(name: str, **changed: Any) -> TrainingOptions:

@@ -1,0 +1,174 @@
+"""The commands that train: the robot's own options, and those of ROS."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cartpole import dqn_train, pg_train
+from cartpole.pg_train import ENV_ID, RobotOptions, choose, main
+from rl_workbench.training import cli
+from rl_workbench.training.options.training_options import TrainingOptions
+
+pytestmark = pytest.mark.usefixtures("signals")
+
+SHORT = ["--episodes=2", "--eval-episodes=1"]
+PLAIN = ["--env-id=CartPole-v1", *SHORT]
+BULLET = ["--backend=bullet", *SHORT]
+
+
+@pytest.fixture(autouse=True)
+def _no_master(monkeypatch, tmp_path: Path) -> None:
+    """The command asks a master for parameters; what it writes goes below the working folder."""
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    monkeypatch.chdir(tmp_path)
+
+
+def refused(capsys, *flags: str, **parameters: Any) -> str:
+    with pytest.raises(SystemExit) as stop:
+        choose(list(flags), parameters)
+    assert stop.value.code == 2
+    return capsys.readouterr().err
+
+
+def failed(capsys, *flags: str) -> str:
+    """Runs the command; returns its one line."""
+    capsys.readouterr()
+    assert main([*flags]) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1 and lines[0].startswith("pg_train.py: ")
+    return lines[0]
+
+
+# Options.
+
+
+def test_without_flags_it_is_the_robot_by_reinforce() -> None:
+    options, robot = choose([], {})
+    assert (options.kind.name, options.run.env_id, robot) == ("reinforce", ENV_ID, RobotOptions())
+    assert options.run.stop_at_length == 2400, "as its section of the configuration says"
+    assert options.run.train_env_kwargs["backend"] in ("ros", "bullet")
+
+
+def test_flags_of_the_robot_become_options_of_its_environment() -> None:
+    flags = ["--episodes=5", "--seed=3", "--run-dir=out", "--save-every=2", "--gui"]
+    options, robot = choose([*flags, "--realtime", "--start-noise=0.05"], {})
+    assert (options.run.episodes, options.run.seed, options.run.run_dir) == (5, 3, "out")
+    assert options.hyperparameters.save_every == 2 and robot.gui
+    assert options.run.train_env_kwargs == {
+        "backend": "ros-realtime", "control_period": None, "noise": 0.05
+    }  # fmt: skip
+    options, _ = choose(["--backend=bullet", "--train-env-kwargs=max_steps=7"], {})
+    assert options.run.train_env_kwargs == {"max_steps": 7, "backend": "bullet"}
+    options, _ = choose(["--algo=reinforce-document", "--random-weights", "--stop-at-length=7"], {})
+    assert options.hyperparameters.random_weights and options.run.stop_at_length == 7
+    assert options.run.env_id == ENV_ID
+
+
+def test_parameters_and_flags_over_them() -> None:
+    parameters = {"episodes": 5, "seed": "3", "backend": "bullet", "start_noise": 0.05}
+    options, robot = choose(["--episodes=7"], parameters)
+    assert (options.run.episodes, options.run.seed) == (7, 3)
+    assert robot == RobotOptions(backend="bullet", start_noise=0.05)
+    empty = {"run_dir": "", "realtime": "", "gui": False, "resume": "", "config": "", "algo": ""}
+    assert choose([], empty) == choose([], {})
+    assert choose([], {"gui": True})[1].gui and not choose(["--no-gui"], {"gui": True})[1].gui
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--start-noise=-0.1"], "start_noise lies between 0 and 0.2"),
+        (["--start-noise=0.3"], "start_noise lies between"),
+        (["--start-noise=nan"], "start_noise lies between"),
+        (["--backend=gazebo"], "invalid choice: 'gazebo'"),
+        (["--gui", "--headless"], "--headless: not with --gui"),
+        (["--backend=bullet", "--gui"], "not with --backend bullet"),
+        (["--backend=bullet", "--realtime"], "not with --backend bullet"),
+        (["--episods=5"], "unknown flag '--episods'; did you mean --episodes?"),
+        (["--gamma=1.5"], "gamma lies between 0 and 1"),
+        (["--algo=gae"], "the algorithm gae is called reinforce now"),
+        (["--algorithm=gae"], "--algorithm is called --algo now"),
+        (["--stop-at=7"], "--stop-at is called --stop-at-length now"),
+        (["surplus"], "unknown flag 'surplus'"),
+    ],
+)
+def test_wrong_flags_exit_with_2_and_a_line(capsys, flags: list[str], words: str) -> None:
+    told = refused(capsys, *flags)
+    assert words in told and len(told.splitlines()) == 2
+
+
+def test_wrong_parameters_too(capsys) -> None:
+    assert "'episods'; did you mean episodes" in refused(capsys, episods=5)
+    assert "realtime must be true or false, not 'yes'" in refused(capsys, realtime="yes")
+
+
+@pytest.mark.parametrize("given", ["--backend=ros", "--start-noise=0.1", "--gui", "--realtime"])
+def test_what_is_the_robots_alone(capsys, given: str) -> None:
+    flag = given.partition("=")[0]
+    line = refused(capsys, "--env-id=X-v0", given)
+    assert f"{flag} is of the robot: not with --env-id X-v0" in line
+
+
+def test_what_goes_for_every_environment() -> None:
+    plain = choose(["--env-id=X-v0"], {})[0]
+    flags = ["--backend=bullet", "--no-gui", "--headless", "--no-realtime", "--start-noise=0"]
+    assert choose(["--env-id=X-v0", *flags], {})[0] == plain
+    assert plain.run.train_env_kwargs == {}
+
+
+def test_help_explains_both(capsys) -> None:
+    with pytest.raises(SystemExit) as stop:
+        choose(["--help"], {})
+    told = capsys.readouterr().out
+    assert stop.value.code == 0
+    assert all(flag in told for flag in ("--backend", "--start-noise", "--gae-lambda", "--resume"))
+
+
+# Trainings in this process.
+
+
+def test_the_robot_in_this_process_and_resumed(tmp_path: Path, capsys) -> None:
+    assert main([*BULLET, "--exp-name=mine", "--start-noise=0.02"]) == 0
+    (run,) = (tmp_path / "runs").iterdir()
+    assert run.name.startswith("cartpole-Balance-v0__mine__0__")
+    record = json.loads((run / "config.json").read_text())
+    assert record["run"]["train_env_kwargs"] == {"backend": "bullet", "noise": 0.02}
+    assert main([f"--resume={run}", "--episodes=3"]) == 0
+    assert "after episode 2 of 3" in capsys.readouterr().out
+    assert "--resume allows no --backend" in refused(capsys, f"--resume={run}", "--backend=bullet")
+
+
+def test_another_environment(tmp_path: Path) -> None:
+    private = ["_gamma:=0.5", "_batch_episodes:=2"]
+    assert main([*PLAIN, "--run-dir=run", "--seed=5", *private]) == 0
+    record = json.loads((tmp_path / "run/config.json").read_text())
+    own = record["hyperparameters"]
+    assert (own["gamma"], own["batch_episodes"], record["run"]["seed"]) == (0.5, 2, 5)
+
+
+def test_an_environment_that_does_not_do(capsys, tmp_path: Path) -> None:
+    swing_up = ["--env-id=cartpole/SwingUp-v0", "--backend=bullet", "--run-dir=run"]
+    assert "PPO, A2C, SAC, TD3 or DDPG fit it" in failed(capsys, *swing_up)
+    assert "did you mean CartPole-v1?" in failed(capsys, "--env-id=CartPol-v1", "--run-dir=run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_ctrl_c_before_the_training(capsys, monkeypatch) -> None:
+    def interrupted(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pg_train, "train", interrupted)
+    assert main(BULLET) == 130
+    assert "before the training began" in capsys.readouterr().err
+
+
+def test_private_parameters_of_dqn_train(monkeypatch) -> None:
+    """As every node takes them: rosrun cartpole dqn_train.py _gamma:=0.5."""
+    chosen: list[TrainingOptions] = []
+    monkeypatch.setattr(cli, "train", lambda options, interrupt: chosen.append(options))
+    assert dqn_train.main(["_gamma:=0.5", "--seed=3", "_seed:=4", "_dueling:=true"]) == 0
+    (options,) = chosen
+    assert (options.kind.name, options.run.seed) == ("dqn", 3)
+    assert (options.hyperparameters.gamma, options.hyperparameters.dueling) == (0.5, True)

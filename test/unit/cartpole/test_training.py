@@ -1,0 +1,35 @@
+"""The robot in this process, trained: interrupted and resumed it ends as it would have."""
+
+from pathlib import Path
+
+import pytest
+from training_runs import InterruptAfter, assert_same_run, resume, rows, summary, train
+
+import cartpole
+from cartpole.environment import CartPoleEnv
+
+NAMES = {"dqn": "Classic", "reinforce": "Balance", "reinforce-document": "Balance"}
+
+
+def options(name: str) -> dict[str, object]:
+    length = {"total_timesteps": 300} if name == "dqn" else {"episodes": 8}
+    return {"env_id": f"cartpole/{NAMES[name]}-v0", "env_kwargs": {"noise": 0.02}, **length}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_resumes_exactly(tmp_path: Path, name: str) -> None:
+    assert cartpole.__name__  # registers the environments
+    whole = train(tmp_path / "whole", name, **options(name))
+    run = train(tmp_path / "run", name, InterruptAfter(137), **options(name))
+    assert summary(run)["interrupted"]
+    assert_same_run(whole, resume(run))
+
+
+@pytest.mark.parametrize("name", ["dqn", "reinforce"])
+def test_one_robot_for_training_and_evaluation(tmp_path: Path, monkeypatch, name: str) -> None:
+    """Over ROS there is one; the episode under way goes on as if nobody had moved the robot."""
+    whole = train(tmp_path / "whole", name, **options(name), eval_frequency=30)
+    monkeypatch.setattr(CartPoleEnv, "shares_robot", True)
+    run = train(tmp_path / "run", name, InterruptAfter(150), **options(name), eval_frequency=30)
+    assert rows(run) != rows(whole), "interrupted"
+    assert_same_run(whole, resume(run))
