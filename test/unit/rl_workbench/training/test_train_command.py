@@ -52,9 +52,7 @@ def told_and_left(capsys, *arguments: str) -> tuple[int, str, str]:
      pytest.param("a2c", {"total_timesteps": 600},
                   marks=pytest.mark.extras("stable_baselines3"))],
 )  # fmt: skip
-def test_a_training_from_the_command_line(
-    tmp_path: Path, capsys, name: str, options: dict
-) -> None:
+def test_a_training_from_the_command_line(tmp_path: Path, capsys, name: str, options: dict) -> None:
     given = flags(options | {"eval_episodes": 1, "confirm_episodes": 0})
     arguments = [f"--algo={name}", "--env-id=CartPole-v1", *given]
     assert main([*arguments, "--seed=5"]) == 0
@@ -101,7 +99,9 @@ def test_parameters_of_a_node(tmp_path: Path) -> None:
 def test_a_node_may_have_defaults() -> None:
     options = choose_training([], {}, default="reinforce", env_id="Acrobot-v1")
     assert (options.kind.name, options.run.env_id) == ("reinforce", "Acrobot-v1")
-    options = choose_training(["--algo=dqn", "--env-id=A-v0"], {}, default="reinforce", env_id="B-v0")
+    options = choose_training(
+        ["--algo=dqn", "--env-id=A-v0"], {}, default="reinforce", env_id="B-v0"
+    )
     assert (options.kind.name, options.run.env_id) == ("dqn", "A-v0")
 
 
