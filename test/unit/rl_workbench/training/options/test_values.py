@@ -130,11 +130,9 @@ def test_every_section_belongs_to_an_algorithm() -> None:
 @pytest.mark.extras("stable_baselines3")
 @pytest.mark.parametrize(("algorithm", "name"), SECTIONS)
 def test_every_section_is_valid_and_counts(algorithm: str, name: str) -> None:
-    kind = ALGORITHMS[algorithm]
+    kind, env_id = ALGORITHMS[algorithm], name.rsplit(maxsplit=1)[-1]
     section = yaml.safe_load(default_file(kind.config).read_text())[name]
-    chosen = (
-        ["--preset=tutorial"] if name == "tutorial" else [f"--env-id={name.rsplit(maxsplit=1)[-1]}"]
-    )
+    chosen = ["--preset=tutorial"] if name == "tutorial" else [f"--env-id={env_id}"]
     options = choose(kind, chosen)
     found = options.record()["run"] | options.record()["hyperparameters"]
     wanted = known_options(kind).read(section, name)
@@ -146,7 +144,6 @@ def test_every_section_is_valid_and_counts(algorithm: str, name: str) -> None:
         assert options.run.total_timesteps >= 10_000
         is_continuous = "SwingUp" in name or "Continuous" in name
         like_it = {"LunarLanderContinuous-v3": "Pendulum-v1", "LunarLander-v3": "CartPole-v1"}
-        env_id = options.run.env_id
         if env_id.startswith("cartpole/"):
             like_it[env_id] = "Pendulum-v1" if is_continuous else "CartPole-v1"
         run = dataclasses.replace(options.run, env_id=like_it.get(env_id, env_id), env_kwargs={})
