@@ -20,7 +20,9 @@ def policy_gradient(folder: Path, algorithm: str = "reinforce-document", **chang
 
 
 def sb3(folder: Path, algorithm: str = "ppo", **changed: object) -> Path:
-    return training_runs.run(training_runs.options_of(algorithm, {**PPO, **changed}), folder)
+    """Of PPO's options above those count that aren't given as None."""
+    given = {key: value for key, value in {**PPO, **changed}.items() if value is not None}
+    return training_runs.run(training_runs.options_of(algorithm, given), folder)
 
 
 def record(folder: Path, returns: list[float], **run: object) -> Path:

@@ -12,8 +12,6 @@ from rl_workbench.training.options.record import is_plain
 from rl_workbench.training.options.training_options import choose, known_options
 
 CONFIG = "benchmark.yaml"
-# Flags that are no options: which section of the algorithm's file, or which other file.
-SPECIAL = ("preset", "config")
 NAME = re.compile(r"\w[\w.+-]*")  # of a variant, which is a folder's too
 MOST_SEEDS = 10_000
 OWN = ("seed", "run_dir", "exp_name")  # the benchmark gives these
@@ -91,7 +89,7 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
         raise WorkbenchError(f"{origin}: {taken[0]} is given by the benchmark")
     if not algorithm(kind).package:  # the others are asked only when they are trained
         rest = {key: value for key, value in rest.items() if value is not None}
-        known_options(algorithm(kind)).read(_without_special(rest), f"{origin}: {name}")
+        known_options(algorithm(kind)).read(_without_special(kind, rest), f"{origin}: {name}")
     return Variant(name, kind, rest)
 
 
@@ -106,13 +104,15 @@ def check_package(variant: Variant) -> None:
         choose(kind, arguments(variant, 0, Path("run"))[2:])
 
 
-def _without_special(options: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in options.items() if key not in SPECIAL}
+def _without_special(name: str, options: dict[str, Any]) -> dict[str, Any]:
+    """Without the flags that are no options: which section of the algorithm's file, or which file."""
+    special = ("config", *(("preset",) if algorithm(name).presets else ()))
+    return {key: value for key, value in options.items() if key not in special}
 
 
 def arguments(variant: Variant, seed: int, folder: Path) -> list[str]:
     """What `workbench.py train` is told for one run."""
-    rest = _without_special(variant.options)
+    rest = _without_special(variant.algorithm, variant.options)
     special = {key: value for key, value in variant.options.items() if key not in rest}
     own = {"run_dir": folder, "exp_name": variant.name, "seed": seed, **special}
     flags = [f"--{key.replace('_', '-')}={value}" for key, value in own.items()]

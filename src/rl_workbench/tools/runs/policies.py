@@ -10,6 +10,7 @@ import numpy as np
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.runs import Run
 from rl_workbench.training.algorithms import recorded_options
+from rl_workbench.training.options.record import CONFIG_RECORD
 from rl_workbench.training.run import checkpoints
 from rl_workbench.training.run.environments import make_environment
 from rl_workbench.training.run.policy import load_policy
@@ -41,7 +42,8 @@ def load_learned(
         say: is told of what is passed over.
 
     Raises:
-        WorkbenchError: if there is no checkpoint that can be read, or no such environment.
+        WorkbenchError: if there is no checkpoint that can be read, it is another run's, or there
+            is no such environment.
     """
     paths = checkpoints.candidates(run.folder, best_first=which == "best")
     for path in paths:
@@ -59,6 +61,11 @@ def _learned(
     run: Run, path: Path, content: dict[str, Any], env_options: Mapping[str, Any]
 ) -> LearnedPolicy:
     options = recorded_options(content.get("config"), str(path))
+    recorded = recorded_options(run.config, str(run.folder / CONFIG_RECORD))
+    try:
+        recorded.check_same(content["config"], str(path))
+    except WorkbenchError as error:
+        raise WorkbenchError(f"{path} isn't a checkpoint of {run.folder}") from error
     env = make_environment(run.env_id, {**run.env_kwargs, **env_options})
     try:
         return LearnedPolicy(*load_policy(options, content, env, str(path)), env, path)

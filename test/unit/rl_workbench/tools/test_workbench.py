@@ -1,4 +1,4 @@
-"""The commands of workbench.py on small trainings: what they print, write and refuse."""
+"""The commands of rl-workbench on small trainings: what they print, write and refuse."""
 
 import json
 import os
@@ -10,6 +10,7 @@ import pytest
 import workbench_runs
 from PIL import Image
 
+import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli
 
 pytestmark = pytest.mark.usefixtures("signals")
@@ -18,11 +19,11 @@ pytestmark = pytest.mark.usefixtures("signals")
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("runs")
-    workbench_runs.dqn(folder / "dqn_0")
+    workbench_runs.dqn(folder / "dqn_0", seed=0)
     workbench_runs.dqn(folder / "dqn_1", seed=1)
     workbench_runs.dqn(folder / "robot", env_id="cartpole/Classic-v0", total_timesteps=200)
-    workbench_runs.policy_gradient(folder / "pg")
-    workbench_runs.policy_gradient(folder / "gae", algorithm="gae")
+    for algorithm in ("reinforce", "reinforce-document"):
+        workbench_runs.policy_gradient(folder / algorithm, algorithm)
     return folder
 
 
@@ -40,11 +41,13 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     """The one line that a command says when it fails."""
     assert work(*arguments) == 1
     lines = capsys.readouterr().err.strip().splitlines()
-    assert "Traceback" not in lines[-1] and lines[-1].startswith("workbench.py: ")
+    assert "Traceback" not in lines[-1] and lines[-1].startswith(
+        ("rl-workbench: ", "rl-workbench train: ")
+    )
     return lines[-1]
 
 
-ALL = ["dqn_0", "robot", "pg", "gae"]
+ALL = ["dqn_0", "robot", "reinforce", "reinforce-document"]
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -81,7 +84,7 @@ def test_options_of_the_environment_reach_it(runs: Path, given: list[str], capsy
     assert json.loads(capsys.readouterr().out)["lengths"] == [3]
 
 
-@pytest.mark.parametrize("name", ["dqn_0", "robot", "pg"])
+@pytest.mark.parametrize("name", ["dqn_0", "robot", "reinforce"])
 def test_record_writes_a_gif_without_a_display(runs: Path, tmp_path: Path, name: str) -> None:
     out = tmp_path / "video.gif"
     assert work("record", runs / name, "--out", out, "--max-steps", 40, "--scale", 0.5) == 0
@@ -254,6 +257,12 @@ def test_a_damaged_checkpoint_gives_way_to_an_earlier_one(own: Path, capsys) -> 
     assert json.loads(out)["checkpoint"].endswith("last.pt")
 
 
+def test_a_checkpoint_of_another_run_is_refused(runs: Path, own: Path, capsys) -> None:
+    for other in ("dqn_1", "robot", "reinforce"):  # another seed, environment, algorithm
+        shutil.copy(runs / other / "best.pt", own / "best.pt")
+        assert "best.pt isn't a checkpoint of" in refused(capsys, "eval", own)
+
+
 def test_without_any_good_checkpoint(own: Path, capsys) -> None:
     for path in own.rglob("*.pt"):
         path.write_bytes(b"")
@@ -302,11 +311,6 @@ def test_the_nearest_command_is_named(capsys) -> None:
     with pytest.raises(SystemExit):
         work("evla")
     assert "did you mean eval?" in capsys.readouterr().err
-
-
-def test_roslaunchs_arguments_are_left_out(runs: Path) -> None:
-    extra = ["__name:=workbench", "__log:=/tmp/log"]
-    assert work("eval", runs / "dqn_0", "--episodes", 1, *extra) == 0
 
 
 @pytest.mark.parametrize("name", ["video.avi", "video"])

@@ -1,4 +1,4 @@
-"""`workbench.py benchmark`: suites, trainings as processes, tables that leave no failure out."""
+"""`rl-workbench benchmark`: suites, trainings as processes, tables that leave no failure out."""
 
 import json
 import os
@@ -14,13 +14,14 @@ import pytest
 import workbench_runs
 
 from rl_workbench import cli
+from rl_workbench.cli import PROGRAM
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.benchmark import trainings
 from rl_workbench.tools.benchmark.results import RunResult, examine
 from rl_workbench.tools.benchmark.suites import (
     CONFIG,
     arguments,
-    check_stable_baselines3,
+    check_package,
     default_file,
     make_variant,
     read_suite,
@@ -86,7 +87,8 @@ def test_a_suite_gives_tables_with_every_seed_and_every_failure(
     assert rows["plain"]["steps"] == 300 and rows["plain"]["best"] is not None
     assert rows["plain"]["cpu_seconds"] > 0
     config = json.loads((out / "plain/seed_0/config.json").read_text())
-    assert config["dqn"]["hidden_sizes"] == [8, 4] and not config["dqn"]["double"]
+    own = config["hyperparameters"]
+    assert own["hidden_sizes"] == [8, 4] and not own["double"]
     assert config["run"]["env_kwargs"] == {"sutton_barto_reward": True}
     assert config["run"]["exp_name"] == "plain"
     assert rows["broken"]["best"] is None and "no run folder" in rows["broken"]["fault"]
@@ -117,7 +119,7 @@ def test_an_interrupted_benchmark_goes_on_where_it_was(tmp_path: Path) -> None:
     first = json.loads((run / "summary.json").read_text())
     assert first["interrupted"] and not first["complete"]
     same = Job(make_variant("t", "t", {}), 0, run)
-    assert not same.is_done() and trainings.command(same)[-1] == f"--resume={run}"
+    assert not same.is_done() and trainings.command(same, PROGRAM)[-1] == f"--resume={run}"
 
 
 def test_a_folder_of_other_options_is_refused(
@@ -138,8 +140,8 @@ def test_a_folder_of_other_options_is_refused(
         (["cartpole", "--env-id", "CartPole-v1"], "a suite says itself"),
         (["cartpole", "--algo", "dqn"], "a suite says itself"),
         (["--suites", "mine.yaml"], "which suite of mine.yaml"),
-        (["--algo", "pg", "--params", "gama=0.9"], "did you mean gamma"),
-        (["--algo", "pg", "--params", "preset=tutorial"], "unknown option 'preset'"),
+        (["--algo", "reinforce", "--params", "gama=0.9"], "did you mean gamma"),
+        (["--algo", "reinforce", "--params", "preset=tutorial"], "unknown option 'preset'"),
         (["--params", "seed=3"], "seed is given by the benchmark"),
     ],
 )
@@ -165,7 +167,7 @@ def test_wrong_input_is_a_line(
         ("{variants: {a: {}}, seeds: 0}", "seeds is a number from 1"),
         ("variants: {../../a: {}}", "a variant's name is"),
         ("variants: {..: {}}", "a variant's name is"),
-        ("variants: {a: {algo: pg, value_epoch: 3}}", "s: a: .*did you mean value_epochs"),
+        ("variants: {a: {algo: reinforce, value_epoch: 3}}", "s: a: .*did you mean value_epochs"),
         ("variants: {a: {gamma: high}}", "s: a: gamma must be a number"),
     ],
 )
@@ -184,9 +186,7 @@ def test_options_that_stable_baselines3_does_not_know_are_refused_before_anythin
     assert cli.main(command) == 1
     assert "did you mean n_steps" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-    check_stable_baselines3(
-        make_variant("t", "a", {"algo": "ppo", "target_kl": None, "n_steps": 64})
-    )
+    check_package(make_variant("t", "a", {"algo": "ppo", "target_kl": None, "n_steps": 64}))
 
 
 def test_a_flag_of_train_leads_to_its_place_here(capsys: pytest.CaptureFixture[str]) -> None:
@@ -278,7 +278,7 @@ def complete(out: Path) -> list[str]:
 
 
 def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(trainings, "command", lambda job: pytest.fail("it is done"))
+    monkeypatch.setattr(trainings, "command", lambda *_: pytest.fail("it is done"))
     assert cli.main(complete(tmp_path)) == 0
     assert (tmp_path / "results.md").exists()
 
@@ -307,7 +307,7 @@ def test_a_training_that_outlived_its_benchmark_is_left_alone(tmp_path: Path) ->
     one = job(tmp_path)
     one.folder.mkdir()
     with run_folder.held(one.folder), pytest.raises(WorkbenchError, match="a training is running"):
-        Trainings(print).run([one], 1, Interrupt())
+        Trainings(print, PROGRAM).run([one], 1, Interrupt())
     assert one.folder.exists()
 
 
@@ -323,16 +323,16 @@ def test_a_damaged_record_costs_no_other_run_its_row(tmp_path: Path) -> None:
 
 def test_every_training_has_a_master_of_its_own(tmp_path: Path, monkeypatch) -> None:
     program = "import os; print(os.environ['ROS_MASTER_URI'])"
-    monkeypatch.setattr(trainings, "command", lambda job: [sys.executable, "-c", program])
+    monkeypatch.setattr(trainings, "command", lambda *_: [sys.executable, "-c", program])
     jobs = [job(tmp_path, seed) for seed in range(2)]
-    Trainings(lambda text: None).run(jobs, 2, Interrupt())
+    Trainings(lambda text: None, PROGRAM).run(jobs, 2, Interrupt())
     masters = {one.log.read_text().strip() for one in jobs}
     assert len(masters) == 2 and all(each.startswith("http://127.0.0.1:") for each in masters)
 
 
 def test_ctrl_c_as_a_training_ends_by_itself(tmp_path: Path, monkeypatch) -> None:
     """Its process number may belong to somebody else as soon as it was asked how it ended."""
-    running, interrupt, genuine = Trainings(lambda text: None), Interrupt(), os.waitid
+    running, interrupt, genuine = Trainings(lambda text: None, PROGRAM), Interrupt(), os.waitid
 
     def waited(*arguments: int) -> object:
         result = genuine(*arguments)
@@ -340,7 +340,7 @@ def test_ctrl_c_as_a_training_ends_by_itself(tmp_path: Path, monkeypatch) -> Non
         running._stop(interrupt)
         return result
 
-    monkeypatch.setattr(trainings, "command", lambda job: ["true"])
+    monkeypatch.setattr(trainings, "command", lambda *_: ["true"])
     monkeypatch.setattr(os, "waitid", waited)
     one, other = (job(tmp_path, seed) for seed in range(2))
     running.run([one, other], 1, interrupt)

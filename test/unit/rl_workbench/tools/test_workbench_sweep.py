@@ -12,7 +12,8 @@ from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.sweep.ranges import Range, read_ranges
 from rl_workbench.tools.sweep.sweep import Sweep, run_sweep
-from rl_workbench.tools.sweep.trainers import names_of
+from rl_workbench.training.algorithms import ALGORITHMS
+from rl_workbench.training.options.training_options import known_options
 from rl_workbench.training.run.interrupt import Interrupt
 
 pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.extras("optuna", "stable_baselines3")]
@@ -101,15 +102,17 @@ def test_a_damaged_study(tmp_path: Path) -> None:
 def test_wrong_ranges(tmp_path: Path, text: str, told: str) -> None:
     (tmp_path / "a.yaml").write_text(text)
     with pytest.raises(WorkbenchError, match=told):
-        read_ranges(tmp_path / "a.yaml", "dqn", "CartPole-v1", names_of("dqn"))
+        read_ranges(
+            tmp_path / "a.yaml", "dqn", "CartPole-v1", known_options(ALGORITHMS["dqn"]).names
+        )
 
 
 @pytest.mark.parametrize("algorithm", ["dqn", "ppo", "sac"])
 def test_the_packages_own_ranges(algorithm: str) -> None:
-    assert read_ranges(None, algorithm, "Any-v0", names_of(algorithm))
+    assert read_ranges(None, algorithm, "Any-v0", known_options(ALGORITHMS[algorithm]).names)
 
 
-@pytest.mark.parametrize("algorithm", ["dqn", "ppo"])
+@pytest.mark.parametrize("algorithm", ["dqn", "reinforce", "ppo"])
 def test_the_command_trains_and_its_best_options_can_be_used(
     tmp_path: Path, algorithm: str, capsys
 ) -> None:
@@ -117,7 +120,8 @@ def test_the_command_trains_and_its_best_options_can_be_used(
     ranges.write_text(
         "dqn: {gamma: {choices: [0.98, 0.99]}, eval_frequency: {choices: [200]}, "
         "confirm_episodes: {choices: [2]}}\n"
-        "ppo: {gamma: {choices: [0.98]}, n_steps: {choices: [64]}, eval_frequency: {choices: [64]}}"
+        "ppo: {gamma: {choices: [0.98]}, n_steps: {choices: [64]}, eval_frequency: {choices: [64]}}\n"
+        "reinforce: {gamma: {choices: [0.98]}, batch_episodes: {choices: [1, 2]}}"
     )
     flags = ["sweep", "--algo", algorithm, "--out", str(tmp_path / "study"), "--trials", "2",
              "--ranges", str(ranges), "--total-timesteps", "200"]  # fmt: skip
@@ -125,4 +129,4 @@ def test_the_command_trains_and_its_best_options_can_be_used(
     assert len(trials(tmp_path / "study")) == 2
     assert "its options are in" in capsys.readouterr().out
     best = yaml.safe_load((tmp_path / "study" / "best.yaml").read_text())
-    assert list(best) == ["CartPole-v1" if algorithm == "dqn" else "ppo CartPole-v1"]
+    assert list(best) == ["ppo CartPole-v1" if algorithm == "ppo" else "CartPole-v1"]

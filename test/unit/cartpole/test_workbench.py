@@ -1,0 +1,40 @@
+"""workbench.py: rl_workbench's command line, which knows the cart-pole and roslaunch's arguments."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import workbench_runs
+
+from cartpole.workbench import PROGRAM, main
+
+pytestmark = pytest.mark.usefixtures("signals")
+
+
+def test_the_cart_pole_is_known_and_roslaunchs_arguments_are_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot = {"env_id": "cartpole/Classic-v0", "total_timesteps": 100, "eval_frequency": 0}
+    run = workbench_runs.dqn(tmp_path / "run", **robot)
+    capsys.readouterr()
+    extra = ["__name:=workbench", "__log:=workbench.log"]
+    assert main(["eval", str(run), "--episodes=1", "--json=-", *extra]) == 0
+    assert len(json.loads(capsys.readouterr().out)["returns"]) == 1
+
+
+def test_errors_begin_with_the_name_it_was_called_by(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["/somewhere/workbench.py"])
+    assert main(["eval", str(tmp_path)]) == main(["train", f"--resume={tmp_path}"]) == 1
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.startswith("workbench.py: ") and second.startswith("workbench.py train: ")
+
+
+def test_its_trainings_in_processes_of_their_own_know_the_cart_pole(tmp_path: Path) -> None:
+    flags = ["--algo=dqn", "--env-id=cartpole/Classic-v0", "--total-timesteps=50",
+             "--eval-episodes=1", f"--run-dir={tmp_path / 'run'}"]  # fmt: skip
+    subprocess.run([*PROGRAM, "train", *flags], check=True, timeout=120)
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["complete"]

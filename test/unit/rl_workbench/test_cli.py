@@ -1,0 +1,105 @@
+"""The command line as a whole: who is asked, by which name, and what --help and wrong words come to."""
+
+import json
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+import workbench_runs
+from training_runs import SMALL, flags, summary
+
+from rl_workbench.cli import COMMANDS, PROGRAM, main
+
+pytestmark = pytest.mark.usefixtures("signals")
+
+SHORT = {"total_timesteps": 60, "eval_episodes": 1, "confirm_episodes": 0}
+
+
+def test_a_training_its_resumption_and_its_policy(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "run"
+    assert main(["train", "--algo=dqn", *flags(SMALL["dqn"] | SHORT), f"--run-dir={run}"]) == 0
+    assert summary(run)["steps"] == 60
+    assert main(["train", f"--resume={run}", "--total-timesteps=70"]) == 0
+    assert summary(run)["steps"] == 70
+    capsys.readouterr()
+    assert main(["eval", str(run), "--episodes=1", "--json=-"]) == 0
+    assert json.loads(capsys.readouterr().out)["run"] == str(run)
+
+
+@pytest.mark.parametrize("prog", ["rl-workbench", "workbench.py"])
+def test_errors_begin_with_the_commands_name(
+    tmp_path: Path, prog: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for arguments, name in (
+        (["eval", str(tmp_path)], prog),
+        (["train", f"--resume={tmp_path}"], f"{prog} train"),
+    ):
+        assert main(arguments, prog) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith(f"{name}: {tmp_path} is no run folder")
+
+
+def test_it_can_be_started_without_a_script() -> None:
+    for command in (["nonsense"], ["train", "--algo=dqm"]):
+        ended = subprocess.run(
+            [*PROGRAM, *command], capture_output=True, text=True, timeout=120, check=False
+        )
+        assert ended.returncode == 2 and "Traceback" not in ended.stderr
+        assert f"{' '.join(['rl-workbench', *command[:-1]])}: error: unknown " in ended.stderr
+
+
+def test_help_names_all_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--help"])
+    told = capsys.readouterr().out
+    assert ended.value.code == 0 and set(COMMANDS) == set(re.findall(r"^ {4}(\w+)", told, re.M))
+
+
+@pytest.mark.parametrize(
+    ("name", "flag", "resuming"),
+    [
+        ("dqn", "--dueling", "to the same bits"),
+        ("reinforce", "--gae-lambda", "to the same bits"),
+        ("reinforce-document", "--save-every", "to the same bits"),
+        ("ppo", "--clip-range", "a new episode and other random numbers"),
+        ("sac", "--ent-coef", "a new episode and other random numbers"),
+    ],
+)
+@pytest.mark.extras("stable_baselines3")
+def test_every_algorithm_shows_its_own_flags(
+    name: str, flag: str, resuming: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["train", "--algo", name, "--help"])
+    told = " ".join(capsys.readouterr().out.split())
+    assert ended.value.code == 0 and told.startswith("usage: rl-workbench train")
+    assert flag in told and resuming in told
+
+
+@pytest.mark.extras("stable_baselines3")
+def test_a_misspelt_flag_of_stable_baselines(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["train", "--algo=ppo", "--learning-rat=1"])
+    assert ended.value.code == 2 and "did you mean --learning-rate?" in capsys.readouterr().err
+
+
+@pytest.mark.extras("stable_baselines3")
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ("--seed=1", "--resume allows no --seed, only --total-timesteps"),
+        ("--gamma=0.9", "--resume allows no --gamma"),
+        ("--algo=sac", "is of a training by ppo, not by sac"),
+    ],
+)
+def test_what_cannot_be_changed_of_one_by_stable_baselines(
+    tmp_path: Path, given: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = workbench_runs.record(tmp_path / "run", [1.0], exp_name="ppo", total_timesteps=64)
+    content = json.loads((run / "config.json").read_text()) | {"algorithm": "ppo"}
+    (run / "config.json").write_text(json.dumps(content))
+    assert main(["train", f"--resume={run}", given]) == 1
+    assert told in capsys.readouterr().err
