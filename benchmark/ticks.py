@@ -21,7 +21,7 @@ from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import Robot
+from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 from ros_utils import ros_urdf
 
@@ -39,7 +39,7 @@ def make_world(urdf: str, controllers: Mapping[str, Mapping[str, object]]) -> Si
     if controllers:
         hardware = RobotHardware(read_description(urdf))
         manager = ControllerManager(hardware)
-        sim.add_robot(Robot(model, hardware, manager))
+        sim.add_robot(ControlledRobot(model, hardware, manager))
         for name, params in controllers.items():
             for output in manager.load(name, params).outputs:
                 output.sink = _drop

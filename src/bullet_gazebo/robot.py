@@ -11,7 +11,7 @@ NANOSECONDS = 1_000_000_000
 STRONGEST = 1e9  # [N m, N]; of a motor without a limit: the engine's solver wants a number
 
 
-class Robot:
+class ControlledRobot:
     """Reads joint states into handles and writes what controllers command, in place, once a tick."""
 
     def __init__(

@@ -11,7 +11,7 @@ from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.projection import place_link
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import Robot
+from bullet_gazebo.robot import ControlledRobot
 
 NANOSECONDS = 1_000_000_000
 IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()
@@ -43,7 +43,7 @@ class Simulator:
         self.max_update_rate = max_update_rate
         self.relatch = relatch
         self.now = 0  # [ns] of simulated time
-        self.robots: list[Robot] = []
+        self.robots: list[ControlledRobot] = []
         self.applied = AppliedForces()
         # Called with `now` before each physics step.
         self.listeners: list[Callable[[int], None]] = []
@@ -149,13 +149,13 @@ class Simulator:
             for robot in self.robots:
                 robot.read()
 
-    def add_robot(self, robot: Robot) -> None:
+    def add_robot(self, robot: ControlledRobot) -> None:
         """Puts a robot under control; the caller holds the lock."""
         # Its controllers may start before time moves on.
         robot.joints_moved(self.now, relatch=False)
         self.robots.append(robot)
 
-    def remove_robot(self, robot: Robot) -> None:
+    def remove_robot(self, robot: ControlledRobot) -> None:
         """Ends control of a robot; the caller holds the lock."""
         self.robots.remove(robot)
 

@@ -14,7 +14,7 @@ from bullet_gazebo.physics.engine import Engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import Robot
+from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
 PLANT = CartPole()
@@ -110,7 +110,7 @@ def control(sim: Simulator) -> tuple:
     model = sim.world.spawn("cartpole", parse_urdf(cartpole_urdf()), Pose())
     hardware = RobotHardware(read_description(cartpole_urdf()))
     manager = ControllerManager(hardware)
-    sim.add_robot(Robot(model, hardware, manager))
+    sim.add_robot(ControlledRobot(model, hardware, manager))
     manager.load("cart", CART)
     manager.switch(["cart"], [], STRICT)
     return manager, model

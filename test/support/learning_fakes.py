@@ -115,7 +115,7 @@ def learned_lengths(agent: PolicyGradientAgent | ReinforceAgent, episodes: int) 
     """Lets a policy gradient learn to hold the pole; returns how long it did, episode by episode."""
     env, lengths = gymnasium.make(POLE), []
     for _ in range(episodes):
-        episode = run_episode(env, agent, lambda: False)
+        episode = run_episode(env, agent.act, lambda: False)
         agent.learn(episode)
         lengths.append(episode.length)
     return lengths

@@ -23,7 +23,7 @@ from bullet_gazebo.physics.properties import (
     set_link_properties,
 )
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import Robot as ControlledRobot
+from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 from robot_envs.backends.backend import DEFAULT_ENGINE, PHYSICS_STEP, ticks_per_action
 from robot_envs.errors import RobotEnvError, SimulatorError

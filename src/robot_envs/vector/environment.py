@@ -12,7 +12,7 @@ from gymnasium.vector.utils import batch_space
 
 from robot_envs.backends.choice import IN_PROCESS
 from robot_envs.vector.process import WorkerProcess
-from robot_envs.vector.worker import Job, Maker
+from robot_envs.vector.worker import Maker, WorkerShare
 from robot_envs.vector.worlds import Env, Infos, Worlds, arrays_in, bytes_needed, check_resettable
 
 PAYS = 4  # environments that a worker must have to be worth its messages
@@ -66,7 +66,7 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self._worlds: Worlds | None = None
         self.closed = False
         jobs = [
-            Job(maker, num_envs, begin, end, mode.value)
+            WorkerShare(maker, num_envs, begin, end, mode.value)
             for begin, end in _bounds(num_envs, max(1, wanted))
         ]
         if wanted == 0:
@@ -81,7 +81,7 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self._memory = mmap.mmap(self._file, size)
         self._arrays = arrays_in(self._memory, probe, self.num_envs)
 
-    def _start(self, jobs: Sequence[Job]) -> None:
+    def _start(self, jobs: Sequence[WorkerShare]) -> None:
         try:
             for job in jobs:
                 self._workers.append(WorkerProcess(job, self._file))

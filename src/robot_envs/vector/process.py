@@ -11,7 +11,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from robot_envs.errors import SimulatorError
-from robot_envs.vector.worker import Job
+from robot_envs.vector.worker import WorkerShare
 
 ANSWER_TIMEOUT = 60.0  # [s] of wall time; a step takes far less than a millisecond a world
 END_TIMEOUT = 5.0  # [s]
@@ -26,7 +26,7 @@ class WorkerProcess:
         memory: file descriptor of the memory that holds the arrays.
     """
 
-    def __init__(self, job: Job, memory: int) -> None:
+    def __init__(self, job: WorkerShare, memory: int) -> None:
         self._job = job
         ours, theirs = socket.socketpair()
         for end in (ours, theirs):

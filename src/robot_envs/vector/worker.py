@@ -35,7 +35,7 @@ class Maker(NamedTuple):
         return make(**self.options)
 
 
-class Job(NamedTuple):
+class WorkerShare(NamedTuple):
     """What a worker has to know: its environments are `begin` to before `end`, of `total`."""
 
     maker: Maker
@@ -65,7 +65,7 @@ def main(argv: list[str]) -> None:
 
 
 def _serve(connection: Connection, memory: int) -> None:
-    job: Job = connection.recv()
+    job: WorkerShare = connection.recv()
     envs = job.envs()
     worlds = job.worlds(envs, mmap.mmap(memory, bytes_needed(envs[0], job.total)))
     connection.send(None)

@@ -11,7 +11,7 @@ from bullet_gazebo.control.manager import STRICT, ControllerManager
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import Robot
+from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
 SET_POINT = 0.05  # [m]
@@ -28,7 +28,7 @@ def simulated(engine, tick):
     model = sim.world.spawn("cartpole", parse_urdf(cartpole_urdf()), Pose())
     hardware = RobotHardware(read_description(cartpole_urdf()))
     manager = ControllerManager(hardware)
-    sim.add_robot(Robot(model, hardware, manager))
+    sim.add_robot(ControlledRobot(model, hardware, manager))
     manager.load("cart", CART)
     manager.switch(["cart"], [], STRICT)
     manager.get("cart").command(SET_POINT)

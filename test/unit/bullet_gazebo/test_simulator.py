@@ -13,7 +13,7 @@ from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import Robot
+from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import NotInLockstep, Simulator
 
 BOUND = 10.0  # [s]
@@ -25,7 +25,7 @@ STATES = {"type": "joint_state_controller/JointStateController", "publish_rate":
 def make_robot(sim):
     model = sim.world.spawn("cartpole", parse_urdf(cartpole_urdf()), Pose())
     hardware = RobotHardware(read_description(cartpole_urdf()))
-    robot = Robot(model, hardware, ControllerManager(hardware))
+    robot = ControlledRobot(model, hardware, ControllerManager(hardware))
     sim.add_robot(robot)
     robot.manager.load("states", STATES)
     robot.manager.load("cart", CART)

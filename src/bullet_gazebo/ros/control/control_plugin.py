@@ -11,7 +11,7 @@ from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import GAINS, RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
-from bullet_gazebo.robot import Robot
+from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.ros.control.controller_services import ControllerServices
 from bullet_gazebo.ros.control.pid_ports import PidPorts
 from bullet_gazebo.ros.plugins import PluginContext
@@ -33,7 +33,7 @@ class ControlPlugin:
         self._namespace = rospy.names.ns_join(rospy.get_namespace(), context.namespace)
         self._gone = threading.Event()
         self._lock = threading.Lock()
-        self._robot: Robot | None = None
+        self._robot: ControlledRobot | None = None
         self._services: ControllerServices | None = None
         self._pids: list[PidPorts] = []
         self._emergency_stop: rospy.Subscriber | None = None
@@ -97,7 +97,7 @@ class ControlPlugin:
         hardware = RobotHardware(description, gains if isinstance(gains, dict) else {})
         manager = ControllerManager(hardware)
         with self._sim.lock:
-            robot = Robot(
+            robot = ControlledRobot(
                 self._context.model, hardware, manager, self._control_period(), self._namespace
             )
         self._services = self._offer(manager)
@@ -127,7 +127,7 @@ class ControlPlugin:
             )  # fmt: skip
         return period
 
-    def _listen_to_emergency_stop(self, robot: Robot) -> None:
+    def _listen_to_emergency_stop(self, robot: ControlledRobot) -> None:
         """`<eStopTopic>` (docs/contract/gazebo_ros_control.md 6.7)."""
         topic = self._context.text("eStopTopic", "")
         if not topic:

@@ -11,7 +11,7 @@ from bullet_gazebo.control.errors import FAULTS, ControlError
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import RUNNING
 from bullet_gazebo.physics.model import Model
-from bullet_gazebo.robot import Robot
+from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.ros.wire.checks import LARGEST
 from bullet_gazebo.simulator import Simulator
 
@@ -167,7 +167,7 @@ def _command_port(controller: Controller) -> Input:
     raise ControlError(f"controller '{controller.name}' ({controller.type_name}) takes no numbers")
 
 
-def _check_free(robot: Robot, joint: JointHandle) -> None:
+def _check_free(robot: ControlledRobot, joint: JointHandle) -> None:
     for controller in robot.manager.loaded:
         if controller.state == RUNNING and joint.name in controller.claimed:
             raise ControlError(f"joint '{joint.name}' belongs to controller '{controller.name}'")

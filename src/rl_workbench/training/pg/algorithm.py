@@ -105,7 +105,7 @@ class PolicyGradientTraining(Algorithm):
         """See `Algorithm.learn`."""
         self._generators.mark()
         while not frame.is_over():
-            episode = run_episode(self.env, self._agent, frame.is_interrupted)
+            episode = run_episode(self.env, self._agent.act, frame.is_interrupted)
             if episode is None:
                 break
             losses = self._agent.learn(episode)

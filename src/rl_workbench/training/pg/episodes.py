@@ -3,7 +3,7 @@
 import json
 import random
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -12,18 +12,17 @@ import torch
 from rl_workbench.agents.pg.document import Episode
 
 
-class Actor(Protocol):
-    """Chooses actions."""
-
-    def act(self, observation: np.ndarray) -> int:
-        """Draws an action for an observation (D,)."""
-        ...
-
-
 def run_episode(
-    env: gymnasium.Env[Any, Any], actor: Actor, should_stop: Callable[[], bool]
+    env: gymnasium.Env[Any, Any],
+    act: Callable[[np.ndarray], int],
+    should_stop: Callable[[], bool],
 ) -> Episode | None:
     """Runs one episode.
+
+    Args:
+        env: was seeded before.
+        act: draws an action for an observation (D,), float32.
+        should_stop: is asked before each step.
 
     Returns:
         The episode, or None if it was broken off because `should_stop()` became true.
@@ -34,7 +33,7 @@ def run_episode(
     while not finished:
         if should_stop():
             return None
-        action = actor.act(observation)
+        action = act(observation)
         following, reward, terminated, truncated, _ = env.step(action)
         episode.add(observation, action, float(reward))
         observation = _vector(following)

@@ -20,7 +20,7 @@ WINDOW = 20  # [episodes] over which a mean length counts
 LAST = 100  # [episodes] over which the summary reports a mean return
 
 
-class Outcome(NamedTuple):
+class TrainingOutcome(NamedTuple):
     """A training at its end, whatever ended it."""
 
     options: TrainingOptions

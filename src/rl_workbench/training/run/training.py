@@ -17,7 +17,7 @@ from rl_workbench.training.run.checkpoints import Checkpoints, candidates, fitti
 from rl_workbench.training.run.evaluator import Evaluation, Evaluator
 from rl_workbench.training.run.history import History
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.outcome import WINDOW, Outcome
+from rl_workbench.training.run.outcome import WINDOW, TrainingOutcome
 from rl_workbench.training.run.progress import Progress, tell
 from rl_workbench.training.run.random_states import random_states, restore_random_states, seed_all
 from rl_workbench.training.run.scalar_log import ScalarLog
@@ -292,7 +292,7 @@ class Training:
 
     def _finish(self, failure: WorkbenchError | None) -> None:
         """Draws and tells; then passes a failure on, unless the user had stopped anyway."""
-        outcome = Outcome(
+        outcome = TrainingOutcome(
             self._options, self.folder, self._history, self._algorithm.steps, self._is_complete(),
             self._interrupt.requested(), self._evaluation,
         )  # fmt: skip

@@ -14,7 +14,7 @@ from bullet_gazebo.control.manager import STRICT, ControllerManager
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import Robot
+from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
 WEIGHT = 2.0 * 9.8  # [N] of the lift
@@ -44,7 +44,7 @@ class Lift:
         self.model = self.sim.world.spawn("lift", parse_urdf(text), Pose())
         hardware = RobotHardware(read_description(text), gains)
         self.manager = ControllerManager(hardware)
-        self.robot = Robot(self.model, hardware, self.manager, period)
+        self.robot = ControlledRobot(self.model, hardware, self.manager, period)
         self.sim.add_robot(self.robot)
         self.joint = hardware.joints["rail"]
         if controller:

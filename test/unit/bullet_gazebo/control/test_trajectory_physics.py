@@ -12,7 +12,7 @@ from bullet_gazebo.control.trajectory.tolerances import Tolerance
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import Robot
+from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
 S = 1_000_000_000  # [ns]
@@ -75,7 +75,7 @@ def start(sim, interface):
     text = arm(interface)
     model = sim.world.spawn("arm", parse_urdf(text), Pose())
     hardware = RobotHardware(read_description(text))
-    robot = Robot(model, hardware, ControllerManager(hardware))
+    robot = ControlledRobot(model, hardware, ControllerManager(hardware))
     sim.add_robot(robot)
     kind = f"{interface.lower()}_controllers/JointTrajectoryController"
     params = {"type": kind, "joints": list(JOINTS), "constraints": {"goal_time": 0.5}}

@@ -8,7 +8,7 @@ from bullet_gazebo.control.manager import STRICT, ControllerManager
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
-from bullet_gazebo.robot import Robot
+from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
 
@@ -64,7 +64,7 @@ class Bench:
         self.model = self.sim.world.spawn("robot", parse_urdf(text), pose)
         self.hardware = RobotHardware(read_description(text), gains)
         manager = ControllerManager(self.hardware)
-        self.sim.add_robot(Robot(self.model, self.hardware, manager))
+        self.sim.add_robot(ControlledRobot(self.model, self.hardware, manager))
         self.group = manager.load("group", {"type": kind, "joints": joints})
         manager.switch(["group"], [], STRICT)
 

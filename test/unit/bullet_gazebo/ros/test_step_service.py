@@ -17,7 +17,7 @@ from bullet_gazebo.physics.engines.registry import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.robot import Robot
+from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.ros.services.step_service import StepService
 from bullet_gazebo.simulator import Simulator
 
@@ -42,7 +42,7 @@ class Slides:
     def add(self, name, *controllers):
         model = self.sim.world.spawn(name, parse_urdf(self._urdf), Pose())
         hardware = RobotHardware(read_description(self._urdf))
-        robot = Robot(model, hardware, ControllerManager(hardware), namespace=f"/{name}")
+        robot = ControlledRobot(model, hardware, ControllerManager(hardware), namespace=f"/{name}")
         self.sim.add_robot(robot)
         for controller in controllers:
             robot.manager.load(controller, self._params[controller])
