@@ -188,8 +188,7 @@ def load_policy(
     The checkpoint holds plain tensors, and the model is made anew from the recorded options: so a
     foreign file can't run code, as it could in Stable-Baselines3's own zip.
     """
-    model = make_model(options, for_acting=True)
-    model.get_env().close()
+    model = make_model(options, acts_in=env)
     model.policy.load_state_dict(content["policy"])
     preference, meaning = _preference(model, options.kind.name, env.action_space)
     return Policy(

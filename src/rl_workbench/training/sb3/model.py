@@ -44,11 +44,12 @@ def check_fit(algorithm: str, env_id: str, space: gymnasium.Space[Any]) -> None:
     raise WorkbenchError(f"{algorithm} can't choose from {space}, the actions of {env_id}; {hint}")
 
 
-def make_model(options: TrainingOptions, for_acting: bool = False) -> Any:
+def make_model(options: TrainingOptions, acts_in: gymnasium.Env[Any, Any] | None = None) -> Any:
     """A new model with its environments; the caller closes `model.get_env()`.
 
     Args:
-        for_acting: with one environment, and no room to learn.
+        acts_in: for a model that only acts: the environment, instead of those that it learned in,
+            which may have been a simulator's; then the model has no room to learn.
 
     Raises:
         WorkbenchError: if the environment can't be made, the algorithm doesn't fit it, or an
@@ -58,11 +59,14 @@ def make_model(options: TrainingOptions, for_acting: bool = False) -> Any:
 
     name, run, settings = options.kind.name, options.run, options.hyperparameters
     own = settings.own
-    if for_acting and name in ON_POLICY:  # of one environment as many steps as of all
-        own["n_steps"] *= settings.n_envs
-    elif for_acting:
-        own["buffer_size"] = 1  # nothing is learned, so nothing is kept
-    vector = DummyVecEnv([_maker(options)] * (1 if for_acting else settings.n_envs))
+    if acts_in is None:
+        vector = DummyVecEnv([_maker(options)] * settings.n_envs)
+    else:
+        vector = DummyVecEnv([lambda: acts_in])
+        if name in ON_POLICY:  # of one environment as many steps as of all
+            own["n_steps"] *= settings.n_envs
+        else:
+            own["buffer_size"] = 1  # nothing is learned, so nothing is kept
     try:
         check_fit(name, run.env_id, vector.action_space)
         torch.empty(0, device=run.device)  # where there is none, the model would take the CPU
@@ -75,10 +79,12 @@ def make_model(options: TrainingOptions, for_acting: bool = False) -> Any:
             **_translated(settings, own, vector.action_space),
         )
     except WorkbenchError:
-        vector.close()
+        if acts_in is None:
+            vector.close()
         raise
     except (TypeError, ValueError, AssertionError, RuntimeError, ArithmeticError) as error:
-        vector.close()
+        if acts_in is None:
+            vector.close()
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise WorkbenchError(f"{name} can't be made: {text}") from error
 
