@@ -7,6 +7,7 @@ from typing import Any
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import check_options, option
+from rl_workbench.training.options.record import is_plain
 
 CLASSES = {"ppo": "PPO", "a2c": "A2C", "sac": "SAC", "td3": "TD3", "ddpg": "DDPG", "dqn-sb3": "DQN"}
 ON_POLICY = ("ppo", "a2c")
@@ -37,7 +38,7 @@ class SB3Options:
     """What we add to an algorithm's own options.
 
     Raises:
-        WorkbenchError: if a value is beyond its limits.
+        WorkbenchError: if a value is beyond its limits, or none that a record can hold.
     """
 
     n_envs: int = option(1, "environments that are stepped in turn", 1, 1024)
@@ -47,6 +48,9 @@ class SB3Options:
 
     def __post_init__(self) -> None:
         check_options(self)
+        for name, value in self.own.items():
+            if not is_plain(value):
+                raise WorkbenchError(f"{name} has a value that no file can hold: {value!r}")
         for name, (lowest, highest) in LIMITS.items():
             value = getattr(self, name, lowest)
             if not _lies_within(value, lowest, highest):
