@@ -16,6 +16,9 @@ SEVERAL = "PPO or A2C"
 LARGEST = float(np.finfo(np.float32).max)  # networks and replay know no larger number
 # What constructors raise about options that they don't like.
 _REFUSED = (gymnasium.error.Error, ImportError, TypeError, ValueError, LookupError, AssertionError)
+# What running ones raise that can't go on: Gymnasium's own, and those of devices and connections, which
+# the frame would take for its disk's.
+_FAILED = (gymnasium.error.Error, OSError)
 
 
 def make_environment(
@@ -65,8 +68,8 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         """
         try:
             observation, info = self.env.reset(seed=seed, options=options)
-        except gymnasium.error.Error as error:
-            raise WorkbenchError(str(error)) from error
+        except _FAILED as error:
+            raise self._failed(error) from error
         self._check(observation)
         return observation, info
 
@@ -79,12 +82,20 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         """
         try:
             observation, reward, terminated, truncated, info = self.env.step(action)
-        except gymnasium.error.Error as error:
-            raise WorkbenchError(str(error)) from error
+        except _FAILED as error:
+            raise self._failed(error) from error
         self._check(observation)
-        if not abs(float(reward)) <= LARGEST:  # so that NaN is refused too
+        try:
+            size = abs(float(reward))
+        except (TypeError, ValueError) as error:
+            raise WorkbenchError(f"the reward of {self._id} isn't a number: {reward!r}") from error
+        if not size <= LARGEST:  # so that NaN is refused too
             raise self._error("reward", reward)
         return observation, reward, terminated, truncated, info
+
+    def _failed(self, error: Exception) -> WorkbenchError:
+        text = str(error) or type(error).__name__
+        return WorkbenchError(f"{self._id} failed: {text}" if isinstance(error, OSError) else text)
 
     def _check(self, observation: np.ndarray) -> None:
         if not np.abs(observation).max(initial=0) <= LARGEST:
