@@ -21,6 +21,7 @@ from rl_workbench.training.run.scalar_log import NAME as SCALARS
 SUMMARY = "summary.json"
 RETURN, EVALUATION = "charts/episodic_return", "eval/mean_reward"  # tags
 CONFIRMED = "eval/confirmed_reward"  # of a policy that became the best one
+RECORDED = {"env_id": str, "env_kwargs": dict, "exp_name": str, "seed": int}
 _NOT_THERE = (FileNotFoundError, NotADirectoryError)
 
 
@@ -69,12 +70,18 @@ def open_run(folder: Path) -> Run:
         raise WorkbenchError(f"{folder} is no run folder: it has no {CONFIG_RECORD}")
     try:
         return _with_config(folder, config)
-    except (KeyError, TypeError, AttributeError) as error:
+    except KeyError as error:
         raise WorkbenchError(f"{folder} is no run folder: its record lacks {error}") from error
+    except TypeError as error:
+        text = f"its record is damaged: {error}"
+        raise WorkbenchError(f"{folder} is no run folder: {text}") from error
 
 
 def _with_config(folder: Path, config: dict[str, Any]) -> Run:
     run = config["run"]
+    for name, kind in RECORDED.items():
+        if not isinstance(run[name], kind) or isinstance(run[name], bool):
+            raise TypeError(f"{name} is {run[name]!r}")
     # Those of its evaluations, without what was its training's alone; older records have neither.
     env_kwargs = {**run["env_kwargs"], **run.get("eval_env_kwargs", {})}
     return Run(
@@ -104,9 +111,16 @@ def summary_of(run: Run) -> dict[str, Any]:
     """What a run wrote at its end; empty as long as it hasn't.
 
     Raises:
-        WorkbenchError: if it can't be read.
+        WorkbenchError: if it can't be read, or is something else.
     """
-    return _read_json(run.folder / SUMMARY) or {}
+    path = run.folder / SUMMARY
+    content = _read_json(path)
+    if content is None:
+        return {}
+    returns = content.get("returns", []) if isinstance(content, dict) else None
+    if not isinstance(returns, list) or not all(isinstance(each, int | float) for each in returns):
+        raise WorkbenchError(f"{path} isn't the summary of a training")
+    return dict(content)
 
 
 def cost_file(folder: Path) -> Path:

@@ -57,7 +57,8 @@ def _flat(record: Any, origin: str) -> dict[str, Any]:
     if "algorithm" not in found or not all(isinstance(each, dict) for each in parts):
         raise WorkbenchError(f"{origin} isn't a training of this version")
     plain = json.loads(json.dumps(record))
-    return {"algorithm": plain["algorithm"], **plain["run"], **plain["hyperparameters"]}
+    # What both have is the run's, so somebody who edits config.json has to do so once.
+    return {"algorithm": plain["algorithm"], **plain["hyperparameters"], **plain["run"]}
 
 
 def known_options(kind: AlgorithmKind) -> Options:

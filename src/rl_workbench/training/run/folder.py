@@ -8,7 +8,7 @@ import re
 import shlex
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -109,12 +109,14 @@ def _fresh(wanted: Path) -> Path:
             folder, number = wanted.with_name(f"{wanted.name}_{number}"), number + 1
 
 
-def other_versions(before: Mapping[str, str]) -> str:
+def other_versions(before: Any) -> str:
     """Where those that a training began with aren't those of now; empty if they are the same.
 
     Args:
-        before: what `versions` gave then.
+        before: what `versions` gave then; no training depends on it, so it may be damaged.
     """
+    if not isinstance(before, dict):
+        return ""
     now = versions()
     names = [name for name in LIBRARIES if name in before and before[name] != now.get(name)]
     return ", ".join(f"{name} {before[name]} is now {now.get(name)}" for name in names)

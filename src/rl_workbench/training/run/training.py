@@ -138,7 +138,7 @@ class Training:
             tell(f"{about}: {self.folder}")
             self._save()  # so that there is something to go on from, whatever happens
             return
-        others = run_folder.other_versions(read_record(self.folder).get("versions", {}))
+        others = run_folder.other_versions(read_record(self.folder).get("versions"))
         if others:
             tell(f"{others}: from here on it may come to other bits")
         with fitting("state of the environment"):
