@@ -12,7 +12,7 @@ from cartpole.ros_options import ros_options
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import check_options, option
 from rl_workbench.training.cli import choose_training, train
-from rl_workbench.training.options.command_line import flag
+from rl_workbench.training.options.command_line import USAGE, flag
 from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.interrupt import Interrupt
@@ -34,10 +34,10 @@ class RobotOptions:
         WorkbenchError: if a value is beyond its limits.
     """
 
-    backend: str = option(
-        "", "ros: the robot in a simulator over ROS, which is started if none runs; bullet: in this "
+    backend: str | None = option(
+        None, "ros: the robot in a simulator over ROS, which is started if none runs; bullet: in this "
         "process, with the same bits, several times as fast; ros where ROS is installed",
-        choices=("", "ros", "bullet"),
+        choices=("ros", "bullet"),
     )  # fmt: skip
     realtime: bool = option(False, "let the world run by itself, as the existing script does")
     start_noise: float = option(
@@ -111,7 +111,7 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOption
     """
     parser = argparse.ArgumentParser(
         PROG,
-        usage=f"{PROG} [--help] [--OPTION VALUE ...]",
+        usage=USAGE.format(prog=PROG),
         add_help=False,
         allow_abbrev=False,
         argument_default=argparse.SUPPRESS,
@@ -147,9 +147,10 @@ def _joined(
                 f"{flag(robots[0])} is of the robot: not with --env-id {run.env_id}"
             )
         return options
-    return options._replace(
-        run=replace(run, train_env_kwargs=run.train_env_kwargs | robot.environment)
-    )
+    environment = robot.environment
+    if "backend" in run.training_environment and not (robot.backend or robot.realtime):
+        del environment["backend"]  # it is what those get who name none
+    return options._replace(run=replace(run, train_env_kwargs=run.train_env_kwargs | environment))
 
 
 @contextlib.contextmanager

@@ -41,5 +41,5 @@ def check_options(instance: Any) -> None:
             raise WorkbenchError(
                 f"{each.name} lies between {limits[0]:g} and {limits[1]:g}, not {value!r}"
             )
-        if choices and value not in choices:
+        if choices and value is not None and value not in choices:
             raise WorkbenchError(f"{each.name} is one of {', '.join(choices)}, not {value!r}")

@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm, recorded_kind
+from rl_workbench.training.options.command_line import USAGE, check_flag
 from rl_workbench.training.options.kind import AlgorithmKind
 from rl_workbench.training.options.training_options import TrainingOptions, choose
 from rl_workbench.training.run import folder as run_folder
@@ -59,6 +60,7 @@ def choose_training(
 def _parser(prog: str) -> argparse.ArgumentParser:
     result = argparse.ArgumentParser(
         prog,
+        usage=USAGE.format(prog=prog),
         description="Trains an agent.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -82,6 +84,8 @@ def _without_algorithm(parser: argparse.ArgumentParser, rest: list[str]) -> NoRe
     if "-h" in rest or "--help" in rest:
         parser.print_help()
         parser.exit()
+    for given in rest:
+        check_flag(parser, given.partition("=")[0])
     parser.error(f"--algo is missing, one of {', '.join(ALGORITHMS)}")
 
 

@@ -7,12 +7,15 @@ from typing import Any
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.kind import AlgorithmKind
-from rl_workbench.training.options.options import Options, key_values, unknown
+from rl_workbench.training.options.options import (
+    RENAMED,
+    Options,
+    key_values,
+    unknown,
+    unknown_option,
+)
 
-RENAMED = {  # flags that earlier versions had
-    "--algorithm": "--algo",
-    "--stop-at": "--stop-at-length",
-}
+USAGE = "{prog} [--help] [--OPTION VALUE ...]"
 DESCRIPTION = """\
 Trains {about}.
 
@@ -25,6 +28,17 @@ Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
 def flag(name: str) -> str:
     """An option's flag."""
     return f"--{name.replace('_', '-')}"
+
+
+def check_flag(parser: argparse.ArgumentParser, given: str) -> None:
+    """Tells the name of today of a flag that earlier versions had.
+
+    Raises:
+        SystemExit: if it is one.
+    """
+    for old, new in RENAMED.items():
+        if given == flag(old):
+            parser.error(f"{given} is called {flag(new)} now")
 
 
 class CommandLine:
@@ -51,7 +65,7 @@ class CommandLine:
         is_node = prog.endswith(".py")
         self.parser = argparse.ArgumentParser(
             prog,
-            usage=f"{prog} [--help] [--OPTION VALUE ...]",
+            usage=USAGE.format(prog=prog),
             description=DESCRIPTION.format(
                 about=kind.about,
                 config=kind.config,
@@ -85,7 +99,7 @@ class CommandLine:
         known = [*self._special, *self._options.names]
         for name in parameters:
             if name not in known:
-                raise WorkbenchError(f"rosparam: {unknown('parameter', name, known)}")
+                raise WorkbenchError(f"rosparam: {unknown_option(name, known, 'parameter')}")
         special = {name: str(parameters[name]) for name in self._special if parameters.get(name)}
         own = {name: value for name, value in parameters.items() if name not in self._special}
         pairs = [*shlex.split(special.pop("params", "")), *from_flags.pop("params", [])]
@@ -97,8 +111,7 @@ class CommandLine:
         known, strange = self.parser.parse_known_args(flags)
         if strange:
             given = strange[0].partition("=")[0]
-            if given in RENAMED:
-                self.parser.error(f"{given} is called {RENAMED[given]} now")
+            check_flag(self.parser, given)
             names = [flag(name) for name in (*self._special, *self._options.names)]
             self.parser.error(unknown("flag", given, names))
         return vars(known)

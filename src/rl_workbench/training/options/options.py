@@ -11,6 +11,8 @@ import yaml
 
 from rl_workbench.errors import WorkbenchError
 
+RENAMED = {"algorithm": "algo", "stop_at": "stop_at_length"}  # options that earlier versions had
+
 
 class Options:
     """The fields of one or more dataclasses, by name.
@@ -44,7 +46,7 @@ class Options:
         result = {}
         for name, value in values.items():
             if name not in self._fields:
-                raise WorkbenchError(f"{origin}: {unknown('option', str(name), self.names)}")
+                raise WorkbenchError(f"{origin}: {unknown_option(str(name), self.names)}")
             if value is None or value == "":
                 continue
             try:
@@ -102,6 +104,13 @@ def unknown(kind: str, name: str, known: list[str]) -> str:
     near = get_close_matches(name, known, 1)
     hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
     return f"unknown {kind} {name!r}; {hint}"
+
+
+def unknown_option(name: str, known: list[str], kind: str = "option") -> str:
+    """The same for an option's name; one of an earlier version is told by that of today."""
+    if name in RENAMED:
+        return f"the {kind} {name} is called {RENAMED[name]} now"
+    return unknown(kind, name, known)
 
 
 def key_values(texts: list[str], origin: str) -> dict[str, str]:
