@@ -29,7 +29,7 @@ from rl_workbench.training.options.options import key_values
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.files import as_json, as_text, write_file
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import warn
+from rl_workbench.training.run.progress import tell, warn
 
 RECORD = "suite.json"
 
@@ -84,16 +84,12 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     ]
     with run_folder.held(folder):
         interrupt.defer()
-        Trainings(_tell, arguments.program).run(jobs, arguments.jobs, interrupt)
+        Trainings(tell, arguments.program).run(jobs, arguments.jobs, interrupt)
         if interrupt.requested():
-            _tell("interrupted; the same command goes on")
+            tell("interrupted; the same command goes on")
             return
         interrupt.at_once()  # what follows takes minutes, and can be made again
         _report(folder, suite, jobs, arguments)
-
-
-def _tell(text: str) -> None:
-    print(text, flush=True)
 
 
 def _suite(arguments: argparse.Namespace) -> Suite:
@@ -152,7 +148,7 @@ def _report(folder: Path, suite: Suite, jobs: list[Job], arguments: argparse.Nam
             warn(f"no {name}: {error}")
         else:
             write_figure(folder / name, figure)
-    _tell(f"{every}\n\n{summary}\n\ntables, figures and curves lie in {folder}")
+    tell(f"{every}\n\n{summary}\n\ntables, figures and curves lie in {folder}")
 
 
 def _examine(jobs: list[Job], episodes: int) -> tuple[list[Run], list[RunResult]]:

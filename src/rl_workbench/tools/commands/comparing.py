@@ -12,7 +12,7 @@ from rl_workbench.tools.runs.policies import WHICH
 from rl_workbench.tools.runs.runs import find_runs
 from rl_workbench.training.run.files import as_json, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import warn
+from rl_workbench.training.run.progress import tell, warn
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
@@ -45,8 +45,8 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     ]
     results.sort(key=lambda result: (result.group, result.seed, result.run))
     groups = tables.grouped(results)
-    print(tables.table(results, tables.COMPARE), end="\n\n")
-    print(tables.summary_table(groups, tables.COMPARE_SUMMARY), flush=True)
+    tell(tables.table(results, tables.COMPARE) + "\n")
+    tell(tables.summary_table(groups, tables.COMPARE_SUMMARY))
     if arguments.json:
         write_file(arguments.json, as_json(_content(arguments, groups)))
     if arguments.out:

@@ -12,7 +12,7 @@ from rl_workbench.tools.runs.policies import load_learned
 from rl_workbench.tools.runs.runs import find_runs, open_run
 from rl_workbench.training.run.files import check_writable
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import warn
+from rl_workbench.training.run.progress import tell, warn
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         write_figure(arguments.out, training_curves(panels, across))
     else:
         _policy(arguments)
-    print(arguments.out)
+    tell(str(arguments.out))
 
 
 def _policy(arguments: argparse.Namespace) -> None:

@@ -15,6 +15,7 @@ from rl_workbench.tools.runs.policies import LearnedPolicy, load_learned
 from rl_workbench.tools.runs.runs import Run, open_run, threshold
 from rl_workbench.training.run.files import as_json, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.progress import tell
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")  # any of them names one
 
@@ -71,10 +72,10 @@ def _eval(arguments: argparse.Namespace, run: Run) -> None:
     found = {"run": str(run.folder), **episodes.statistics(result, policy.checkpoint, line)}
     # With the figures on standard output, what people read goes beside it.
     stream = sys.stderr if to_stdout else sys.stdout
-    print(episodes.lines(result), file=stream)
-    print(episodes.summary(found, line), file=stream)
+    tell(episodes.lines(result), stream)
+    tell(episodes.summary(found, line), stream)
     if to_stdout:
-        print(json.dumps(found, indent=1))
+        tell(json.dumps(found, indent=1))
     elif arguments.json:
         write_file(arguments.json, as_json(found))
 
@@ -87,7 +88,7 @@ def _enjoy(arguments: argparse.Namespace, run: Run) -> None:
         )
     policy = _policy(arguments, run, render_mode="human")
     try:
-        print(episodes.lines(episodes.play(policy, arguments.episodes, arguments.seed)))
+        tell(episodes.lines(episodes.play(policy, arguments.episodes, arguments.seed)))
     finally:
         policy.env.close()
 
@@ -105,7 +106,7 @@ def _record(arguments: argparse.Namespace, run: Run) -> None:
     finally:
         policy.env.close()
     videos.write_video(arguments.out, video, arguments.scale)
-    print(
+    tell(
         f"{arguments.out}: return {video.total_reward:.2f} in {video.length} steps, "
         f"{len(video.frames)} frames, {len(video.frames) / video.rate:.1f} s"
     )

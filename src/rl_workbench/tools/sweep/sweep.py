@@ -18,6 +18,7 @@ from rl_workbench.extras import need
 from rl_workbench.tools.sweep.ranges import Range
 from rl_workbench.training.run.files import as_json, as_text, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.progress import tell
 
 STUDY, NAME = "study.db", "sweep"
 
@@ -55,7 +56,7 @@ def run_sweep(sweep: Sweep, train: Trainer, interrupt: Interrupt) -> None:
     check_writable(sweep.folder / STUDY)
     study = _open(sweep, optuna)
     done = len(_complete(study, optuna))
-    print(f"{done} of {sweep.trials} trials are done: {sweep.folder}", flush=True)
+    tell(f"{done} of {sweep.trials} trials are done: {sweep.folder}")
     for _ in range(sweep.trials - done):
         if interrupt.requested():
             break
@@ -99,12 +100,12 @@ def _run_trial(sweep: Sweep, study: Any, train: Trainer, interrupt: Interrupt) -
         score = _score(sweep, trial.number, values, train, interrupt)
     except WorkbenchError as error:
         trial.set_user_attr("failure", str(error))
-        print(f"trial {trial.number} failed: {error}", flush=True)
+        tell(f"trial {trial.number} failed: {error}")
     finally:
         state = TrialState.FAIL if score is None else TrialState.COMPLETE
         study.tell(trial, score, state=state)
     if score is not None:
-        print(f"trial {trial.number}: {score:.2f} with {values}", flush=True)
+        tell(f"trial {trial.number}: {score:.2f} with {values}")
 
 
 def _score(
@@ -133,9 +134,11 @@ def _write_results(sweep: Sweep, study: Any, optuna: Any) -> None:
     ]
     write_file(sweep.folder / "trials.json", as_json(rows))
     if not _complete(study, optuna):
-        print("no trial came to its end", flush=True)
+        tell("no trial came to its end")
         return
     best = yaml.safe_dump({sweep.section: study.best_params})
     write_file(sweep.folder / "best.yaml", as_text(best))
-    print(f"best: trial {study.best_trial.number}, {study.best_value:.2f}; its options are in "
-          f"{sweep.folder / 'best.yaml'}", flush=True)  # fmt: skip
+    tell(
+        f"best: trial {study.best_trial.number}, {study.best_value:.2f}; its options are in "
+        f"{sweep.folder / 'best.yaml'}"
+    )
