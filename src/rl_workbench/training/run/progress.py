@@ -1,6 +1,7 @@
 """What the user sees while training: a bar on a terminal, and a line every 20 episodes."""
 
 import contextlib
+import io
 import os
 import sys
 import time
@@ -58,7 +59,7 @@ class Progress:
     """
 
     def __init__(self, total: int, unit: str, done: int, stream: TextIO | None = None) -> None:
-        self._stream = stream or sys.stderr
+        self._stream = stream or sys.stderr or io.StringIO()  # it may have been closed by 2>&-
         self._counts_steps = unit == "step"
         self._done = self._shown = done
         self._time = time.monotonic()
