@@ -1,0 +1,47 @@
+"""Policies of Stable-Baselines3 away from where they learned; options that no record could hold."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from training_runs import options_of, record
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.algorithms import recorded_options
+from rl_workbench.training.run.checkpoints import read
+from rl_workbench.training.run.environments import make_environment
+from rl_workbench.training.run.policy import load_policy
+
+pytestmark = pytest.mark.extras("stable_baselines3")
+
+
+@pytest.mark.parametrize("name", ["ppo", "sac"])
+def test_a_policy_needs_no_environment_of_its_training(
+    whole: Callable[[str], Path], name: str
+) -> None:
+    """It may have been a robot over ROS: nobody wants a simulator for a picture of the policy."""
+    content = read(whole(name) / "last.pt")
+    content["config"]["run"]["train_env_kwargs"] = {"nobody": "knows this one"}
+    options = recorded_options(content["config"], "last.pt")
+    env = make_environment(options.run.env_id, options.run.env_kwargs)
+    policy = load_policy(options, content, env, "last.pt")
+    observation, _ = env.reset(seed=0)
+    assert env.action_space.contains(policy.act(np.asarray(observation, np.float32)))
+    env.step(policy.act(np.asarray(observation, np.float32)))  # it is still open
+    env.close()
+
+
+@pytest.mark.parametrize("value", [float("inf"), float("nan")])
+def test_numbers_that_no_record_can_hold(value: float) -> None:
+    with pytest.raises(WorkbenchError, match="^target_kl has a value that no file can hold: "):
+        options_of("ppo", {"target_kl": value})
+
+
+def test_a_date_is_none_either() -> None:
+    with pytest.raises(WorkbenchError, match="^sde_sample_freq has a value that no file can hold"):
+        options_of("ppo", {"sde_sample_freq": "2020-01-01"})
+
+
+def test_all_defaults_can_be_held(whole: Callable[[str], Path]) -> None:
+    assert record(whole("sac"))["hyperparameters"]["target_entropy"] == "auto"
