@@ -171,7 +171,7 @@ def dying(monkeypatch: pytest.MonkeyPatch, after: int) -> None:
 def test_a_simulator_that_dies_costs_nothing_that_was_saved(
     tmp_path: Path, monkeypatch, name: str
 ) -> None:
-    options = ON_A_ROBOT | {"eval_frequency": 0}
+    options = ON_A_ROBOT | {"eval_frequency": 0, "checkpoint_frequency": 70 * (name == "dqn")}
     whole = train(tmp_path / "whole", name, **options)
     with monkeypatch.context() as patched:
         dying(patched, 100)

@@ -1,5 +1,6 @@
 """Run folders: new each time, one training in each, nothing left of one that never began."""
 
+import fcntl
 import multiprocessing
 import os
 from pathlib import Path
@@ -70,6 +71,24 @@ def test_one_that_is_in_use(tmp_path: Path) -> None:
         pass
     with pytest.raises(WorkbenchError, match="is no run folder"), held(tmp_path / "none"):
         pass
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_one_that_its_last_holder_removes_meanwhile(
+    tmp_path: Path, monkeypatch, again: bool
+) -> None:
+    def removed(descriptor: int, how: int) -> None:
+        (tmp_path / "run").rmdir()
+        if again:  # somebody else's
+            (tmp_path / "run").mkdir()
+        lock(descriptor, how)
+
+    lock = fcntl.flock
+    monkeypatch.setattr(fcntl, "flock", removed)
+    (tmp_path / "run").mkdir()
+    with pytest.raises(WorkbenchError, match="removed just now"), held(tmp_path / "run"):
+        pass
+    assert (tmp_path / "run").exists() == again
 
 
 def race(barriers: list, folder: Path, index: int, results: multiprocessing.Queue) -> None:

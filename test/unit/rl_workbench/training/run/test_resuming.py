@@ -23,6 +23,7 @@ from training_runs import (
 )
 
 from rl_workbench.training.run import checkpoints as run_checkpoints
+from rl_workbench.training.run.checkpoints import Checkpoints
 from rl_workbench.training.run.environments import CheckedEnvironment
 
 
@@ -151,6 +152,7 @@ def test_there_is_something_to_resume_from_the_first_moment_on(
         patched.setattr(CheckedEnvironment, "step", killed)
         with pytest.raises(Killed):
             train(tmp_path / "run", name)
+    assert checkpoint(tmp_path / "run")["steps"] == 0
     assert_same_run(whole(name), resume(tmp_path / "run"))
 
 
@@ -159,18 +161,22 @@ def test_killed_between_the_names_of_a_best_checkpoint(
     whole, tmp_path: Path, monkeypatch, name: str
 ) -> None:
     """Resumed, the training comes to the same best checkpoint."""
-    genuine = run_checkpoints._name
+    give_name, save, bests = run_checkpoints._name, Checkpoints.save, [False]
+
+    def saved(writer: Checkpoints, step: int, content: dict, best: bool = False) -> None:
+        bests.append(best)
+        save(writer, step, content, best)
 
     def killed(path: Path, to: Path) -> None:
-        genuine(path, to)
-        if to.name == "best.pt":
+        give_name(path, to)
+        if bests[-1]:
             raise Killed
 
     with monkeypatch.context() as patched:
+        patched.setattr(Checkpoints, "save", saved)
         patched.setattr(run_checkpoints, "_name", killed)
         with pytest.raises(Killed):
             train(tmp_path / "run", name)
-    assert (tmp_path / "run" / "best.pt").exists()
     assert_same_run(whole(name), resume(tmp_path / "run"))
 
 

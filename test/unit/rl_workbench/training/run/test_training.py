@@ -225,6 +225,8 @@ def test_the_mean_length_of_20_episodes_ends_it(tmp_path: Path, name: str) -> No
     assert result["complete"]
     assert 20 < result["episodes"] == 20 + means.index(max(means)), "not the first ones that came"
     assert result["lengths"] == lengths[: result["episodes"]]
+    few = train(tmp_path / "few", name, **free, stop_at_length=1)
+    assert summary(few)["episodes"] == 20, "no fewer"
 
 
 @pytest.mark.parametrize("name", ["ppo"])
