@@ -25,6 +25,9 @@ ROOT = Path(__file__).resolve().parent.parent
 # Networks this small only lose by more threads: on a busy machine a test of seconds takes a minute.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+# Under nohup a closed terminal is ignored, by whatever a test starts, too; the tests are as from a terminal.
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
 ENGINES = ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
 
 

@@ -9,6 +9,8 @@ from actionlib.action_server import ActionServer
 from actionlib.status_tracker import StatusTracker
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 
+from bullet_gazebo.ros.wire.rospy_patches import wait_until_sent
+
 QUEUE = 50
 KEPT = 5.0  # [s of wall time]; how long the status of a goal is told after its end, as by actionlib
 MOST_KEPT = 100  # goals that have ended
@@ -56,9 +58,11 @@ class SteadyActionServer(ActionServer):
         )
 
     def stop(self) -> None:
-        """Closes the topics; that of results last, so that a result just published still gets through."""
+        """Closes the topics; a result that was just published still gets through."""
         with self.lock:
             self.started = False
+            for told in (self.status_pub, self.result_pub):
+                wait_until_sent(told)
             for topic in (self.goal_sub, self.cancel_sub, self.status_pub, self.feedback_pub,
                           self.result_pub):  # fmt: skip
                 topic.unregister()

@@ -7,6 +7,7 @@ needed with rospy 1.15.15 (Debian 12), and are held by the test that is named.
 - `hang_up_on_nonsense`: a client whose request can't be read waits for ever (gazebo_clients.test)
 - `answer_xmlrpc`: a node can't answer one XML-RPC call more (gazebo_ros.test, `gz`)
 - `stop_hearing_clock`: who makes /clock hears it over a socket to itself (gazebo_parameters.test)
+- `wait_until_sent`: what was published just before a topic is closed is thrown away (test_rospy_patches.py)
 - `set_time`: and so has to tell rospy the time by itself (gazebo_ros.test, a plugin)
 
 Classes that merely override a method stand where they are used: `SteadyActionServer` (actionlib),
@@ -15,6 +16,7 @@ Classes that merely override a method stand where they are used: `SteadyActionSe
 
 import socket
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -25,6 +27,7 @@ import rospy.impl.tcpros_base
 from rospy.exceptions import TransportException
 from rospy.impl.masterslave import ROSHandler
 from rospy.impl.tcpros_base import TCPROSTransport
+from rospy.impl.tcpros_pubsub import QueuedConnection
 from rospy.impl.tcpros_service import ServiceImpl
 
 
@@ -90,6 +93,27 @@ def stop_hearing_clock() -> None:
         subscription.unregister()
 
 
-def set_time(time: genpy.Time) -> None:
+def set_time(now: genpy.Time) -> None:
     """Tells this process's rospy the simulated time, as a message on /clock does elsewhere."""
-    rospy.rostime._set_rostime(time)
+    rospy.rostime._set_rostime(now)
+
+
+def wait_until_sent(publisher: rospy.Publisher, bound: float = 1.0) -> None:
+    """Waits until rospy's threads have written what was published, so that closing the topic loses nothing.
+
+    Args:
+        bound: of the wait [s of wall time]; a client that doesn't read holds nobody up for longer.
+    """
+    deadline = time.monotonic() + bound
+    for connection in list(publisher.impl.connections):
+        while not _has_sent(connection) and time.monotonic() < deadline:
+            time.sleep(0.002)
+
+
+def _has_sent(connection: Any) -> bool:
+    """Whether the connection's thread waits for something to write."""
+    if not isinstance(connection, QueuedConnection):
+        return True
+    with connection._lock:
+        waits = bool(connection._cond_data_available._waiters)  # else it is still writing
+        return bool(connection.done) or (waits and not connection._queue)
