@@ -24,6 +24,8 @@ from training_runs import (
 
 from rl_workbench.errors import WorkbenchError
 
+pytestmark = pytest.mark.slow
+
 
 def rewrite(run: Path, change: Callable[[dict], object]) -> None:
     """Changes the newest checkpoint of a run."""

@@ -23,6 +23,8 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.run import evaluator
 from rl_workbench.training.run.evaluator import Evaluation
 
+pytestmark = pytest.mark.slow
+
 MANY = {"total_timesteps": 400, "episodes": 0, "stop_at_length": 0}
 
 

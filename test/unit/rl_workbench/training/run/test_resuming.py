@@ -26,6 +26,8 @@ from rl_workbench.training.run import checkpoints as run_checkpoints
 from rl_workbench.training.run.checkpoints import Checkpoints
 from rl_workbench.training.run.environments import CheckedEnvironment
 
+pytestmark = pytest.mark.slow
+
 
 class Killed(Exception):
     """Nobody catches it, as nobody catches kill -9."""
