@@ -5,8 +5,7 @@ import time
 from pathlib import Path
 from typing import Generic
 
-import pybullet
-
+from bullet_gazebo.physics.engines.bullet.library import pybullet
 from robot_envs.display import hindrance
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot, State

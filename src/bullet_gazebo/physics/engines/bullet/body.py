@@ -3,8 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-import pybullet
-
 from bullet_gazebo.physics.description import Inertia, ModelDescription
 from bullet_gazebo.physics.engine import Body, Twist
 from bullet_gazebo.physics.engines.bullet.contacts import (
@@ -12,6 +10,7 @@ from bullet_gazebo.physics.engines.bullet.contacts import (
     choose_self_collisions,
     set_friction,
 )
+from bullet_gazebo.physics.engines.bullet.library import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
 
 NO_SPEED_LIMIT = 1e9  # [rad/s, m/s]; PyBullet clamps joint speeds at 100 unless told otherwise

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from itertools import combinations
 
-import pybullet
-
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription, Shape
+from bullet_gazebo.physics.engines.bullet.library import pybullet
 
 
 def set_friction(

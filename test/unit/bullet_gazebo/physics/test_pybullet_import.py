@@ -1,0 +1,82 @@
+"""PyBullet comes without its line about when it was built, and without hiding what others write."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SRC = Path(__file__).resolve().parents[4] / "src"
+LIBRARY = SRC / "bullet_gazebo/physics/engines/bullet/library.py"
+BESIDE = """
+import os, sys, threading
+sys.setswitchinterval(1e-6)
+done = threading.Event()
+count = 0
+def write():
+    global count
+    while not done.is_set():
+        os.write(2, b"%d\\n" % count)
+        count += 1
+thread = threading.Thread(target=write)
+thread.start()
+from bullet_gazebo.physics.engines.registry import make_engine
+make_engine()
+done.set()
+thread.join()
+print(count)
+"""
+
+
+def outcome(code: str, *python: str) -> subprocess.CompletedProcess[str]:
+    command = [*python, sys.executable, "-c", f"import sys; sys.path = {sys.path}; {code}"]
+    return subprocess.run(command, capture_output=True, text=True, check=True)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "from bullet_gazebo.physics.engines.registry import make_engine; make_engine()",
+        "import gymnasium, cartpole; gymnasium.make('cartpole/Balance-v0').reset(seed=0)",
+        "import robot_envs.window",
+    ],
+)
+def test_an_engine_comes_without_a_word(code: str) -> None:
+    done = outcome(code)
+    assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_what_another_thread_writes_meanwhile_comes_whole() -> None:
+    done = outcome(f"exec({BESIDE!r})")
+    lines = done.stderr.splitlines()
+    assert sorted(map(int, lines)) == list(range(int(done.stdout)))
+
+
+def test_a_library_that_cannot_be_loaded_says_why(tmp_path: Path) -> None:
+    (tmp_path / "pybullet.py").write_text(
+        "import sys; print('a reason', file=sys.stderr); raise ImportError('broken')"
+    )
+    code = (
+        f"sys.path.insert(0, {str(tmp_path)!r}); import bullet_gazebo.physics.engines.bullet.engine"
+    )
+    with pytest.raises(subprocess.CalledProcessError) as caught:
+        outcome(code)
+    assert "a reason" in caught.value.stderr
+    assert "ImportError: broken" in caught.value.stderr
+
+
+def test_without_a_standard_error() -> None:
+    code = "from bullet_gazebo.physics.engines.registry import make_engine; make_engine(); print('made')"
+    assert outcome(code, "sh", "-c", 'exec "$@" 2>&-', "sh").stdout == "made\n"
+
+
+def test_it_is_imported_in_one_place() -> None:
+    def imports(path: Path) -> bool:
+        nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        return any(
+            isinstance(node, ast.Import) and any(each.name == "pybullet" for each in node.names)
+            for node in nodes
+        )
+
+    assert [path for path in sorted(SRC.rglob("*.py")) if imports(path)] == [LIBRARY]
