@@ -46,7 +46,7 @@ class ModelServices:
             return GetWorldPropertiesResponse(
                 sim_time=self._sim.sim_time,
                 model_names=list(self._sim.world.models),
-                rendering_enabled=True,
+                rendering_enabled=False,  # no cameras here: who waits for pictures has to know
                 success=True,
                 status_message="GetWorldProperties: got properties",
             )
