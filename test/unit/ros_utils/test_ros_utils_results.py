@@ -1,4 +1,4 @@
-"""What ros_utils answers when something fails is false, whatever its shape: ``if f(...):`` is what is written."""
+"""What ros_utils answers to a failure is false, whatever its shape: users write ``if f(...):``."""
 
 import inspect
 import math
@@ -119,5 +119,5 @@ def test_no_function_returns_a_plain_tuple(name):
 @pytest.mark.parametrize("success", [False, True])
 def test_the_truth_of_a_result_is_its_success(name, success):
     annotation = inspect.signature(FUNCTIONS[name], eval_str=True).return_annotation
-    values = {field: None for field in TUPLES[name]} | {"success": success}
+    values = dict.fromkeys(TUPLES[name]) | {"success": success}
     assert bool(annotation(**values)) is success

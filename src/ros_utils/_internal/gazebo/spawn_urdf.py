@@ -63,7 +63,9 @@ def gazebo_spawn_urdf_pkg(
     `gazebo_spawn_urdf_string`."""
     xml = urdf_parse_from_pkg(pkg_name, file_name, file_folder, args_xacro)
     if xml is None:
-        return SpawnResult(False, f"{file_name} in package {pkg_name}: can't be found, read or expanded")
+        return SpawnResult(
+            False, f"{file_name} in package {pkg_name}: can't be found, read or expanded"
+        )
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     options = SpawnOptions(
         model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
