@@ -53,5 +53,6 @@ enter_workspace() {
     set -u
     # Behind ours: the caller's own packages are found, and none of them hides one of ours.
     export ROS_PACKAGE_PATH=$ROS_PACKAGE_PATH${callers_packages:+:$callers_packages}
-    export PATH=$VENV/bin:$PATH  # catkin's own entries came first
+    # Programs of the workspace before those that pip has put beside Python: xacro is bounded.
+    export PATH=$WS/devel/bin:$VENV/bin:$PATH
 }

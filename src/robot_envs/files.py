@@ -1,6 +1,5 @@
 """Reads a robot's files: its URDF, through xacro if it is one, and its controllers' parameters."""
 
-import threading
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -8,8 +7,7 @@ from typing import Any
 import yaml
 
 from robot_envs.errors import RobotEnvError
-
-_lock = threading.Lock()  # xacro keeps its state in module variables
+from ros_calls.expansion import CannotExpand, expand
 
 
 @lru_cache(maxsize=8)
@@ -19,14 +17,10 @@ def read_urdf(path: Path) -> str:
     Raises:
         RobotEnvError: if it can't be read or expanded.
     """
-    import xacro  # only whoever makes a robot needs it
-
     try:
-        with _lock:
-            return str(xacro.process_file(str(path)).toprettyxml(indent="  "))
-    except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise RobotEnvError(f"can't read {path}: {reason}") from error
+        return expand(path)
+    except CannotExpand as error:
+        raise RobotEnvError(f"can't read {error}") from error
 
 
 @lru_cache(maxsize=8)

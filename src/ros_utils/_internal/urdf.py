@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import re
-import threading
 from collections.abc import Sequence
-from xml.parsers.expat import ExpatError
 
-import xacro
-
+from ros_calls.expansion import CannotExpand, expand
 from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages
 
-_lock = threading.Lock()  # xacro keeps its state in module variables
 
-
-class BrokenModel(Exception):
-    """The file can't be expanded; the text gives the file, the place and what is wrong."""
+class BadArgument(ValueError):
+    """A xacro argument has another form; the text says which."""
 
 
 def urdf_parse_from_pkg(
@@ -35,8 +30,9 @@ def urdf_parse_from_pkg(
 def urdf_parse_from_path(model_path: str, args_xacro: Sequence[str] | None = None) -> str | None:
     """Expand a URDF or xacro file, given by its path. See `urdf_parse_from_pkg`."""
     try:
-        return _expand(_packages.existing(model_path), args_xacro or [])
-    except (_packages.NotFound, BrokenModel) as fault:
+        mappings = dict(_mapping(argument) for argument in args_xacro or [])
+        return expand(_packages.existing(model_path), mappings)
+    except (_packages.NotFound, BadArgument, CannotExpand) as fault:
         _log.error(f"urdf: {fault}")
         return None
 
@@ -50,29 +46,8 @@ def find(caller: str, package: str, folder: str, name: str) -> str | None:
         return None
 
 
-def _expand(path: str, arguments: Sequence[str]) -> str:
-    mappings = dict(_mapping(argument) for argument in arguments)
-    with _lock:
-        try:
-            return str(xacro.process_file(path, mappings=mappings).toprettyxml(indent="  "))
-        except ExpatError as fault:
-            raise BrokenModel(f"{_place(path)}: {fault}") from fault
-        except Exception as fault:
-            # xacro evaluates the file's own Python expressions: anything may come out.
-            text = " ".join(str(fault.args[0] if isinstance(fault, KeyError) else fault).split())
-            raise BrokenModel(f"{_place(path)}: {text or type(fault).__name__}") from fault
-
-
 def _mapping(argument: str) -> tuple[str, str]:
     name, sign, value = argument.partition(":=")
     if not sign or not re.fullmatch(r"\w+", name):
-        raise BrokenModel(f"xacro argument {argument!r}: expected 'name:=value'")
+        raise BadArgument(f"xacro argument {argument!r}: expected 'name:=value'")
     return name, value
-
-
-def _place(path: str) -> str:
-    """The file that xacro was reading, with the files and macros that led there."""
-    files = [str(file) for file in reversed(xacro.filestack or [path]) if file]
-    macros = [macro.body.getAttribute("name") for macro in reversed(xacro.macrostack or [])]
-    through = "".join(f", included from {file}" for file in files[1:])
-    return files[0] + through + "".join(f", in macro {name}" for name in macros)

@@ -154,6 +154,15 @@ def test_rosrun_finds_one_executable(ws, root):
     assert "stand_cart" in result.stdout
 
 
+@pytest.mark.parametrize("command", [("xacro",), ("rosrun", "xacro", "xacro")])
+def test_xacro_is_the_one_with_limits(ws, tmp_path, command):
+    path = tmp_path / "robot.xacro"
+    path.write_text('<r xmlns:xacro="http://www.ros.org/wiki/xacro">${"a" * 10**10}</r>')
+    result = ws(*command, path)
+    assert result.returncode == 2
+    assert re.fullmatch("xacro: .*robot.xacro: needs more than 1024 MiB of memory\n", result.stderr)
+
+
 def test_xacro_knows_packages(ws, root):
     robot = root / "companions/cartpole_gazebo/robots/cartpole_v1.urdf"
     result = ws("xacro", robot)

@@ -21,6 +21,7 @@ from ros_utils._internal.gazebo.calls import (
     make_pose,
     succeeded,
 )
+from ros_utils._internal.gazebo.results import SpawnResult
 
 
 class SpawnOptions(NamedTuple):
@@ -35,7 +36,7 @@ class SpawnOptions(NamedTuple):
     verify: bool
 
 
-def spawn(kind: str, xml: str, options: SpawnOptions) -> tuple[bool, str]:
+def spawn(kind: str, xml: str, options: SpawnOptions) -> SpawnResult:
     """Spawn a model from XML text; `kind` is "urdf" or "sdf".
 
     Returns:
@@ -55,10 +56,10 @@ def spawn(kind: str, xml: str, options: SpawnOptions) -> tuple[bool, str]:
         return _failed(
             f"{options.name} isn't in the world {options.timeout:g} s after it was spawned"
         )
-    return True, str(answer.status_message)
+    return SpawnResult(True, str(answer.status_message))
 
 
-def spawn_param(kind: str, param_name: str, options: SpawnOptions) -> tuple[bool, str]:
+def spawn_param(kind: str, param_name: str, options: SpawnOptions) -> SpawnResult:
     """Spawn a model from the text in parameter ``<namespace>/<param_name>``. See `spawn`."""
     name = rosgraph.names.ns_join(options.namespace or "/", param_name)
     try:
@@ -106,7 +107,7 @@ def _appears(name: str, wanted: bool, timeout: float, gazebo_ns: str) -> bool:
     return wait_until(look, timeout, f"model {name}") == "as wanted"
 
 
-def _failed(text: str) -> tuple[bool, str]:
+def _failed(text: str) -> SpawnResult:
     """What a spawn function answers when something is wrong; the text is logged."""
     _log.error(text)
-    return False, text
+    return SpawnResult(False, text)

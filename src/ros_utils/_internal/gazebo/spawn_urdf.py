@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ros_utils._internal.gazebo.calls import GAZEBO, TIMEOUT
+from ros_utils._internal.gazebo.results import SpawnResult
 from ros_utils._internal.gazebo.spawn import SpawnOptions, spawn, spawn_param
 from ros_utils._internal.urdf import urdf_parse_from_path, urdf_parse_from_pkg
 
@@ -26,11 +27,11 @@ def gazebo_spawn_urdf_path(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
-) -> tuple[bool, str]:
+) -> SpawnResult:
     """Spawn a URDF or xacro file, given by its path. See `gazebo_spawn_urdf_string`."""
     xml = urdf_parse_from_path(model_path, args_xacro)
     if xml is None:
-        return False, f"{model_path}: can't be read or expanded"
+        return SpawnResult(False, f"{model_path}: can't be read or expanded")
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     options = SpawnOptions(
         model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
@@ -57,12 +58,14 @@ def gazebo_spawn_urdf_pkg(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
-) -> tuple[bool, str]:
+) -> SpawnResult:
     """Spawn a package's URDF or xacro file, ``<pkg_name><file_folder>/<file_name>``. See
     `gazebo_spawn_urdf_string`."""
     xml = urdf_parse_from_pkg(pkg_name, file_name, file_folder, args_xacro)
     if xml is None:
-        return False, f"{file_name} in package {pkg_name}: can't be found, read or expanded"
+        return SpawnResult(
+            False, f"{file_name} in package {pkg_name}: can't be found, read or expanded"
+        )
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     options = SpawnOptions(
         model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
@@ -86,7 +89,7 @@ def gazebo_spawn_urdf_string(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
-) -> tuple[bool, str]:
+) -> SpawnResult:
     """Spawn a model from URDF text.
 
     Args:
@@ -100,7 +103,8 @@ def gazebo_spawn_urdf_string(
         verify: return only once the model is in the world's list.
 
     Returns:
-        Whether it was spawned, and the simulator's text or what went wrong before.
+        Whether it was spawned, and the simulator's text or what went wrong before: a pair that is
+        false if it wasn't.
     """
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     options = SpawnOptions(
@@ -125,7 +129,7 @@ def gazebo_spawn_urdf_param(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
-) -> tuple[bool, str]:
+) -> SpawnResult:
     """Spawn the URDF text in parameter ``<robot_namespace>/<param_name>``. See
     `gazebo_spawn_urdf_string`."""
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)

@@ -25,6 +25,12 @@ from ros_utils._internal.gazebo.calls import (
     pose_numbers,
     succeeded,
 )
+from ros_utils._internal.gazebo.results import (
+    JointPropertiesResult,
+    LinkStateResult,
+    ModelStateResult,
+    WorldPropertiesResult,
+)
 
 
 def gazebo_get_model_state(
@@ -33,7 +39,7 @@ def gazebo_get_model_state(
     *,
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
-) -> tuple[Header, Pose, Twist, bool]:
+) -> ModelStateResult:
     """Ask for a model's pose [m, quaternion] and twist [m/s, rad/s] relative to a model, link or
     "world".
 
@@ -49,8 +55,8 @@ def gazebo_get_model_state(
         gazebo_ns=gazebo_ns,
     )
     if answer is None:
-        return Header(), Pose(), Twist(), False
-    return answer.header, answer.pose, answer.twist, bool(answer.success)
+        return ModelStateResult(Header(), Pose(), Twist(), False)
+    return ModelStateResult(answer.header, answer.pose, answer.twist, bool(answer.success))
 
 
 def gazebo_set_model_state(
@@ -104,7 +110,7 @@ def gazebo_get_link_state(
     *,
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
-) -> tuple[Pose, Twist, bool]:
+) -> LinkStateResult:
     """Ask for a link's pose [m, quaternion] and twist [m/s, rad/s]; `link_name` is best scoped,
     ``model::link``.
 
@@ -116,8 +122,9 @@ def gazebo_get_link_state(
         "get_link_state", srv.GetLinkState, *request, timeout=timeout, gazebo_ns=gazebo_ns
     )
     if answer is None:
-        return Pose(), Twist(), False
-    return answer.link_state.pose, answer.link_state.twist, bool(answer.success)
+        return LinkStateResult(Pose(), Twist(), False)
+    state = answer.link_state
+    return LinkStateResult(state.pose, state.twist, bool(answer.success))
 
 
 def gazebo_set_link_state(
@@ -167,7 +174,7 @@ def gazebo_set_model_configuration(
 
 def gazebo_get_joint_properties(
     joint_name: str, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> tuple[float, float, bool]:
+) -> JointPropertiesResult:
     """Ask for a joint's position [rad, m] and velocity [rad/s, m/s].
 
     Returns:
@@ -176,8 +183,8 @@ def gazebo_get_joint_properties(
     kind = srv.GetJointProperties
     answer = call("get_joint_properties", kind, joint_name, timeout=timeout, gazebo_ns=gazebo_ns)
     if not succeeded(answer):
-        return 0.0, 0.0, False
-    return float(answer.position[0]), float(answer.rate[0]), True
+        return JointPropertiesResult(0.0, 0.0, False)
+    return JointPropertiesResult(float(answer.position[0]), float(answer.rate[0]), True)
 
 
 def gazebo_apply_joint_effort(
@@ -210,7 +217,7 @@ def gazebo_apply_joint_effort(
 
 def gazebo_get_world_properties(
     *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> tuple[bool, float, list[str]]:
+) -> WorldPropertiesResult:
     """Ask what is in the world.
 
     Returns:
@@ -219,8 +226,9 @@ def gazebo_get_world_properties(
     kind = srv.GetWorldProperties
     answer = call("get_world_properties", kind, timeout=timeout, gazebo_ns=gazebo_ns)
     if answer is None:
-        return False, 0.0, []
-    return bool(answer.success), float(answer.sim_time), list(answer.model_names)
+        return WorldPropertiesResult(False, 0.0, [])
+    names = list(answer.model_names)
+    return WorldPropertiesResult(bool(answer.success), float(answer.sim_time), names)
 
 
 def gazebo_get_model_names(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> list[str]:
