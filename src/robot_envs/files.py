@@ -31,7 +31,7 @@ def read_parameters(path: Path) -> dict[str, Any]:
         RobotEnvError: if it can't be read.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = yaml.safe_load(path.read_bytes())  # it finds out about UTF-16 by itself
     except OSError as error:
         raise RobotEnvError(f"can't read {path}: {error.strerror}") from error
     except yaml.YAMLError as error:

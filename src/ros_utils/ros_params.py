@@ -56,7 +56,7 @@ def _read(path: str) -> list[dict[str, Any]]:
         ValueError: not YAML, or a document that is no mapping; the text gives the place.
         OSError: the file can't be read.
     """
-    with open(path, encoding="utf-8") as file:
+    with open(path, "rb") as file:  # YAML finds out by itself whether it is UTF-8 or UTF-16
         text = file.read()
     try:
         documents = [document for document in yaml.safe_load_all(text) if document is not None]

@@ -4,11 +4,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
+from file_reading.errors import FileError
+from file_reading.xml_parser import parse
 
 PREFIX = "hardware_interface/"
 OVERRIDES = {  # what: field of the limits, and its parameter
@@ -56,9 +57,9 @@ def read_description(text: str) -> RobotDescription:
         ControlError: if it isn't XML, or a transmission names an interface that doesn't exist.
     """
     try:
-        robot = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise ControlError(f"robot_description is not well-formed XML: {error}") from error
+        robot = parse(text)
+    except FileError as error:
+        raise ControlError(f"robot_description: {error}") from error
     joints = {e.get("name", ""): _joint(e) for e in robot.findall("joint")}
     warnings: list[str] = []
     transmissions: dict[str, Transmission] = {}
@@ -78,9 +79,12 @@ def _joint(element: Element) -> JointHandle:
     limits = JointLimits()
     if limit is not None:
         bounded = kind in ("revolute", "prismatic")
+        lower, upper = sorted(
+            (_float(limit, "lower"), _float(limit, "upper"))
+        )  # as Gazebo swaps them
         limits = JointLimits(
-            lower=_float(limit, "lower") if bounded else None,
-            upper=_float(limit, "upper") if bounded else None,
+            lower=lower if bounded else None,
+            upper=upper if bounded else None,
             velocity=_size(limit, "velocity"),
             effort=_size(limit, "effort"),
             soft=_soft(element.find("safety_controller")),

@@ -5,11 +5,21 @@ from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.pose import Pose, Vector
 
+LONGEST = 4000  # characters of a fault
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
 class DescriptionError(ValueError):
     """A model file that can't be simulated: the text names the place in it and what is wrong."""
+
+    def __init__(self, text: str) -> None:
+        """Names in the file may hold anything: `text` is made one line, and cut to a length for a log."""
+        line = " ".join(text.split())
+        super().__init__(line if len(line) <= LONGEST else f"{line[:LONGEST]}…")
+
+
+class LimitExceeded(DescriptionError):
+    """More of something than one model or world may have: there is no going on without it."""
 
 
 @dataclass(frozen=True)

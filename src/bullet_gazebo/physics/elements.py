@@ -1,55 +1,30 @@
-"""Reading XML model files: guarded parsing, and numbers with the place that they stand at."""
+"""Reading XML model files: numbers and names, with the place that they stand at."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TypeVar
-from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
+from xml.etree.ElementTree import Element
 
-from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
+from file_reading.errors import FileError, TooLarge
+from file_reading.xml_parser import parse
 
-MAX_DEPTH = 100  # nested elements; real models have about ten
 SHOWN = 80  # characters of a faulty value that a message repeats
 
-T = TypeVar("T")
 
-
-class _GuardedBuilder(TreeBuilder):
-    """Builds the tree, and refuses what only serves to exhaust the reader."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._depth = 0
-
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        raise DescriptionError("a document type (<!DOCTYPE>) is not taken")
-
-    def start(self, tag: str, attributes: dict[str, str]) -> Element:
-        self._depth += 1
-        if self._depth > MAX_DEPTH:
-            raise DescriptionError(f"elements are nested more than {MAX_DEPTH} deep")
-        return super().start(tag, attributes)
-
-    def end(self, tag: str) -> Element:
-        self._depth -= 1
-        return super().end(tag)
-
-
-def parse_xml(text: str) -> Element:
-    """Returns the root element.
+def parse_xml(text: str | bytes, count: Callable[[int], None] | None = None) -> Element:
+    """Returns the root element of a text, or of what a file holds; `count` is told of the elements.
 
     Raises:
-        DescriptionError: if it isn't well-formed or is a trap.
+        DescriptionError: if it isn't well-formed, or has a document type.
+        LimitExceeded: if it is too large.
     """
-    parser = XMLParser(target=_GuardedBuilder())
     try:
-        parser.feed(text)
-        root: Element = parser.close()
-    except (ParseError, ValueError) as error:
-        if isinstance(error, DescriptionError):
-            raise
-        raise DescriptionError(f"not well-formed XML: {error}") from error
-    return root
+        return parse(text) if count is None else parse(text, count)
+    except TooLarge as error:
+        raise LimitExceeded(str(error)) from error
+    except FileError as error:
+        raise DescriptionError(str(error)) from error
 
 
 @contextmanager
@@ -58,7 +33,18 @@ def place(where: str) -> Iterator[None]:
     try:
         yield
     except DescriptionError as error:
-        raise DescriptionError(f"{where}: {error}") from error
+        raise type(error)(f"{where}: {error}") from error
+
+
+@contextmanager
+def files_named_by_a_model(where: str) -> Iterator[None]:
+    """Makes what the system says to a strange file name, one too long for it, a DescriptionError."""
+    try:
+        yield
+    except DescriptionError:
+        raise
+    except (OSError, ValueError) as error:
+        raise DescriptionError(f"{where}: {shown(str(error))}") from error
 
 
 def finite(text: str, where: str) -> float:
@@ -78,7 +64,7 @@ def finite(text: str, where: str) -> float:
 
 def numbers(text: str | None, where: str, count: int) -> tuple[float, ...]:
     """Returns `count` numbers separated by blanks. `where` names them in the error's text."""
-    words = (text or "").split()
+    words = (text or "").split(None, count)  # of a text of millions no more than are wanted
     if len(words) != count:
         raise DescriptionError(f"{where} must hold {count} numbers, not '{shown(text or '')}'")
     return tuple(finite(word, where) for word in words)
@@ -106,7 +92,7 @@ def named(element: Element, what: str) -> str:
 
 def shown(text: str) -> str:
     """Returns `text` as one line, cut to a length that suits a message."""
-    line = " ".join(text.split())
+    line = " ".join(text[: 4 * SHOWN].split())
     return line if len(line) <= SHOWN else f"{line[:SHOWN]}…"
 
 

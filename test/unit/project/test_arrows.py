@@ -14,15 +14,17 @@ SRC = Path(__file__).resolve().parents[3] / "src"
 ROOT = SRC.parent
 MODULES = sorted(SRC.rglob("*.py"))
 FOLDERS = sorted({path.parent for path in MODULES} | {SRC})
-OURS = {"bullet_gazebo", "cartpole", "rl_workbench", "robot_envs", "ros_calls", "ros_utils"}
+OURS = {"bullet_gazebo", "cartpole", "rl_workbench", "robot_envs", "ros_calls", "ros_utils",
+        "file_reading"}  # fmt: skip
 ROS = ("rospy", "rosgraph", "rosnode", "roslib", "rosparam", "roslaunch", "rosservice")
 ROS_ROOMS = ("bullet_gazebo/ros", "ros_calls", "ros_utils", "robot_envs/backends")
 
 # A library, and which of ours it may import.
 ALLOWED = {
-    "bullet_gazebo": {"ros_calls"},
+    "bullet_gazebo": {"ros_calls", "file_reading"},
     "ros_calls": set(),
-    "ros_utils": {"ros_calls"},
+    "file_reading": set(),
+    "ros_utils": {"ros_calls", "file_reading"},
     "robot_envs": {"bullet_gazebo", "ros_calls", "ros_utils"},
     "rl_workbench": set(),
     "cartpole": {"rl_workbench", "robot_envs"},

@@ -6,8 +6,14 @@ from typing import Any
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics import elements
-from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
-from bullet_gazebo.physics.elements import named, numbers, parse_xml, shown, truth
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    Light,
+    LimitExceeded,
+    ModelDescription,
+)
+from bullet_gazebo.physics.elements import named, numbers, shown, truth
+from bullet_gazebo.physics.files.reading import Reading
 from bullet_gazebo.physics.files.sdf.frames import read_pose
 from bullet_gazebo.physics.files.sdf.geometry import read_color, value
 from bullet_gazebo.physics.files.sdf.include import FileContext, included_name, open_include
@@ -57,24 +63,29 @@ def sun() -> Light:
     )
 
 
-def load_world(path: Path, resources: Resources) -> WorldDescription:
+def load_world(
+    path: Path, resources: Resources, reading: Reading | None = None
+) -> WorldDescription:
     """Reads a world file. A model that can't be read is left out, with a warning.
 
     Raises:
         DescriptionError: in one line, if the file as a whole can't be used.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DescriptionError(f"{path}: it can't be read: {error}") from error
+    reading = reading or Reading()
+    root = reading.open(path)
     with elements.place(str(path)):
-        return parse_world(text, resources, path.parent)
+        return _read(root, FileContext(resources, reading, sdf_version(root), path.parent))
 
 
-def parse_world(text: str, resources: Resources, folder: Path | None = None) -> WorldDescription:
-    """As load_world, from the text; relative names are looked up in `folder`."""
-    root = parse_xml(text)
-    context = FileContext(resources, sdf_version(root), folder)
+def parse_world(text: str | bytes, resources: Resources) -> WorldDescription:
+    """As load_world, from the text."""
+    reading = Reading()
+    root = reading.parse(text)
+    return _read(root, FileContext(resources, reading, sdf_version(root)))
+
+
+def _read(root: Element, context: FileContext) -> WorldDescription:
+    """As load_world, from the root element."""
     element = root.find("world")
     if element is None:
         raise DescriptionError("there is no <world>")
@@ -126,6 +137,8 @@ def _add(world: WorldDescription, element: Element, context: FileContext) -> Non
         _keep(
             world, read_light(element) if element.tag == "light" else read_model(element, context)
         )
+    except LimitExceeded:
+        raise
     except DescriptionError as error:
         world.warnings.append(f"{error}; it is left out")
 
@@ -136,6 +149,8 @@ def included(
     """What an `<include>` brings; ground_plane and sun are there without any file."""
     try:
         return open_include(include, context)
+    except LimitExceeded:
+        raise
     except DescriptionError:
         name = included_name(include)
         if name not in ("ground_plane", "sun"):

@@ -1,6 +1,6 @@
 """What the physics engine can compute with: beyond these figures it crashes, hangs or loses the world."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from bullet_gazebo.physics.description import DescriptionError, Joint, Link, ModelDescription
 
@@ -34,7 +34,16 @@ def _check_counts(model: ModelDescription) -> None:
             f"it has {len(model.joints)} joints: the physics engine takes {MOST_JOINTS} of a model, "
             f"or {MOST_COORDINATES - FREE_BASE} movable ones if it isn't fixed to the world"
         )
-    shapes = sum(len(link.collisions) + len(link.visuals) for link in model.links.values())
+    check_shapes(model.links.values())
+
+
+def check_shapes(links: Iterable[Link]) -> None:
+    """Refuses links with too many shapes; before they are lumped, which would take long, and after it.
+
+    Raises:
+        DescriptionError: if there are more than MOST_SHAPES.
+    """
+    shapes = sum(len(link.collisions) + len(link.visuals) for link in links)
     if shapes > MOST_SHAPES:
         raise DescriptionError(
             f"it has {shapes} collisions and visuals; up to {MOST_SHAPES} are taken"

@@ -25,6 +25,16 @@ def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
     return found
 
 
+def check_count(links: int) -> None:
+    """Refuses a model of too many links, before time is spent on them.
+
+    Raises:
+        DescriptionError: if there are more than MAX_LINKS.
+    """
+    if links > MAX_LINKS:
+        raise DescriptionError(f"there are {links} links; up to {MAX_LINKS} are read (MAX_LINKS)")
+
+
 def find_roots(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
     """Returns the links that are nobody's child, in document order; all others hang from one of them.
 
@@ -33,8 +43,7 @@ def find_roots(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
     """
     if not links:
         raise DescriptionError("there is no <link>")
-    if len(links) > MAX_LINKS:
-        raise DescriptionError(f"there are {len(links)} links; up to {MAX_LINKS} are read")
+    check_count(len(links))
     below = _children(links, joints)
     children = {name for names in below.values() for name in names}
     roots = [name for name in links if name not in children]

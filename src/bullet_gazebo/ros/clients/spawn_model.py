@@ -6,6 +6,7 @@ import math
 import sys
 import threading
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -16,6 +17,10 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.ros.clients import gazebo_interface
 from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
+from file_reading.content import MAX_BYTES, read_file
+from file_reading.errors import FileError
+from file_reading.xml_parser import parse as parse_xml
+from file_reading.xml_text import decode
 from ros_calls.service import ServiceClient, ServiceFailed
 from ros_calls.waiting import wait_until
 
@@ -34,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     command_line = list(sys.argv if argv is None else argv)
     options = parse(rospy.myargv(command_line)[1:])
     # Here, because a thread that waits for standard input can't be ended.
-    piped = sys.stdin.read() if options.stdin else ""
+    piped = sys.stdin.buffer.read(MAX_BYTES + 1) if options.stdin else b""
 
     def work() -> int:
         init_node("spawn_model", command_line)
@@ -102,7 +107,7 @@ def _position(parser: argparse.ArgumentParser, text: str) -> float:
         parser.error(f"argument -J: {text!r} is no number")
 
 
-def _run(options: argparse.Namespace, piped: str) -> int:
+def _run(options: argparse.Namespace, piped: bytes) -> int:
     gazebo = options.gazebo_namespace.rstrip("/")
     if options.wait:
         _wait_for_model(gazebo, options.wait)
@@ -190,26 +195,32 @@ def _call(service: str, kind: type) -> Any:
         raise CannotSpawn(str(fault)) from fault
 
 
-def _read(options: argparse.Namespace, piped: str) -> str:
+def _read(options: argparse.Namespace, piped: bytes) -> str:
     if options.stdin:
-        text, origin = piped, "standard input"
+        text, origin = _decoded(piped), "standard input"
     elif options.file is not None:
         text, origin = _read_file(options.file), options.file
     elif options.param is not None:
         text, origin = _read_param(options.param), f"parameter {rospy.resolve_name(options.param)}"
     else:
         return INCLUDE.format(options.database)
-    if not text.strip():
+    if not text.strip("\ufeff \t\r\n"):
         raise CannotSpawn(f"{origin} is empty")
     return text
 
 
 def _read_file(path: str) -> str:
     try:
-        with open(path, encoding="utf-8") as file:
-            return file.read()
-    except (OSError, UnicodeDecodeError) as fault:
-        raise CannotSpawn(f"{path} can't be read: {fault}") from fault
+        return decode(read_file(Path(path)))
+    except FileError as fault:
+        raise CannotSpawn(f"{path}: {fault}") from fault
+
+
+def _decoded(piped: bytes) -> str:
+    try:
+        return decode(piped)
+    except FileError as fault:
+        raise CannotSpawn(f"standard input: {fault}") from fault
 
 
 def _read_param(name: str) -> str:
@@ -222,10 +233,9 @@ def _read_param(name: str) -> str:
 def _prepared(text: str, package_to_model: bool) -> str:
     """Returns the XML without comments and declaration, as the service gets it from Gazebo's tool."""
     try:
-        # From bytes: text with an encoding in its declaration is refused otherwise.
-        root = ElementTree.fromstring(text.encode())
-    except ElementTree.ParseError as fault:
-        raise CannotSpawn(f"the model is no valid XML: {fault}") from fault
+        root = parse_xml(text)
+    except FileError as fault:
+        raise CannotSpawn(f"the model can't be used: {fault}") from fault
     if package_to_model:
         for mesh in root.iter("mesh"):
             name = mesh.get("filename", "")

@@ -116,7 +116,7 @@ def _names(argument: str, namespace: str) -> list[str]:
     if not os.path.isfile(argument):
         return [argument]
     try:
-        with open(argument, encoding="utf-8") as file:
+        with open(argument, "rb") as file:  # YAML finds out by itself whether it is UTF-8 or UTF-16
             documents = rosparam.load_str(file.read(), argument)
     except (yaml.YAMLError, TypeError) as fault:
         raise ValueError(f"{argument}: {' '.join(str(fault).split())}") from fault

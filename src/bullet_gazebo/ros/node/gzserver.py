@@ -4,6 +4,7 @@ import argparse
 import sys
 import threading
 import traceback
+from collections.abc import Callable
 from functools import partial
 
 import rospy
@@ -35,13 +36,15 @@ STOP_TIMEOUT = 5.0  # [s]
 class GazeboNode:
     """The simulator, its thread, and all that it offers to ROS."""
 
-    def __init__(self, args: argparse.Namespace, engine: Engine) -> None:
+    def __init__(
+        self, args: argparse.Namespace, engine: Engine, interrupted: Callable[[], bool]
+    ) -> None:
         if not rospy.has_param("/use_sim_time"):
             rospy.set_param("/use_sim_time", True)
         world = World(engine)
         relatch = rospy.get_param("~relatch_on_reset", True)
         self.sim = Simulator(world, lockstep=args.lockstep, relatch=bool(relatch))
-        fill_world(self.sim, read_world(args.world))
+        fill_world(self.sim, read_world(args.world, interrupted), interrupted)
         if args.paused:
             self.sim.pause()
         self._advertise(bool(rospy.get_param("~enable_ros_network", True)))
@@ -121,4 +124,4 @@ def main(argv: list[str] | None = None) -> int:
     except EngineError as error:
         rospy.logfatal("%s", error)
         return 1
-    return GazeboNode(args, engine).run(signals)
+    return GazeboNode(args, engine, signals.noted).run(signals)

@@ -1,10 +1,12 @@
 """Puts a world file into the simulator when it starts."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import rospy
 
 from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.files.reading import Reading
 from bullet_gazebo.physics.files.world_file import WorldDescription, empty_world, load_world
 from bullet_gazebo.ros.plugins import PluginRegistry
 from bullet_gazebo.ros.services.resource_paths import find_world, resources
@@ -12,8 +14,11 @@ from bullet_gazebo.ros.services.spawn_services import at_most, warn
 from bullet_gazebo.simulator import Simulator
 
 
-def read_world(name: str) -> WorldDescription:
-    """Returns the world of file `name`; one with a ground plane only, and a warning, if it is unusable."""
+def read_world(name: str, interrupted: Callable[[], bool]) -> WorldDescription:
+    """Returns the world of file `name`; one with a ground plane only, and a warning, if it is unusable.
+
+    Reading it ends early once `interrupted` returns true.
+    """
     path = find_world(name)
     if path is None:
         rospy.logwarn(
@@ -21,7 +26,7 @@ def read_world(name: str) -> WorldDescription:
         )
         return empty_world()
     try:
-        world = load_world(path, resources())
+        world = load_world(path, resources(), Reading(interrupted))
     except DescriptionError as error:
         rospy.logerr("%s. The world is empty but for a ground plane", error)
         return empty_world()
@@ -34,8 +39,11 @@ def read_world(name: str) -> WorldDescription:
     return world
 
 
-def fill_world(sim: Simulator, world: WorldDescription) -> None:
-    """Sets gravity and step, and adds lights and models; one that the engine can't take is left out."""
+def fill_world(sim: Simulator, world: WorldDescription, interrupted: Callable[[], bool]) -> None:
+    """Sets gravity and step, and adds lights and models; one that the engine can't take is left out.
+
+    No more models are added once `interrupted` returns true.
+    """
     with sim.lock:
         sim.set_time_step(world.time_step)
         sim.max_update_rate = world.update_rate
@@ -44,6 +52,8 @@ def fill_world(sim: Simulator, world: WorldDescription) -> None:
             sim.world.set_solver(replace(sim.world.solver, iterations=world.iterations))
         sim.world.lights.update(world.lights)
         for name, description in world.models.items():
+            if interrupted():
+                return
             try:
                 sim.world.spawn(name, description, description.initial_pose)
             except DescriptionError as error:

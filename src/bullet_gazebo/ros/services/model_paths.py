@@ -1,9 +1,14 @@
 """Where `model://NAME` is looked for (docs/contract/gazebo_launch.md 4.2)."""
 
 import os
-from xml.etree import ElementTree
+from pathlib import Path
 
 import rospkg
+
+from file_reading.content import read_file
+from file_reading.errors import FileError
+from file_reading.xml_parser import parse
+from file_reading.xml_text import decode
 
 VARIABLE = "GAZEBO_MODEL_PATH"
 EXPORT = "gazebo_model_path"
@@ -26,12 +31,11 @@ def model_paths() -> list[str]:
 def _exported(package: str) -> list[str]:
     """Reads one package.xml as text first: few export anything, and there may be hundreds."""
     try:
-        with open(os.path.join(package, "package.xml"), encoding="utf-8") as file:
-            text = file.read()
+        text = decode(read_file(Path(package, "package.xml")))
         if EXPORT not in text:
             return []
-        root = ElementTree.fromstring(text.encode())
-    except (OSError, UnicodeDecodeError, ElementTree.ParseError):  # somebody else's broken package
+        root = parse(text)
+    except FileError:  # somebody else's broken package
         return []
     return [
         folder.replace("${prefix}", package)

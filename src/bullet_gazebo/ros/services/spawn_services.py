@@ -17,12 +17,14 @@ from gazebo_msgs.srv import (
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
 from bullet_gazebo.physics.elements import shown
 from bullet_gazebo.physics.files.model_file import UnknownFormat, read_entity
+from bullet_gazebo.physics.files.reading import Reading
 from bullet_gazebo.physics.pose import Pose, is_finite
 from bullet_gazebo.physics.world import NameTaken
 from bullet_gazebo.ros.plugins import PluginRegistry
 from bullet_gazebo.ros.services.resource_paths import resources
 from bullet_gazebo.ros.wire.conversions import from_pose_msg
 from bullet_gazebo.simulator import Simulator
+from file_reading.content import MAX_BYTES
 
 ROOT_TAG = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
 PACKAGE = re.compile(r"package://([^/\"'<>\s]+)")
@@ -51,6 +53,10 @@ class SpawnServices:
         ]
 
     def _spawn_urdf(self, request: SpawnModelRequest) -> SpawnModelResponse:
+        if len(request.model_xml) > MAX_BYTES:
+            return self._spawn(
+                request, request.model_xml
+            )  # which refuses it, before anything looks at it
         text = without_comments(request.model_xml)
         root = ROOT_TAG.search(text)
         if root is None or root.group(1) != "robot":
@@ -63,9 +69,12 @@ class SpawnServices:
 
     def _spawn(self, request: SpawnModelRequest, text: str) -> SpawnModelResponse:
         try:
+            self._checked_pose(request)  # before anything takes time
+            # A file may take long: spawns of others go on meanwhile.
+            reading = Reading(cancelled=rospy.is_shutdown)
+            entity = read_entity(text, request.model_name, resources(), reading)
             with self._one_at_a_time:
                 pose = self._checked_pose(request)
-                entity = read_entity(text, request.model_name, resources())
                 self._add(request, entity, pose.compose(entity_pose(entity)))
         except NameTaken:
             return SpawnModelResponse(False, TAKEN)

@@ -39,6 +39,10 @@ class SignalHandler:
     def _note(self, _number: int, _frame: FrameType | None) -> None:
         self._news.put("signal")
 
+    def noted(self) -> bool:
+        """Returns whether a signal has come that nobody has waited for yet; for long work before `wait`."""
+        return not self._news.empty()
+
     def wait(self) -> bool:
         """Returns once a signal came, or the node was shut down otherwise, and the node is down.
 

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from file_reading.content import read_file
+from file_reading.errors import FileError
+from file_reading.xml_text import decode
 from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages
 from ros_utils._internal.gazebo.calls import GAZEBO, TIMEOUT
@@ -139,8 +144,7 @@ def gazebo_spawn_sdf_param(
 def _read(path: str) -> str | None:
     """The text of a file, or None, with an error in the log."""
     try:
-        with open(_packages.existing(path), encoding="utf-8") as file:
-            return file.read()
-    except (_packages.NotFound, OSError, UnicodeDecodeError) as fault:
+        return decode(read_file(Path(_packages.existing(path))))
+    except (_packages.NotFound, FileError) as fault:
         _log.error(f"sdf: {path}: {fault}")
         return None

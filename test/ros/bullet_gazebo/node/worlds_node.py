@@ -5,7 +5,9 @@ See docs/contract/gazebo.md 2.3 to 2.5.
 """
 
 import os
+import subprocess
 import tempfile
+import threading
 import time
 import unittest
 
@@ -241,7 +243,7 @@ class Refusals(unittest.TestCase):
         self.refused(
             "longer than 1000 bytes", "new", f'<robot name="r"><link name="{"x" * 10**7}"/></robot>'
         )
-        links = "".join(f'<link name="l{i}"/>' for i in range(500_000))
+        links = "".join(f'<link name="l{i}"/>' for i in range(400_000))
         self.refused("links", "new", f'<robot name="r">{links}</robot>')
         with self.assertRaises(rospy.ServiceException):
             spawn("new", "<!--" * 2_500_000, service="urdf")
@@ -269,12 +271,90 @@ class Refusals(unittest.TestCase):
         )
 
 
+class OddFiles(unittest.TestCase):
+    """Files and texts that take long, or come from elsewhere."""
+
+    def test_an_include_bomb_is_refused_with_its_limit(self):
+        """Ten includes of ten includes, seven levels: ten million models."""
+        with tempfile.TemporaryDirectory() as folder:
+            for level in range(7):
+                include = f"<include><uri>file://{folder}/{level + 1}.sdf</uri><name>m{{}}</name></include>"
+                includes = "".join(include.format(i) for i in range(10))
+                with open(f"{folder}/{level}.sdf", "w") as file:
+                    file.write(f'<sdf version="1.6"><model name="m">{includes}</model></sdf>')
+            with open(f"{folder}/7.sdf", "w") as file:
+                file.write('<sdf version="1.6"><model name="leaf"/></sdf>')
+            uri = f"file://{folder}/0.sdf"
+            answer = spawn("bomb", f'<sdf version="1.6"><include><uri>{uri}</uri></include></sdf>')
+        self.assertFalse(answer.success)
+        self.assertIn(f"<include> of 'file://{folder}/7.sdf'", answer.status_message)
+        self.assertIn("more than 5000 models (MAX_MODELS)", answer.status_message)
+
+    def test_a_giant_text_is_refused_with_its_limit(self):
+        for service in ("sdf", "urdf"):
+            answer = spawn("giant", "<robot>" + " " * 70_000_000, service=service)
+            self.assertFalse(answer.success)
+            self.assertIn("bytes of XML (MAX_BYTES)", answer.status_message)
+
+    def test_spawns_of_others_go_on_while_a_file_is_read(self):
+        """Seven hundred links are melted one after the other, for seconds; then a fault is found."""
+        inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+        shapes = '<visual><geometry><box size="1 1 1"/></geometry></visual>' * 3
+        ends = '<parent link="l{}"/><child link="l{}"/></joint>'
+        links = "".join(f'<link name="l{i}">{inertial}{shapes}</link>' for i in range(700))
+        joints = "".join(
+            f'<joint name="j{i}" type="{"fixed" if i < 698 else "planar"}">' + ends.format(i, i + 1)
+            for i in range(699)
+        )
+        answers = []
+
+        def spawn_slowly():
+            answers.append(spawn("slow", f'<robot name="r">{links}{joints}</robot>'))
+
+        client = threading.Thread(target=spawn_slowly)
+        client.start()
+        served = 0
+        while not answers:
+            self.assertTrue(spawn("quick", BOX.format(more=""), initial_pose=at(40.0)).success)
+            self.assertTrue(delete("quick").success)
+            served += not answers
+        client.join()
+        self.assertIn("a planar joint is only simulated", answers[0].status_message)
+        # One may come before the slow one is looked at; if they waited, no second one would.
+        self.assertGreater(served, 2)
+
+    def test_texts_may_say_what_files_say_of_themselves(self):
+        """The text of a parameter or request is decoded already, whatever its declaration says."""
+        declaration = '<?xml version="1.0" encoding="{}"?>\r\n'
+        for number, encoding in enumerate(("utf-8", "ISO-8859-1", "utf-16")):
+            for before in ("", "\ufeff", "\r\n <!-- mine -->\n"):
+                for service, text in (("urdf", URDF), ("sdf", URDF), ("sdf", BOX.format(more=""))):
+                    xml = before + declaration.format(encoding) + text
+                    answer = spawn("Gerät", xml, service, initial_pose=at(50.0 + number))
+                    self.assertTrue(answer.success, answer.status_message)
+                    self.assertTrue(delete("Gerät").success)
+
+    def test_spawn_model_reads_files_of_every_encoding(self):
+        declaration = '\n<!-- mine -->\n<?xml version="1.0" encoding="{0}"?>\r\n<!-- Gelände -->'
+        with tempfile.NamedTemporaryFile(suffix=".sdf") as file:
+            for encoding in ("utf-8-sig", "utf-16", "latin-1"):
+                text = declaration.format(encoding.removesuffix("-sig")) + BOX.format(more="")
+                with open(file.name, "wb") as written:
+                    written.write(text.encode(encoding))
+                command = ["rosrun", "gazebo_ros", "spawn_model", "-sdf", "-model", "from_file"]
+                for source in (["-file", file.name], ["-stdin"]):
+                    with open(file.name, "rb") as piped:
+                        code = subprocess.call([*command, *source, "-x", "60"], stdin=piped)
+                    self.assertEqual(code, 0, (encoding, source))
+                    self.assertTrue(delete("from_file").success)
+
+
 class Worlds(unittest.TestSuite):
     def __init__(self):
         super().__init__()
         loader = unittest.defaultTestLoader
         self.addTests(
-            loader.loadTestsFromTestCase(kind) for kind in (WorldFile, Spawning, Refusals)
+            loader.loadTestsFromTestCase(kind) for kind in (WorldFile, Spawning, Refusals, OddFiles)
         )
 
 

@@ -156,19 +156,6 @@ def test_plugins_of_the_model_are_kept():
             robot(link("a"), link("b"), '<joint name="j" type="revolute"><parent link="a"/>'
                   '<child link="b"/></joint>'), "joint 'j': a revolute joint needs <limit>",
         ),
-        (
-            robot(link("a"), link("b"), '<joint name="j" type="revolute"><parent link="a"/>'
-                  '<child link="b"/><limit lower="1" upper="0" effort="1" velocity="1"/></joint>'),
-            "joint 'j', limit: lower 1.0 is above upper 0.0",
-        ),
-        (
-            robot(link("a", more="<collision><geometry/></collision>")),
-            "link 'a', collision: <geometry> with a shape is missing",
-        ),
-        (
-            robot(link("a", more='<visual><geometry><box size="1 2"/></geometry></visual>')),
-            "link 'a', visual: <box size> must hold 3 numbers, not '1 2'",
-        ),
     ],
 )  # fmt: skip
 def test_a_fault_is_one_line_with_its_place(text, fault):

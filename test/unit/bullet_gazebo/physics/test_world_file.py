@@ -142,7 +142,7 @@ def test_without_a_usable_file_the_world_is_empty_and_the_log_says_why(tmp_path,
     path = tmp_path / "my.world"
     if text is not None:
         path.write_text(text)
-    assert list(read_world(str(path)).models) == ["ground_plane"]
+    assert list(read_world(str(path), lambda: False).models) == ["ground_plane"]
     (line,) = caplog.messages
     assert str(path) in line
     assert "empty but for a ground plane" in line

@@ -39,7 +39,7 @@ class Frames:
         while name not in self._known:
             if name in chain:
                 raise DescriptionError(
-                    f"the frames {list(chain)[:5]} refer to each other in a circle"
+                    f"the frames {[shown(each) for each in list(chain)[:5]]} refer to each other in a circle"
                 )
             if name not in self._given:
                 raise DescriptionError(f"frame '{shown(name)}' does not exist")

@@ -1,11 +1,19 @@
 """Inertia and shapes of an SDF link (sdformat.org, specification 1.4 to 1.7)."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from xml.etree.ElementTree import Element
 
-from bullet_gazebo.physics.description import Color, DescriptionError, Inertia, Shape
-from bullet_gazebo.physics.elements import finite, numbers, positive
+from bullet_gazebo.physics.description import (
+    Color,
+    DescriptionError,
+    Inertia,
+    LimitExceeded,
+    Shape,
+)
+from bullet_gazebo.physics.elements import files_named_by_a_model, finite, numbers, positive, shown
+from bullet_gazebo.physics.files.reading import Reading
 from bullet_gazebo.physics.files.sdf.frames import Frames, read_pose
 from bullet_gazebo.physics.meshes.mesh_files import MeshFinder
 from bullet_gazebo.physics.pose import Pose, Quaternion, cross, normalized
@@ -38,16 +46,18 @@ class ShapeReader:
 
     meshes: MeshFinder
     frames: Frames
+    reading: Reading
     warnings: list[str] = field(default_factory=list)
 
     def read(self, link: Element, tag: str, where: str) -> Iterator[Shape]:
         """Yields the shapes; a visual that can't be shown is a warning."""
         for element in link.findall(tag):
-            here = f"{where}, {tag} '{element.get('name', '')[:80]}'"
+            here = f"{where}, {tag} '{shown(element.get('name', ''))}'"
+            self.reading.check()
             try:
                 shape = self._shape(element, link.get("name", ""), here)
             except DescriptionError as error:
-                if tag == "collision":
+                if tag == "collision" or isinstance(error, LimitExceeded):
                     raise
                 self.warnings.append(f"{error}; it is left out")
                 continue
@@ -67,7 +77,8 @@ class ShapeReader:
             pose = frame.compose(pose).relative_to(self.frames.resolve(link))
         mesh, size = "", _size(solid, where)
         if solid.tag == "mesh":
-            found = self.meshes.find(solid.findtext("uri") or "", where, collides)
+            with files_named_by_a_model(where):
+                found = self.meshes.find(solid.findtext("uri") or "", where, collides)
             if found is None:
                 return None
             mesh = found
@@ -87,7 +98,7 @@ def _friction(collision: Element, where: str) -> float:
 
 
 def _size(solid: Element, where: str) -> tuple[float, ...]:
-    where = f"{where}, {solid.tag}"
+    where = f"{where}, {shown(solid.tag)}"
     if solid.tag == "box":
         return numbers(solid.findtext("size", "1 1 1"), f"{where}: <size>", 3)
     if solid.tag == "cylinder":
@@ -105,8 +116,8 @@ def _onto_normal(plane: Element, where: str) -> Quaternion:
     """The shortest rotation that takes z onto the plane's normal."""
     x, y, z = numbers(plane.findtext("normal", "0 0 1"), f"{where}: <normal>", 3)
     length = (x * x + y * y + z * z) ** 0.5
-    if length == 0.0:
-        raise DescriptionError(f"{where}: the plane's normal has length 0")
+    if not 0.0 < length < math.inf:
+        raise DescriptionError(f"{where}: the plane's normal has length {length:g}")
     if z < -0.999999 * length:
         return (1.0, 0.0, 0.0, 0.0)
     axis = cross((0.0, 0.0, 1.0), (x, y, z))
@@ -122,6 +133,6 @@ def _color(element: Element, where: str) -> Color | None:
 
 def read_color(text: str, where: str) -> Color:
     """Returns red, green, blue and alpha; alpha may be missing."""
-    words = [*text.split(), "1"][:4]
+    words = [*text.split(None, 4), "1"][:4]
     r, g, b, a = numbers(" ".join(words), where, 4)
     return (r, g, b, a)

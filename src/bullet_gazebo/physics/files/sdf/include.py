@@ -1,16 +1,19 @@
 """`<include>` in SDF: models from folders on the model path."""
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.elements import parse_xml, place, shown
+from bullet_gazebo.physics.elements import files_named_by_a_model, place, shown
+from bullet_gazebo.physics.files.reading import Reading
 from bullet_gazebo.physics.meshes.mesh_files import Resources
 
 OVERRIDES = ("pose", "static")
 BUILT_IN = "model://"
 NEWEST = (1, 7)
+VERSION = re.compile(r"(\d{1,9})\.(\d{1,9})", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -18,6 +21,7 @@ class FileContext:
     """Where an element of a model file comes from: what its URIs and its version mean."""
 
     resources: Resources
+    reading: Reading
     version: tuple[int, int]
     folder: Path | None = None
 
@@ -43,16 +47,11 @@ def included_name(include: Element) -> str:
 
 
 def _open(uri: str, context: FileContext) -> tuple[Element, FileContext]:
-    found = context.resources.find(uri, context.folder)
-    path = _model_file(found) if found.is_dir() else found
-    if path.exists() and not path.is_file():  # reading a pipe would wait for ever
-        raise DescriptionError(f"{path} is not a file")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DescriptionError(f"{path} can't be read: {error}") from error
+    with files_named_by_a_model(f"'{shown(uri)}'"):
+        found = context.resources.find(uri, context.folder)
+        path = _model_file(found, context.reading) if found.is_dir() else found
+    root = context.reading.open(path)
     with place(str(path)):
-        root = parse_xml(text)
         if root.tag not in ("sdf", "gazebo"):
             raise DescriptionError(f"the root element is <{shown(root.tag)}>, not <sdf>")
         for element in root:
@@ -76,16 +75,13 @@ def _overridden(entity: Element, include: Element) -> Element:
     return copy
 
 
-def _model_file(folder: Path) -> Path:
+def _model_file(folder: Path, reading: Reading) -> Path:
     """The newest file that model.config offers for a version that is read here; else model.sdf."""
     config = folder / "model.config"
     if not config.is_file():
         return folder / "model.sdf"
+    root = reading.open(config)
     with place(str(config)):
-        try:
-            root = parse_xml(config.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError) as error:
-            raise DescriptionError(f"can't be read: {error}") from error
         files = [
             (_version(element.get("version", "")) or (1, 0), (element.text or "").strip())
             for element in root.findall("sdf")
@@ -97,8 +93,8 @@ def _model_file(folder: Path) -> Path:
 
 
 def _version(text: str) -> tuple[int, int] | None:
-    major, _, minor = text.strip().partition(".")
-    return (int(major), int(minor)) if major.isdecimal() and minor.isdecimal() else None
+    match = VERSION.fullmatch(text.strip())
+    return None if match is None else (int(match.group(1)), int(match.group(2)))
 
 
 def renamed(entity: Element, name: str) -> Element:

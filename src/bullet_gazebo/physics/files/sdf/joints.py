@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import DescriptionError, Joint
-from bullet_gazebo.physics.elements import named, numbers, truth
+from bullet_gazebo.physics.elements import named, numbers, shown, truth
 from bullet_gazebo.physics.files.sdf.frames import MODEL, Frames, read_pose
 from bullet_gazebo.physics.files.sdf.geometry import value
 from bullet_gazebo.physics.pose import Pose, Vector, conjugate, rotate
@@ -35,7 +35,7 @@ class JointReader:
         kind = element.get("type", "")
         if kind not in KINDS:
             raise DescriptionError(
-                f"{where}: type '{kind[:80]}' is not simulated; {', '.join(KINDS)} are"
+                f"{where}: type '{shown(kind)}' is not simulated; {', '.join(KINDS)} are"
             )
         joint = Joint(name, kind, ends(element, "parent"), ends(element, "child"), kept=True)
         if joint.child == WORLD:
@@ -56,7 +56,7 @@ class JointReader:
         try:
             return Pose() if name == WORLD else self.frames.resolve(name)
         except DescriptionError as error:
-            raise DescriptionError(f"{where}: link '{name[:80]}': {error}") from error
+            raise DescriptionError(f"{where}: link '{shown(name)}': {error}") from error
 
     def _set_axis(self, joint: Joint, element: Element, where: str) -> None:
         axis = element.find("axis")
@@ -86,8 +86,8 @@ class JointReader:
         text = "0 0 1" if xyz is None else xyz.text
         x, y, z = numbers(text, f"{where}: <xyz>", 3)
         length = math.sqrt(x * x + y * y + z * z)
-        if length == 0.0:
-            raise DescriptionError(f"{where}: the axis has length 0")
+        if not 0.0 < length < math.inf:
+            raise DescriptionError(f"{where}: the axis has length {length:g}")
         direction = (x / length, y / length, z / length)
         frame = "" if xyz is None else xyz.get("expressed_in", "")
         if axis is not None and truth(
@@ -105,5 +105,5 @@ def ends(joint: Element, role: str) -> str:
     """Returns the name of the link at one end of a joint."""
     name = (joint.findtext(role) or "").strip()
     if not name:
-        raise DescriptionError(f"joint '{joint.get('name', '')[:80]}': <{role}> is missing")
+        raise DescriptionError(f"joint '{shown(joint.get('name', ''))}': <{role}> is missing")
     return name

@@ -13,23 +13,25 @@ from bullet_gazebo.physics import elements
 from bullet_gazebo.physics.description import (
     DescriptionError,
     Joint,
+    LimitExceeded,
     Link,
     ModelDescription,
     Plugin,
 )
-from bullet_gazebo.physics.elements import named, parse_xml, shown, truth
+from bullet_gazebo.physics.elements import named, shown, truth
+from bullet_gazebo.physics.files.reading import Reading
 from bullet_gazebo.physics.files.sdf.frames import Frames, read_pose
 from bullet_gazebo.physics.files.sdf.geometry import ShapeReader, read_inertia
 from bullet_gazebo.physics.files.sdf.include import FileContext, open_include
 from bullet_gazebo.physics.files.sdf.joints import WORLD, JointReader, ends
-from bullet_gazebo.physics.files.urdf_extensions import name_sensor, read_plugin
+from bullet_gazebo.physics.files.urdf.extensions import name_sensor, read_plugin
 from bullet_gazebo.physics.mechanics.lumping import detach_from_world
-from bullet_gazebo.physics.mechanics.tree import find_roots, unique
+from bullet_gazebo.physics.mechanics.tree import check_count, find_roots, unique
 from bullet_gazebo.physics.meshes.mesh_files import MeshFinder, Resources
 from bullet_gazebo.physics.pose import Pose
 
 MAX_NESTING = 10
-VERSION = re.compile(r"1\.(\d+)(\.\d+)?")
+VERSION = re.compile(r"1\.(\d{1,9})(\.\d+)?", re.ASCII)
 NEWEST = (1, 7)
 
 
@@ -46,7 +48,7 @@ class _Parts:
 
 
 def parse_sdf(
-    text: str, source: str = "SDF", resources: Resources | None = None
+    text: str | bytes, source: str = "SDF", resources: Resources | None = None
 ) -> ModelDescription:
     """Returns the first model of an SDF text, in the file's pose if it gives one (`initial_pose`).
 
@@ -54,8 +56,9 @@ def parse_sdf(
         DescriptionError: if it can't be simulated: `source`, the place and the fault, in one line.
     """
     with elements.place(source):
-        root = parse_xml(text)
-        context = FileContext(resources or Resources(), sdf_version(root))
+        reading = Reading()
+        root = reading.parse(text)
+        context = FileContext(resources or Resources(), reading, sdf_version(root))
         model = first_entity(root)
         if model.tag == "include":
             model, context = open_include(model, context)
@@ -130,7 +133,8 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
 def _read_parts(model: Element, context: FileContext, static: bool, depth: int) -> _Parts:
     """`depth` models may still be nested in this one."""
     if depth == 0:
-        raise DescriptionError(f"models are nested more than {MAX_NESTING} deep")
+        raise LimitExceeded(f"models are nested more than {MAX_NESTING} deep (MAX_NESTING)")
+    context.reading.model()
     parts, frames = _Parts(), Frames()
     nested = list(_nested(model, context, static, depth))
     _name_frames(model, frames)
@@ -139,7 +143,10 @@ def _read_parts(model: Element, context: FileContext, static: bool, depth: int) 
         for link, pose in inner.poses.items():
             frames.add(f"{name}::{link}", pose, name)
     collide = truth(model.findtext("self_collide"))
-    for element in model.findall("link"):
+    links = model.findall("link")
+    check_count(len(links))
+    for element in links:
+        context.reading.check()
         read = _read_link(element, context, frames, parts, static)
         read.self_collide = truth(element.findtext("self_collide"), default=collide)
         parts.links.append(read)
@@ -158,11 +165,12 @@ def _nested(
     for element in model:
         if element.tag not in ("model", "include"):
             continue
-        inner, inner_context = element, context
+        inner, inner_context, origin = element, context, ""
         if element.tag == "include":
             inner, inner_context = open_include(element, context)
+            origin = f" (<include> of '{shown((element.findtext('uri') or '').strip())}')"
         name = named(inner, "model")
-        with elements.place(f"model '{shown(name)}'"):
+        with elements.place(f"model '{shown(name)}'{origin}"):
             yield name, inner, _read_parts(inner, inner_context, static, depth - 1)
 
 
@@ -178,6 +186,7 @@ def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
                 f"joint '{joint.name}': a nested model can't be joined to the world"
             )
     parts.links += inner.links
+    check_count(len(parts.links))
     parts.joints += inner.joints
     parts.plugins += inner.plugins
     parts.warnings += inner.warnings
@@ -204,7 +213,7 @@ def _read_link(
     name = named(element, "link")
     where = f"link '{name}'"
     meshes = MeshFinder(context.resources, context.folder, parts.warnings)
-    shapes = ShapeReader(meshes, frames, parts.warnings)
+    shapes = ShapeReader(meshes, frames, context.reading, parts.warnings)
     link = Link(name, read_inertia(element, where, static))
     link.collisions = list(shapes.read(element, "collision", where))
     link.visuals = list(shapes.read(element, "visual", where))

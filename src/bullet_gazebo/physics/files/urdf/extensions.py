@@ -1,6 +1,7 @@
 """What `<gazebo>` blocks of a URDF say beyond URDF: plugins, friction, gravity, kept fixed joints.
 
-See docs/contract/gazebo.md 2.4. Sensors are out of scope: they are listed in `left_out`.
+See docs/contract/gazebo.md 2.4. A value is the attribute `value`, or else the text. Sensors are out of scope:
+they are listed in `left_out`.
 """
 
 from dataclasses import replace
@@ -13,7 +14,10 @@ from bullet_gazebo.physics.description import (
     ModelDescription,
     Plugin,
 )
-from bullet_gazebo.physics.elements import finite, truth
+from bullet_gazebo.physics.elements import finite, shown
+
+YES = ("true", "yes", "1")
+NO = ("false", "no", "0")
 
 
 def apply_extensions(model: ModelDescription, robot: Element) -> None:
@@ -34,7 +38,7 @@ def apply_extensions(model: ModelDescription, robot: Element) -> None:
             _apply_to_joint(model.joints[reference], block)
         else:
             model.warnings.append(
-                f"<gazebo reference='{reference[:80]}'> refers to no link or joint"
+                f"<gazebo reference='{shown(reference)}'> refers to no link or joint"
             )
 
 
@@ -44,7 +48,7 @@ def read_plugin(element: Element) -> Plugin:
 
 def name_sensor(element: Element, owner: str) -> str:
     """Returns what to call a sensor that is left out."""
-    kind, name = element.get("type", "unknown"), element.get("name", "")
+    kind, name = shown(element.get("type", "unknown")), shown(element.get("name", ""))
     return f"{kind} sensor '{name}' of {owner}"
 
 
@@ -52,38 +56,48 @@ def _apply_to_model(model: ModelDescription, block: Element) -> None:
     model.plugins += [read_plugin(element) for element in block.findall("plugin")]
     for element in block:
         if element.tag == "static":
-            model.static = model.static or truth(element.text)
-        elif element.tag == "self_collide" and truth(element.text):
+            model.static = model.static or _value(element) in YES
+        elif element.tag == "self_collide" and _value(element) in YES:
             for link in model.links.values():
                 link.self_collide = True
 
 
 def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
     for element in block:
-        place = f"<gazebo reference='{link.name}'>, <{element.tag}>"
+        place = f"<gazebo reference='{shown(link.name)}'>, <{element.tag}>"
         if element.tag == "mu1":
-            mu = _not_negative(element.text or "", place)
+            mu = _not_negative(_value(element), place)
             link.collisions = [replace(shape, mu=mu) for shape in link.collisions]
         elif element.tag == "turnGravityOff":
-            link.gravity = not truth(element.text)
+            link.gravity = (
+                _value(element) in NO
+            )  # whatever else stands there, or nothing, turns it off
         elif element.tag == "gravity":
-            link.gravity = truth(element.text, default=True)
+            link.gravity = _value(element) in ("", *YES)
         elif element.tag == "selfCollide":
-            link.self_collide = truth(element.text)
+            link.self_collide = _value(element) in YES
         elif element.tag == "sensor":
-            model.left_out.append(name_sensor(element, f"link '{link.name}'"))
+            model.left_out.append(name_sensor(element, f"link '{shown(link.name)}'"))
         elif element.tag == "plugin":
-            model.left_out.append(f"plugin {element.get('filename', '')} of link '{link.name}'")
+            name = shown(element.get("filename", ""))
+            model.left_out.append(f"plugin {name} of link '{shown(link.name)}'")
 
 
 def _apply_to_joint(joint: Joint, block: Element) -> None:
     """A fixed joint is kept as it is, or as a hinge that can't turn."""
     if joint.kind != "fixed":
         return
-    if truth(block.findtext("preserveFixedJoint")):
+    if _value(block.find("preserveFixedJoint")) in YES:
         joint.kept = True
-    elif truth(block.findtext("disableFixedJointLumping")):
+    elif _value(block.find("disableFixedJointLumping")) in YES:
         joint.kind = "revolute"
+
+
+def _value(element: Element | None) -> str:
+    """The value of an extension, without blanks, in small letters."""
+    if element is None:
+        return ""
+    return (element.get("value", element.text) or "").strip().lower()
 
 
 def _not_negative(text: str, place: str) -> float:

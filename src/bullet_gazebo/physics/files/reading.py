@@ -1,0 +1,101 @@
+"""How much one model or world may make its reader read, and the files that it names."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
+from bullet_gazebo.physics.elements import parse_xml, place
+from file_reading.content import MAX_BYTES, read_file
+from file_reading.errors import FileError, TooLarge
+from file_reading.xml_parser import MAX_ELEMENTS
+
+# All of it together: the text itself and what it includes, each time that it includes it.
+MAX_FILES = 1000  # different ones
+MAX_MODELS = 5000  # in a world, or nested in a model
+MAX_SECONDS = 60.0  # [s] of computing, however busy the machine is otherwise
+
+
+def _never() -> bool:
+    return False
+
+
+class Reading:
+    """What reading one model or world has taken so far; beyond a limit it ends with LimitExceeded.
+
+    The limits: MAX_BYTES, MAX_ELEMENTS, MAX_FILES, MAX_MODELS and MAX_SECONDS. A file is parsed once,
+    however often it is included; its elements count each time.
+    """
+
+    def __init__(self, cancelled: Callable[[], bool] = _never) -> None:
+        """Made in the thread that reads; it ends as well once `cancelled` returns true."""
+        self._cancelled = cancelled
+        self._end = time.thread_time() + MAX_SECONDS
+        self._bytes = self._elements = self._models = 0
+        self._files: dict[Path, tuple[Element, int]] = {}
+
+    def parse(self, text: str | bytes) -> Element:
+        """Returns the root element of an XML text or a file's content.
+
+        Raises:
+            DescriptionError: if it isn't well-formed.
+            LimitExceeded: if it is too large.
+        """
+        self._bytes += len(text)
+        if self._bytes > MAX_BYTES:
+            raise LimitExceeded(f"more than {MAX_BYTES} bytes of XML (MAX_BYTES)")
+        return parse_xml(text, self._count)
+
+    def open(self, path: Path) -> Element:
+        """Returns the root element of a file, which is the same object each time: don't change it.
+
+        Raises:
+            DescriptionError: if it can't be read; the text names it.
+            LimitExceeded: if it is too much.
+        """
+        with place(str(path)):
+            if path in self._files:
+                root, elements = self._files[path]
+                self._count(elements)
+                return root
+            if len(self._files) == MAX_FILES:
+                raise LimitExceeded(f"more than {MAX_FILES} files are included (MAX_FILES)")
+            before = self._elements
+            try:
+                data = read_file(path)
+            except TooLarge as error:
+                raise LimitExceeded(str(error)) from error
+            except FileError as error:
+                raise DescriptionError(str(error)) from error
+            root = self.parse(data)
+            self._files[path] = root, self._elements - before
+            return root
+
+    def model(self) -> None:
+        """Counts one model more.
+
+        Raises:
+            LimitExceeded: if that is one too many.
+        """
+        self._models += 1
+        if self._models > MAX_MODELS:
+            raise LimitExceeded(f"more than {MAX_MODELS} models (MAX_MODELS)")
+        self.check()
+
+    def check(self) -> None:
+        """For everybody who reads one thing after the other.
+
+        Raises:
+            LimitExceeded: if it has taken too long, or was cancelled.
+        """
+        if time.thread_time() > self._end:
+            raise LimitExceeded(f"reading takes more than {MAX_SECONDS:g} s (MAX_SECONDS)")
+        if self._cancelled():
+            raise LimitExceeded("reading was interrupted")
+
+    def _count(self, elements: int) -> None:
+        self._elements += elements
+        if self._elements > MAX_ELEMENTS:
+            raise LimitExceeded(f"more than {MAX_ELEMENTS} elements (MAX_ELEMENTS)")
+        self.check()

@@ -1,0 +1,215 @@
+"""What one model or world may make its reader read: include bombs, giants, files that are none."""
+
+import os
+
+import pytest
+
+from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
+from bullet_gazebo.physics.files import reading as limits
+from bullet_gazebo.physics.files.model_file import read_entity
+from bullet_gazebo.physics.files.reading import Reading
+from bullet_gazebo.physics.files.sdf.models import parse_sdf
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.files.world_file import load_world, parse_world
+from bullet_gazebo.physics.meshes.mesh_files import Resources
+
+WIDTH, LEVELS = 10, 7  # a bomb: ten includes of ten includes of ...
+MODEL = '<sdf version="1.6"><model name="{}">{}</model></sdf>'
+INCLUDE = "<include><uri>model://{}</uri><name>{}</name></include>"
+LINK = '<link name="body"/>'
+
+
+def write_model(folder, name, text):
+    (folder / name).mkdir()
+    (folder / name / "model.sdf").write_text(text)
+
+
+@pytest.fixture
+def bomb(tmp_path):
+    """A folder of models: b0 includes b1 ten times, and so on; what is left of them is some links."""
+    for level in range(LEVELS):
+        inner = "".join(INCLUDE.format(f"b{level + 1}", f"m{i}") for i in range(WIDTH))
+        write_model(tmp_path, f"b{level}", MODEL.format(f"b{level}", inner))
+    write_model(tmp_path, f"b{LEVELS}", MODEL.format("leaf", LINK))
+    return Resources(models=(tmp_path,))
+
+
+def test_an_include_bomb_is_refused_as_a_model(bomb):
+    """At the latest by the number of its links: it would have ten million."""
+    with pytest.raises(DescriptionError) as raised:
+        parse_sdf(MODEL.format("m", INCLUDE.format("b0", "m")), resources=bomb)
+    assert "there are 1010 links" in str(raised.value) or "(MAX_" in str(raised.value)
+    assert "<include> of 'model://b0'" in str(raised.value)
+
+
+def test_an_include_bomb_without_links_is_refused_by_the_number_of_models(bomb, tmp_path):
+    (tmp_path / f"b{LEVELS}" / "model.sdf").write_text(MODEL.format("leaf", ""))
+    with pytest.raises(LimitExceeded) as raised:
+        parse_sdf(MODEL.format("m", INCLUDE.format("b0", "m")), resources=bomb)
+    assert str(raised.value).endswith("more than 5000 models (MAX_MODELS)")
+
+
+def test_a_world_with_a_bomb_is_refused_as_a_whole(bomb):
+    """Each of its models alone would be within all limits."""
+    includes = "".join(INCLUDE.format(f"b{LEVELS}", f"m{i}") for i in range(6000))
+    with pytest.raises(LimitExceeded, match=r"more than 5000 models \(MAX_MODELS\)"):
+        parse_world(f'<sdf version="1.6"><world name="w">{includes}</world></sdf>', bomb)
+
+
+def test_a_file_counts_each_time_that_it_is_included(tmp_path, monkeypatch):
+    monkeypatch.setattr(limits, "MAX_ELEMENTS", 2000)
+    write_model(tmp_path, "big", MODEL.format("big", LINK + "<x/>" * 500))
+    includes = "".join(INCLUDE.format("big", f"m{i}") for i in range(5))
+    with pytest.raises(LimitExceeded, match=r"more than 2000 elements \(MAX_ELEMENTS\)"):
+        parse_world(f'<sdf version="1.6"><world name="w">{includes}</world></sdf>',
+                    Resources(models=(tmp_path,)))  # fmt: skip
+
+
+def test_so_many_files_and_bytes_are_read_and_no_more(tmp_path, monkeypatch):
+    for name in "abcd":
+        write_model(tmp_path, name, MODEL.format(name, LINK + " " * 1000))
+    includes = "".join(INCLUDE.format(name, name) for name in "abcdabcd")
+    text = (
+        f'<sdf version="1.6"><world name="w">{includes.replace("<name>", "<name>x")}</world></sdf>'
+    )
+    resources = Resources(models=(tmp_path,))
+    monkeypatch.setattr(limits, "MAX_FILES", 4)
+    assert (
+        len(parse_world(text, resources).models) == 4
+    )  # a file that is known already is none more
+    monkeypatch.setattr(limits, "MAX_FILES", 3)
+    with pytest.raises(LimitExceeded) as raised:
+        parse_world(text, resources)
+    assert f"{tmp_path}/d/model.sdf: more than 3 files" in str(raised.value)
+    assert "(MAX_FILES)" in str(raised.value)
+    monkeypatch.undo()
+    monkeypatch.setattr(limits, "MAX_BYTES", 3000)
+    with pytest.raises(LimitExceeded) as raised:
+        parse_world(text, resources)
+    assert f"{tmp_path}/c/model.sdf: more than 3000 bytes" in str(raised.value)
+
+
+@pytest.mark.parametrize("read", [parse_urdf, parse_sdf])
+def test_time_is_bounded_and_told(monkeypatch, read):
+    monkeypatch.setattr(limits, "MAX_SECONDS", 0.0)
+    link = '<link name="body"><inertial><mass value="1"/></inertial></link>'
+    text = f'<robot name="r">{link}</robot>' if read is parse_urdf else MODEL.format("m", link)
+    with pytest.raises(LimitExceeded, match=r"reading takes more than 0 s \(MAX_SECONDS\)"):
+        read(text)
+
+
+def test_reading_ends_when_it_is_cancelled():
+    asked = []
+
+    def cancelled():
+        asked.append(None)
+        return len(asked) > 3
+
+    text = MODEL.format("m", "".join(f'<link name="l{i}"/>' for i in range(900)))
+    with pytest.raises(LimitExceeded, match="reading was interrupted"):
+        read_entity(text, "m", Resources(), Reading(cancelled))
+    assert len(asked) == 4
+
+
+def test_a_giant_text_names_the_limit(monkeypatch):
+    monkeypatch.setattr(limits, "MAX_BYTES", 1000)
+    for text in ("<robot>" * 1000, MODEL.format("m", LINK * 1000)):
+        with pytest.raises(LimitExceeded) as raised:
+            read_entity(text, "mine", Resources(), Reading())
+        assert str(raised.value) == "model 'mine': more than 1000 bytes of XML (MAX_BYTES)"
+
+
+def test_values_of_megabytes_are_refused_in_a_short_line():
+    long = "1 " * 5_000_000
+    with pytest.raises(DescriptionError) as raised:
+        parse_sdf(MODEL.format("m", f'<link name="a"><pose>{long}</pose></link>'))
+    assert "link 'a': <pose> must hold 6 numbers, not '1 1 1" in str(raised.value)
+    name = "n" * 1_000_000
+    for text in (
+        f'<robot name="r"><link name="a"/><joint name="j" type="{name}"/></robot>',
+        f'<robot name="r"><{name}/></robot>',
+        f'<robot name="r"><link name="a"><visual><geometry><{name}/></geometry></visual></link></robot>',
+        f'<robot name="r"><gazebo reference="{name}"/><link name="a"/></robot>',
+        f"<{name}/>",
+    ):
+        with pytest.raises(DescriptionError) as raised:
+            parse_urdf(text)
+        assert len(str(raised.value)) < 5000
+
+
+def test_a_name_with_a_line_end_makes_no_second_line_in_a_log():
+    with pytest.raises(DescriptionError) as raised:
+        parse_urdf(
+            '<robot name="r"><link name="a&#10;[FATAL] x"/><link name="a&#10;[FATAL] x"/></robot>'
+        )
+    assert "link 'a [FATAL] x' is there twice" in str(raised.value)
+
+
+ODD = {
+    "pipe": os.mkfifo,
+    "loop": lambda path: path.symlink_to("loop"),
+    "zero": lambda path: path.symlink_to("/dev/zero"),
+    "folder": lambda path: (path / "model.sdf").mkdir(parents=True),
+    "empty": lambda path: path.mkdir(),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+@pytest.mark.parametrize("scheme", ["file://{}/", "model://", "{}/"])
+def test_files_that_are_none_are_refused_at_once(tmp_path, name, scheme):
+    ODD[name](tmp_path / name)
+    uri = scheme.format(tmp_path) + name
+    with pytest.raises(DescriptionError) as raised:
+        parse_sdf(MODEL.format("m", INCLUDE.format("", "m").replace("model://", uri)),
+                  resources=Resources(models=(tmp_path,)))  # fmt: skip
+    assert f"<include> of '{uri}'" in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("uri", "fault"),
+    [
+        ("gz://models/box", "gz:// is not read here"),
+        ("https://fuel.gazebosim.org/1.0/m", "https:// is not read here"),
+        ("file:///dev/zero", "it is not a file"),
+        ("file:///dev/tty", "it is not a file"),
+        ("/proc/self/mem", "it can't be read"),
+        ("model://" + "x" * 5000, "File name too long"),
+        ("model://%00", "is not found"),
+        ("~%00/x", "null byte"),
+        ("", "<uri> is missing"),
+    ],
+)
+def test_uris_that_lead_nowhere(tmp_path, uri, fault):
+    with pytest.raises(DescriptionError) as raised:
+        parse_sdf(MODEL.format("m", f"<include><uri>{uri}</uri></include>"),
+                  resources=Resources(models=(tmp_path,)))  # fmt: skip
+    assert fault in str(raised.value)
+
+
+def test_versions_of_any_length_are_versions_or_none(tmp_path):
+    with pytest.raises(DescriptionError, match="no version 1.x"):
+        parse_sdf(f'<sdf version="1.{"9" * 5000}"><model name="m">{LINK}</model></sdf>')
+    (tmp_path / "m").mkdir()
+    config = f'<model><sdf version="1.{"9" * 5000}">model.sdf</sdf></model>'
+    (tmp_path / "m" / "model.config").write_text(config)
+    (tmp_path / "m" / "model.sdf").write_text(MODEL.format("m", LINK))
+    assert parse_sdf(
+        MODEL.format("x", INCLUDE.format("m", "y")), resources=Resources(models=(tmp_path,))
+    )
+
+
+@pytest.mark.parametrize("codec", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+@pytest.mark.parametrize("before", ["", "\r\n<!-- mine -->\r\n "])
+def test_worlds_models_and_configurations_of_every_encoding(tmp_path, before, codec):
+    def put(path, text):
+        declaration = f'<?xml version="1.0" encoding="{codec.removesuffix("-sig")}"?>\r\n'
+        path.write_bytes(f"{before}{declaration}{text}".encode(codec))
+
+    folder = tmp_path / "crate"
+    folder.mkdir()
+    put(folder / "model.config", '<model><sdf version="1.6">mine.sdf</sdf></model>')
+    put(folder / "mine.sdf", MODEL.format("crate", LINK))
+    include = INCLUDE.format("crate", "Kiste für Äpfel")
+    put(tmp_path / "w", f'<sdf version="1.6"><world name="w">{include}</world></sdf>')
+    world = load_world(tmp_path / "w", Resources(models=(tmp_path,)))
+    assert (list(world.models), world.warnings) == (["Kiste für Äpfel"], [])
