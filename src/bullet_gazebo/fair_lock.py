@@ -27,6 +27,12 @@ class FairLock:
             self._waiting.append(turn)
         turn.acquire()
 
+    def wait(self, event: threading.Event, timeout: float) -> None:
+        """Lets go of the lock until `event` is set, or for `timeout` [s]; for the holder."""
+        self.__exit__(None, None, None)
+        event.wait(timeout)
+        self.__enter__()
+
     def yield_turn(self) -> None:
         """Lets everybody who waits have their turn first; for the holder, in the middle of long work."""
         self.__exit__(None, None, None)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 
 from bullet_gazebo.applied_forces import AppliedForces
 from bullet_gazebo.fair_lock import FairLock
+from bullet_gazebo.holds import Holds
 from bullet_gazebo.pacing import Pacer
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import Model
@@ -51,6 +52,7 @@ class Simulator:
         self._paused = False
         self._flowing = threading.Event()  # set while time runs by itself
         self._stopping = threading.Event()
+        self.holds = Holds(self.lock, self._update_flow)
         self._update_flow()
 
     @property
@@ -144,10 +146,16 @@ class Simulator:
             if self._stopping.is_set():
                 return
             with self.lock:
+                self.await_holds()
                 self._tick()
         with self.lock:
             for robot in self.robots:
                 robot.read()
+
+    def await_holds(self) -> None:
+        """Waits until nobody holds time; for those who step, in whose lock others go on meanwhile."""
+        if self.holds:
+            self.holds.await_end(self._stopping)
 
     def add_robot(self, robot: ControlledRobot) -> None:
         """Puts a robot under control; the caller holds the lock."""
@@ -232,7 +240,7 @@ class Simulator:
             robot.joints_moved(self.now, self.relatch)
 
     def _update_flow(self) -> None:
-        if self._paused or self.lockstep:
+        if self._paused or self.lockstep or self.holds:
             self._flowing.clear()
         else:
             self._flowing.set()

@@ -89,6 +89,14 @@ class Engine(ABC):
     def remove(self, body: Body) -> None:
         """Takes a body out of the world."""
 
+    def renewed(self, bodies: Sequence[tuple[ModelDescription, Body]]) -> list[Body]:
+        """Returns what to go on with instead of `bodies`, which are all there are, in the same state.
+
+        To be called before a model is loaded. An engine that can't free all that removed bodies have taken
+        begins anew once that has become much; motors and dampings have to be set again then.
+        """
+        return [body for _, body in bodies]
+
     @abstractmethod
     def set_gravity(self, gravity: Vector) -> None:
         """Sets the acceleration of gravity [m/s²]."""

@@ -22,7 +22,7 @@ class Model:
         self.description = description
         self.body = body
         self.initial_pose = pose
-        self._damped: set[str] = set()  # joints that the engine has been given a damping for
+        self._damped: dict[str, float] = {}  # the engine's damping [N m s/rad, N s/m] by joint
         self._motors: dict[str, tuple[float, float]] = {}  # speed [rad/s, m/s] and effort [N m, N]
         self._joints = {joint: index for index, joint in enumerate(body.joint_names)}
 
@@ -135,26 +135,31 @@ class Model:
     def apply_damping(self, time_step: float) -> None:
         """Hands the joints' damping to the engine, which would blow up if it were stiffer than a step."""
         damped = {n for n in self._joints if self.description.joints[n].damping > 0.0}
-        if not damped | self._damped:
+        if not damped | set(self._damped):
             return
         poses = {name: self.body.link_state(name)[0] for name in self.body.link_names}
         inertias = effective_inertias(self.description, poses)
-        for name in damped | self._damped:
+        for name in damped | set(self._damped):
             most = GENTLEST * inertias[name] / time_step
-            damping = min(self.description.joints[name].damping, most)
-            self.body.set_damping(self._joints[name], damping)
-        self._damped |= damped
+            self._damped[name] = min(self.description.joints[name].damping, most)
+            self.body.set_damping(self._joints[name], self._damped[name])
 
     def move_into(self, body: Body) -> None:
         """Goes on in another body of the engine, loaded from the same description, in the same state."""
         pose, twist = self.root_state()
         states = self.joint_states()
-        self.body = body
         body.reset_base(pose, twist)
         for index, (position, velocity) in enumerate(states):
             body.reset_joint(index, position, velocity)
+        self.go_on_in(body)
+
+    def go_on_in(self, body: Body) -> None:
+        """Goes on in another body of the engine, which is in the same state already."""
+        self.body = body
         for name, motor in self._motors.items():
             body.set_motor(self._joints[name], *motor)
+        for name, damping in self._damped.items():
+            body.set_damping(self._joints[name], damping)
 
     def joint_states(self) -> list[tuple[float, float]]:
         """Returns position [rad, m] and velocity [rad/s, m/s] of each movable joint."""

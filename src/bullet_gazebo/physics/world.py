@@ -62,6 +62,7 @@ class World:
         """
         if name in self.models:
             raise NameTaken(name)
+        self._renew()
         body = self.engine.load(description, pose.compose(description.root_pose))
         model = Model(name, description, body, pose)
         try:
@@ -136,6 +137,7 @@ class World:
         Raises:
             DescriptionError: if the engine can't take it; the model is as it was then.
         """
+        self._renew()  # from descriptions that are still those of the bodies
         record = model.description.links[link]
         old, record.inertia = record.inertia, inertia
         if model.description.static:
@@ -163,6 +165,14 @@ class World:
     def close(self) -> None:
         self.models.clear()
         self.engine.close()
+
+    def _renew(self) -> None:
+        """Lets the engine free what removed bodies have left behind."""
+        models = list(self.models.values())
+        bodies = self.engine.renewed([(model.description, model.body) for model in models])
+        for model, body in zip(models, bodies, strict=True):
+            if body is not model.body:
+                model.go_on_in(body)
 
     def _index(self) -> None:
         """Maps plain and scoped names to what a depth-first walk from the world's root finds first."""

@@ -7,7 +7,9 @@ import importlib
 import os
 import traceback
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol
 
 import rospy
@@ -16,6 +18,7 @@ from bullet_gazebo.physics.description import Plugin
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.simulator import Simulator
 
+PATIENCE = 10.0  # [s of wall time]
 PARAMETER = "~plugins"  # library's file name: "module:Factory"
 Update = Callable[[int], None]
 
@@ -86,6 +89,14 @@ class PluginRegistry:
         self._factories = dict(factories)
         self._loaded: dict[Model, list[tuple[PluginContext, LoadedPlugin | None]]] = {}
 
+    def time_held(self, models: str) -> AbstractContextManager[None]:
+        """Lets no time pass while a model comes and its plugins are loaded: as in Gazebo, it has its drives
+        before its first step.
+
+        A plugin that waits for time to pass is waited for, but not for ever.
+        """
+        return self._sim.holds.hold(PATIENCE, partial(_tell_late, models))
+
     def load(self, model: Model, robot_namespace: str) -> None:
         """Starts the plugins of `model`. One that is unknown or fails is a message, and left out
         (docs/contract/gazebo.md 2.4)."""
@@ -133,6 +144,12 @@ class PluginRegistry:
                 model.name, library, place, rospy.resolve_name(PARAMETER), error,
             )  # fmt: skip
             return None
+
+
+def _tell_late(models: str) -> None:
+    rospy.logwarn(
+        "The plugins of %s have been loading for %g s; time goes on without them", models, PATIENCE
+    )
 
 
 def _registered() -> dict[str, object]:

@@ -246,3 +246,55 @@ def test_it_knows_when_it_is_faster_than_the_clock(options, rate, paused, outrun
         sim.pause()
     assert sim.outruns_the_clock == outruns
     sim.world.close()
+
+
+def test_time_that_is_held_stands_still_and_the_world_is_not_paused(sim):
+    sim.lockstep = False
+    sim.unpause()
+    ticked = threading.Event()
+    sim.listeners.append(lambda now: ticked.set())
+    thread = threading.Thread(target=sim.run)
+    thread.start()
+    try:
+        assert ticked.wait(BOUND)
+        with sim.holds.hold(60.0, _never):
+            with sim.lock:
+                held, paused = sim.now, sim.paused
+            sim.pause()
+            sim.unpause()  # of a client, who doesn't know that time is held
+            ticked.clear()
+            assert not ticked.wait(0.1)
+            assert (sim.now, paused) == (held, False)
+        assert ticked.wait(BOUND)
+    finally:
+        sim.stop()
+        thread.join(BOUND)
+
+
+def test_steps_wait_for_the_end_of_a_hold_and_services_do_not(sim):
+    sim.lockstep = False
+    done = threading.Event()
+    thread = threading.Thread(target=lambda: (sim.step(3), done.set()))
+    with sim.holds.hold(60.0, _never), sim.holds.hold(60.0, _never):
+        thread.start()
+        for _ in range(100):
+            with sim.lock:
+                assert sim.now == 0
+        assert not done.is_set()
+    assert done.wait(BOUND)
+    thread.join(BOUND)
+    assert sim.now == 3_000_000
+
+
+def test_time_goes_on_when_a_hold_lasts_too_long(sim):
+    told = threading.Event()
+    with sim.holds.hold(0.01, told.set):
+        assert told.wait(BOUND)
+        sim.lockstep = False
+        sim.step(1)
+        assert sim.now == 1_000_000
+    assert not sim.holds
+
+
+def _never():
+    raise AssertionError("too late")

@@ -62,6 +62,7 @@ def fill_world(sim: Simulator, world: WorldDescription, interrupted: Callable[[]
 
 def load_plugins(sim: Simulator, plugins: PluginRegistry) -> None:
     """Starts the plugins of the models that the world began with."""
-    for model in list(sim.world.models.values()):
-        plugins.load(model, "")
-        warn(model.name, model.description)
+    with plugins.time_held("the world"):
+        for model in list(sim.world.models.values()):
+            plugins.load(model, "")
+            warn(model.name, model.description)

@@ -116,9 +116,10 @@ class SpawnServices:
                 entity.name, entity.pose = name, pose
                 world.lights[name] = entity
             return
-        with self._sim.lock:
-            model = world.spawn(name, entity, pose)
-        self._plugins.load(model, request.robot_namespace)
+        with self._plugins.time_held(f"model '{shown(name)}'"):
+            with self._sim.lock:
+                model = world.spawn(name, entity, pose)
+            self._plugins.load(model, request.robot_namespace)
         warn(model.name, entity)
 
     def _delete(self, request: DeleteModelRequest) -> DeleteModelResponse:

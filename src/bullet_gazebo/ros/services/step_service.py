@@ -27,6 +27,7 @@ class StepService:
 
     def _step(self, request: StepWorldRequest) -> StepWorldResponse:
         with self._one_at_a_time, self._sim.lock:
+            self._sim.await_holds()
             try:
                 plan = StepPlan(self._sim, request)  # everything is checked before anything is done
                 self._begin(request, plan)  # what is left to fail is a user's controller
@@ -51,6 +52,7 @@ class StepService:
             self._pass(SLICE, held)
             ticks -= SLICE
             self._sim.lock.yield_turn()
+            self._sim.await_holds()
         if ticks:
             self._pass(ticks, held)
 

@@ -61,6 +61,7 @@ class BulletBody(Body):
             pybullet.setJointMotorControlArray, body, self._indices, pybullet.TORQUE_CONTROL,
             physicsClientId=client,
         )  # fmt: skip
+        self._base = pose.compose(self._com)  # where the centre of mass was put last
         if not is_plane(description):
             self.reset_base(pose)
 
@@ -176,15 +177,29 @@ class BulletBody(Body):
     def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
         # PyBullet's base pose and velocity are those of the centre of mass, not of the link's frame.
         com = pose.compose(self._com)
-        pybullet.resetBasePositionAndOrientation(
-            self.id, com.position, com.orientation, physicsClientId=self._client
-        )
+        self._put_base(com)
         if not self._fixed:
             linear, angular = twist
             arm = subtract(com.position, pose.position)
             pybullet.resetBaseVelocity(
                 self.id, add(linear, cross(angular, arm)), angular, physicsClientId=self._client
             )
+
+    def _put_base(self, com: Pose) -> None:
+        self._base = com
+        pybullet.resetBasePositionAndOrientation(self.id, *com, physicsClientId=self._client)
+
+    def go_on_from(self, other: "BulletBody") -> None:
+        """Takes over the state of a body of the same description: to the bit, but for the orientation of a
+        free base, which the engine doesn't tell to the last one."""
+        if self._fixed:
+            self._put_base(other._base)
+        else:
+            self._put_base(Pose(*pybullet.getBasePositionAndOrientation(other.id, other._client)))
+            twist = pybullet.getBaseVelocity(other.id, other._client)
+            pybullet.resetBaseVelocity(self.id, *twist, physicsClientId=self._client)
+        for index, state in enumerate(other.joint_states()):
+            self.reset_joint(index, state[0], state[1])
 
     def link_state(self, name: str) -> tuple[Pose, Twist]:
         index = self._links[name]

@@ -1,0 +1,141 @@
+"""One world of PyBullet.
+
+PyBullet frees most of what a body has taken only together with its world: about five bytes for each byte of
+the files that the body was loaded from. So the world counts what removed bodies have left.
+"""
+
+import tempfile
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from bullet_gazebo.physics.description import DescriptionError, ModelDescription
+from bullet_gazebo.physics.engines.bullet.body import BASE, BulletBody, is_plane
+from bullet_gazebo.physics.engines.bullet.contacts import collides_with_itself
+from bullet_gazebo.physics.engines.bullet.library import pybullet
+from bullet_gazebo.physics.engines.bullet.urdf_writer import write_urdf
+from bullet_gazebo.physics.mechanics.engine_form import at_joints, parents_first
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector, scale
+
+MOST_ITERATIONS = 1000  # of the solver in a step; more would only hold the world
+PLANE = 1200  # [bytes] of a file, had it been loaded from one
+
+
+@dataclass
+class BulletSettings:
+    """Gravity [m/s²], length of a step [s], iterations of the solver; at first PyBullet's own."""
+
+    gravity: Vector = ZERO
+    time_step: float = 1.0 / 240.0
+    iterations: int = 50
+
+
+class BulletClient:
+    """A connection to PyBullet, in this process, without a window.
+
+    `live` and `waste` are the bytes of files that the bodies were loaded from, and those that were removed.
+    """
+
+    def __init__(self, settings: BulletSettings) -> None:
+        self._client = pybullet.connect(pybullet.DIRECT)
+        # The order of contact pairs decides the solver's result: keep it the same in every run. And each
+        # body has files of its own, so it is of no use to keep them.
+        pybullet.setPhysicsEngineParameter(
+            deterministicOverlappingPairs=1, enableFileCaching=0, physicsClientId=self._client
+        )
+        self._step = partial(pybullet.stepSimulation, self._client)
+        self._gravity: Vector = ZERO
+        self._weightless: set[tuple[int, int]] = set()  # body and link, where gravity doesn't act
+        self._sizes: dict[int, int] = {}  # [bytes] by body
+        self.waste = 0
+        self.apply(settings)
+
+    @property
+    def live(self) -> int:
+        return sum(self._sizes.values())
+
+    def apply(self, settings: BulletSettings) -> None:
+        """Hands the settings to the engine."""
+        self._gravity = settings.gravity
+        iterations = max(1, min(settings.iterations, MOST_ITERATIONS))
+        pybullet.setGravity(*settings.gravity, physicsClientId=self._client)
+        pybullet.setTimeStep(settings.time_step, physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(
+            numSolverIterations=iterations, physicsClientId=self._client
+        )
+
+    def load(self, description: ModelDescription, pose: Pose) -> BulletBody:
+        """See `Engine.load`."""
+        if is_plane(description):
+            return self._load_plane(description, pose)
+        engine_form, offsets = at_joints(description)
+        flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_MAINTAIN_LINK_ORDER
+        if collides_with_itself(description):
+            flags |= (
+                pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
+            )
+        with tempfile.TemporaryDirectory(prefix="bullet_gazebo_") as folder:
+            path = Path(folder, "model.urdf")
+            path.write_text(write_urdf(parents_first(engine_form), Path(folder)), encoding="utf-8")
+            size = _size(Path(folder), engine_form)
+            try:
+                body = pybullet.loadURDF(
+                    str(path), pose.position, pose.orientation, useFixedBase=description.fixed_base,
+                    flags=flags, physicsClientId=self._client,
+                )  # fmt: skip
+            except pybullet.error as error:
+                self.waste += size
+                raise DescriptionError(
+                    f"the physics engine can't load the model: {error}"
+                ) from error
+        self._sizes[body] = size
+        try:
+            return BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
+        except DescriptionError:
+            self.remove(body)
+            raise
+
+    def _load_plane(self, description: ModelDescription, pose: Pose) -> BulletBody:
+        shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
+        plane = pose.compose(description.links[description.root].collisions[0].pose)
+        body = pybullet.createMultiBody(
+            0.0, shape, -1, plane.position, plane.orientation, physicsClientId=self._client
+        )
+        self._sizes[body] = PLANE
+        return BulletBody(self._client, body, description, pose, self._weightless, {})
+
+    def remove(self, body: int) -> None:
+        """Takes a body out of the world."""
+        pybullet.removeBody(body, physicsClientId=self._client)
+        self._weightless -= {key for key in self._weightless if key[0] == body}
+        self.waste += self._sizes.pop(body)
+
+    def step(self) -> None:
+        """Integrates by one time step."""
+        if self._weightless:
+            self._hold_up()
+        self._step()
+
+    def _hold_up(self) -> None:
+        """PyBullet's gravity acts on everything: a weightless link is held by a force against it."""
+        for body, link in self._weightless:
+            mass = pybullet.getDynamicsInfo(body, link, self._client)[0]
+            if link == BASE:
+                com = pybullet.getBasePositionAndOrientation(body, self._client)[0]
+            else:
+                com = pybullet.getLinkState(body, link, 0, 1, self._client)[0]
+            pybullet.applyExternalForce(
+                body, link, scale(self._gravity, -mass), com, pybullet.WORLD_FRAME, self._client
+            )
+
+    def close(self) -> None:
+        """Frees all of it."""
+        pybullet.disconnect(self._client)
+
+
+def _size(folder: Path, model: ModelDescription) -> int:
+    """Bytes that the engine reads: what was written into `folder`, and meshes that are read as they are."""
+    written = sum(path.stat().st_size for path in folder.iterdir())
+    shapes = [shape for link in model.links.values() for shape in link.collisions]
+    meshes = [Path(shape.mesh) for shape in shapes if shape.mesh]
+    return written + sum(mesh.stat().st_size for mesh in meshes if mesh.exists())
