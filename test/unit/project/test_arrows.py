@@ -25,7 +25,7 @@ ALLOWED = {
     "ros_calls": set(),
     "file_reading": set(),
     "ros_utils": {"ros_calls", "file_reading"},
-    "robot_envs": {"bullet_gazebo", "ros_calls", "ros_utils"},
+    "robot_envs": {"bullet_gazebo", "file_reading", "ros_calls", "ros_utils"},
     "rl_workbench": set(),
     "cartpole": {"rl_workbench", "robot_envs"},
 }
