@@ -4,8 +4,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from file_reading.content import read_file
+from file_reading.errors import FileError
+from file_reading.yaml_text import load_documents
 from robot_envs.errors import RobotEnvError
 from ros_calls.expansion import CannotExpand, expand
 
@@ -31,11 +32,10 @@ def read_parameters(path: Path) -> dict[str, Any]:
         RobotEnvError: if it can't be read.
     """
     try:
-        content = yaml.safe_load(path.read_bytes())  # it finds out about UTF-16 by itself
-    except OSError as error:
-        raise RobotEnvError(f"can't read {path}: {error.strerror}") from error
-    except yaml.YAMLError as error:
-        raise RobotEnvError(f"{path} isn't YAML: {' '.join(str(error).split())}") from error
+        documents = load_documents(read_file(path))
+    except FileError as error:
+        raise RobotEnvError(f"{path}: {error}") from error
+    content = documents[0] if len(documents) == 1 else None
     if not isinstance(content, dict):
         raise RobotEnvError(f"{path} isn't a YAML file of parameters")
     return content

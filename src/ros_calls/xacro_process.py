@@ -3,8 +3,8 @@
 A xacro file is a program: it may include itself, compute without end or ask for all memory. It runs here,
 where the kernel ends it, and not in whoever asks for it.
 
-`expansion` runs this file by itself (``python -I``), so it imports nothing of this repository: the request,
-JSON on standard input, brings the path of its caller's modules. The answer on standard output is the XML or,
+`expansion` runs this file by itself (``python -I``), so it imports nothing of this repository before the request
+has come: JSON on standard input, with the path of its caller's modules. The answer on standard output is the XML or,
 with exit code `BROKEN`, one line that says what is wrong.
 """
 
@@ -16,7 +16,8 @@ import resource
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, NoReturn
 
 PROCESSOR_TIME = 30  # [s], far more than the largest robots in use need
@@ -95,9 +96,20 @@ def _answer_request() -> NoReturn:
     with answer:
         try:
             import xacro
+
+            from file_reading.xml_text import decode, without_declaration
         except ImportError as fault:
             answer.write(f"{fault}: is it installed?".encode())
             sys.exit(BROKEN)
+
+        def parse(given: Any, name: str | None = None) -> Any:
+            """xacro itself takes UTF-8, and nothing before the declaration."""
+            if given is None and name is not None:
+                with suppress(OSError):  # xacro has its own way with files that are missing
+                    given = without_declaration(decode(Path(name).read_bytes()))
+            return xacro_parse(given, name)
+
+        xacro_parse, xacro.parse = xacro.parse, parse
         try:
             with _one_line(xacro, path, request["memory"]):
                 document = xacro.process_file(path, mappings=request["mappings"])

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import rosparam
-import yaml
 
+from file_reading.content import read_file
+from file_reading.errors import FileError
+from file_reading.yaml_text import load_parameters
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages
@@ -43,7 +46,7 @@ def ros_load_yaml_from_path(file_path: str, ns: str = "/") -> bool:
     except (_packages.NotFound, _master.MasterDown) as fault:
         _log.error(f"ros_load_yaml: {fault}")
         return False
-    except (ValueError, OSError) as fault:
+    except FileError as fault:
         _log.error(f"{file_path}: {fault}")
         return False
     return True
@@ -53,24 +56,12 @@ def _read(path: str) -> list[dict[str, Any]]:
     """All documents of a YAML file, which may use ROS's ``deg(90)`` and ``rad(pi)``.
 
     Raises:
-        ValueError: not YAML, or a document that is no mapping; the text gives the place.
-        OSError: the file can't be read.
+        FileError: it can't be read, or is no YAML, or a document is no mapping; with the place.
     """
-    with open(path, "rb") as file:  # YAML finds out by itself whether it is UTF-8 or UTF-16
-        text = file.read()
-    try:
-        documents = [document for document in yaml.safe_load_all(text) if document is not None]
-    except yaml.MarkedYAMLError as fault:
-        mark = fault.problem_mark
-        place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        raise ValueError(f"{place}{fault.problem or fault.context}") from fault
-    except yaml.YAMLError as fault:
-        raise ValueError(" ".join(str(fault).split())) from fault
+    documents = load_parameters(read_file(Path(path)))
     if not documents:
-        raise ValueError("no parameters in it")
+        raise FileError("no parameters in it")
     for document in documents:
-        if not isinstance(document, dict):
-            raise ValueError(f"expected 'name: value' lines, found {type(document).__name__}")
         if document.pop(rosparam.NS, None) is not None:
             _log.warn(
                 f"{path}: its {rosparam.NS} is ignored: the namespace is an argument of the call"

@@ -22,10 +22,10 @@ ROS_ROOMS = ("bullet_gazebo/ros", "ros_calls", "ros_utils", "robot_envs/backends
 # A library, and which of ours it may import.
 ALLOWED = {
     "bullet_gazebo": {"ros_calls", "file_reading"},
-    "ros_calls": set(),
+    "ros_calls": {"file_reading"},
     "file_reading": set(),
     "ros_utils": {"ros_calls", "file_reading"},
-    "robot_envs": {"bullet_gazebo", "ros_calls", "ros_utils"},
+    "robot_envs": {"bullet_gazebo", "file_reading", "ros_calls", "ros_utils"},
     "rl_workbench": set(),
     "cartpole": {"rl_workbench", "robot_envs"},
 }

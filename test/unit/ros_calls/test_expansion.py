@@ -207,3 +207,21 @@ def test_a_signal_ends_the_program_with_its_worker(tmp_path):
             process.terminate()
             assert process.stderr.read() == "xacro: ended by SIGTERM\n"  # both ends are closed
         assert process.wait(60) == xacro_process.BROKEN
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1", "windows-1252"])
+@pytest.mark.parametrize("before", ["", "\r\n<!-- mine -->\r\n"])
+def test_files_of_every_encoding(tmp_path, encoding, before):
+    """Included ones as well; xacro by itself takes UTF-8 only."""
+    declaration = f'{before}<?xml version="1.0" encoding="{encoding.removesuffix("-sig")}"?>\r\n'
+    namespace = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+    inner = f'{declaration}<robot {namespace}><link name="Gelenk für ${{1 + 1}}"/></robot>'
+    outer = (
+        f'{declaration}<robot name="Gerät" {namespace}><xacro:include filename="inner"/>'
+        '<xacro:include filename="none" optional="true"/></robot>'
+    )
+    (tmp_path / "inner").write_bytes(inner.encode(encoding))
+    (tmp_path / "outer").write_bytes(outer.encode(encoding))
+    xml = expand(tmp_path / "outer")
+    assert '<robot name="Gerät"' in xml
+    assert '<link name="Gelenk für 2"/>' in xml

@@ -10,14 +10,17 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import rosparam
 import rospy
-import yaml
 from std_msgs.msg import Bool
 
 from bullet_gazebo.ros.clients.manager_client import STRICT, ManagerClient
 from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
+from file_reading.content import read_file
+from file_reading.errors import FileError
+from file_reading.yaml_text import load_parameters
 from ros_calls.service import ServiceFailed
 from ros_calls.waiting import wait_until
 
@@ -38,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         init_node("spawner", command_line)
         try:
             return _work(ManagerClient(options.namespace), options)
-        except (ValueError, OSError) as fault:
+        except FileError as fault:
             rospy.logerr("Controller Spawner: %s", fault)
             return 1
 
@@ -111,20 +114,18 @@ def _names(argument: str, namespace: str) -> list[str]:
     A file's parameters are loaded first.
 
     Raises:
-        ValueError, OSError: the file can't be read, or is no YAML mapping.
+        FileError: the file can't be read, or is no YAML mapping.
     """
     if not os.path.isfile(argument):
         return [argument]
     try:
-        with open(argument, "rb") as file:  # YAML finds out by itself whether it is UTF-8 or UTF-16
-            documents = rosparam.load_str(file.read(), argument)
-    except (yaml.YAMLError, TypeError) as fault:
-        raise ValueError(f"{argument}: {' '.join(str(fault).split())}") from fault
-    if not all(isinstance(parameters, dict) for parameters, _ in documents):
-        raise ValueError(f"{argument}: expected a mapping from controller names to parameters")
-    for parameters, _ in documents:
+        documents = load_parameters(read_file(Path(argument)))
+    except FileError as fault:
+        raise FileError(f"{argument}: {fault}") from fault
+    for parameters in documents:
+        parameters.pop(rosparam.NS, None)
         rosparam.upload_params(rospy.resolve_name(namespace), parameters)
-    return [str(name) for parameters, _ in documents for name in parameters]
+    return [str(name) for parameters in documents for name in parameters]
 
 
 class _Spawner:

@@ -27,6 +27,8 @@ from gazebo_msgs.srv import (
 )
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
 
+from ros_utils import ros_gazebo
+
 BOUND = 20.0  # [s of wall time]
 UNKNOWN = (
     "GazeboRosApiPlugin SpawnModel Failure: input model_xml not SDF or URDF, or cannot be converted "
@@ -347,6 +349,29 @@ class OddFiles(unittest.TestCase):
                         code = subprocess.call([*command, *source, "-x", "60"], stdin=piped)
                     self.assertEqual(code, 0, (encoding, source))
                     self.assertTrue(delete("from_file").success)
+                self.assertTrue(ros_gazebo.gazebo_spawn_sdf_path(file.name, "from_file", pos_x=60))
+                self.assertTrue(delete("from_file").success)
+
+    def test_a_description_on_the_parameter_server_may_begin_with_anything(self):
+        """Also for the control plugin, which reads it there by itself."""
+        transmission = (
+            '<transmission name="t"><type>transmission_interface/SimpleTransmission</type><joint name="j">'
+            "<hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface></joint>"
+            '<actuator name="m"/></transmission>'
+            '<gazebo><plugin filename="libgazebo_ros_control.so" name="c"/></gazebo></robot>'
+        )
+        text = URDF.replace('type="fixed"', 'type="continuous"').replace("</robot>", transmission)
+        xml = f'\ufeff\r\n<!-- mine -->\r\n<?xml version="1.0" encoding="ISO-8859-1"?>\r\n{text}'
+        rospy.set_param("/odd/robot_description", xml)
+        command = ["rosrun", "gazebo_ros", "spawn_model", "-urdf", "-model", "odd", "-x", "70",
+                   "-param", "/odd/robot_description", "-robot_namespace", "/odd"]  # fmt: skip
+        self.assertEqual(subprocess.call(command), 0)
+        rospy.wait_for_service("/odd/controller_manager/list_controllers", BOUND)
+        self.assertTrue(
+            ros_gazebo.gazebo_spawn_sdf_param("robot_description", "odd2", "/odd", pos_x=80)
+        )
+        for name in ("odd", "odd2"):
+            self.assertTrue(delete(name).success)
 
 
 class Worlds(unittest.TestSuite):

@@ -7,8 +7,10 @@ import pytest
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.world_file import empty_world, load_world, parse_world
 from bullet_gazebo.physics.meshes.mesh_files import Resources
-from bullet_gazebo.ros.node.world_loader import read_world
+from bullet_gazebo.physics.world import World
+from bullet_gazebo.ros.node.world_loader import fill_world, read_world
 from bullet_gazebo.ros.services.resource_paths import find_world
+from bullet_gazebo.simulator import Simulator
 
 EMPTY = Path(__file__).resolve().parents[4] / "companions/gazebo_ros/worlds/empty.world"
 BOX = (
@@ -146,3 +148,17 @@ def test_without_a_usable_file_the_world_is_empty_and_the_log_says_why(tmp_path,
     (line,) = caplog.messages
     assert str(path) in line
     assert "empty but for a ground plane" in line
+
+
+def test_a_world_is_not_read_or_filled_to_the_end_once_that_is_interrupted(
+    tmp_path, caplog, new_engine
+):
+    path = tmp_path / "my.world"
+    path.write_text(f'<sdf version="1.6"><world name="w">{box("a")}{box("b")}</world></sdf>')
+    assert list(read_world(str(path), lambda: True).models) == ["ground_plane"]
+    assert "reading was interrupted" in caplog.messages[0]
+    sim = Simulator(World(new_engine()))
+    answers = iter([False, True])
+    fill_world(sim, read_world(str(path), lambda: False), lambda: next(answers))
+    assert list(sim.world.models) == ["a"]
+    sim.world.close()
