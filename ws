@@ -57,15 +57,16 @@ For example:
        ./ws roslaunch gazebo_ros empty_world.launch gui:=false
 
 Ready means: the packages of requirements/debian.txt are installed (apt-get, through sudo when
-not root), .ws/venv holds requirements/base.txt, and .ws/devel is the catkin workspace built
-from this package and companions/. What is ready is not made again. Logs are in .ws/log.
+not root), .ws/venv holds requirements/base.txt, and .ws is a catkin workspace built from this
+package and companions/. What is ready is not made again. Logs are in .ws/log.
 Apart from Debian's packages everything lies in $CHECKOUT/.ws.
 
 ROS talks over loopback only, to a master on this checkout's own port: $DEFAULT_MASTER
 Set ROS_MASTER_URI, ROS_IP or ROS_HOSTNAME to use another master or network.
-Packages on the caller's ROS_PACKAGE_PATH are found, behind those of the workspace. The
-caller's PYTHONPATH, CMAKE_PREFIX_PATH, ROS_NAMESPACE, conda and virtual environments are
-left out.
+Packages on the caller's ROS_PACKAGE_PATH and in catkin workspaces that the caller has sourced are
+found, and go before the companions of the same name; only cartpole, gazebo_ros and
+bullet_gazebo_msgs are this checkout's. All else of PYTHONPATH and CMAKE_PREFIX_PATH, a whole ROS,
+ROS_NAMESPACE, conda and virtual environments are left out.
 END
 }
 
@@ -109,9 +110,9 @@ main() {
     esac
     local command=$1
     case $command in
-        test | check) make_ready debian venv test_tools build ;;
-        extras) make_ready debian venv extras build ;;
-        *) make_ready debian venv build ;;
+        test | check) make_ready debian venv test_tools companions build ;;
+        extras) make_ready debian venv extras companions build ;;
+        *) make_ready debian venv companions build ;;
     esac
     enter_workspace
     case $command in

@@ -18,7 +18,7 @@ check_lint() { "$VENV/bin/ruff" check .; }
 check_format() { "$VENV/bin/ruff" format --check .; }
 check_types() { "$VENV/bin/mypy"; }
 check_shell() { /usr/bin/shellcheck --external-sources ws .ci/run tools/*.sh; }
-check_catkin() { /usr/bin/catkin_lint --quiet --offline --ignore env_var --strict -W2 "$WS/src"; }
+check_catkin() { /usr/bin/catkin_lint --quiet --offline --ignore env_var --strict -W2 "$WS/src" "$COMPANIONS/src"; }
 check_dead_code() { "$VENV/bin/vulture"; }
 check_links() { "$VENV/bin/python3" tools/check_links.py; }
 

@@ -5,19 +5,12 @@ is_loopback() {
     [[ $1 =~ ^https?://(localhost|127\.[0-9.]+|\[::1\])(:|/|$) ]]
 }
 
-# Nothing of the caller's Python, CMake or ROS environment may decide what runs here.
+# Nothing of the caller's Python, CMake or ROS environment may decide what runs here, but for the
+# caller's own packages: those on ROS_PACKAGE_PATH, and the catkin workspaces that were sourced.
 leave_other_workspaces() {
-    local prefix kept='' entry
-    callers_packages=${callers_packages-${ROS_PACKAGE_PATH-}}
-    IFS=: read -ra prefixes <<<"${CMAKE_PREFIX_PATH-}"
-    IFS=: read -ra entries <<<"${LD_LIBRARY_PATH-}"
-    for entry in "${entries[@]}"; do
-        for prefix in "${prefixes[@]}"; do
-            [[ -n $prefix && $entry == "$prefix"/* ]] && continue 2
-        done
-        kept+=${entry:+${kept:+:}$entry}
-    done
-    export LD_LIBRARY_PATH=$kept
+    [[ -n ${CALLER_WORKSPACES-} ]] || remember_callers_packages
+    LD_LIBRARY_PATH=$(filter_paths in_no_workspace "${LD_LIBRARY_PATH-}")
+    export LD_LIBRARY_PATH
     unset PYTHONPATH PYTHONHOME VIRTUAL_ENV PYENV_VERSION CONDA_PREFIX CONDA_DEFAULT_ENV \
         CMAKE_PREFIX_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH PKG_CONFIG_PATH \
         ROS_PACKAGE_PATH ROS_NAMESPACE ROS_ROOT ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION ROS_ETC_DIR \
@@ -25,6 +18,57 @@ leave_other_workspaces() {
     export PYTHONNOUSERSITE=1  # ~/.local would otherwise come before the venv's base
     export PATH=$VENV/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin:$PATH
     export HOME=${HOME:-$WS/home}
+}
+
+declare -A CALLER=()  # of each path variable, what belongs to the caller's packages
+remember_callers_packages() {
+    CALLER_WORKSPACES=$(filter_paths is_workspace "${CMAKE_PREFIX_PATH-}"):
+    CALLER=(
+        [CMAKE_PREFIX_PATH]=${CALLER_WORKSPACES%:}
+        [ROS_PACKAGE_PATH]=$(filter_paths is_not_ours "${ROS_PACKAGE_PATH-}")
+        [PYTHONPATH]=$(filter_paths in_workspace "${PYTHONPATH-}")
+        [LD_LIBRARY_PATH]=$(filter_paths in_workspace "${LD_LIBRARY_PATH-}")
+        [PATH]=$(filter_paths in_workspace "$PATH")
+    )
+}
+
+filter_paths() {  # test, a:b:c
+    local entry kept='' entries
+    IFS=: read -ra entries <<<"$2"
+    for entry in "${entries[@]}"; do
+        if [[ -n $entry ]] && "$1" "$entry"; then kept+=${kept:+:}$entry; fi
+    done
+    printf %s "$kept"
+}
+
+is_not_ours() { [[ $1/ != "$WS"/* ]]; }
+
+# A whole ROS isn't taken: rospy and its like are Debian's.
+is_workspace() { [[ -f $1/.catkin && ! -e $1/share/rospy ]] && is_not_ours "$1"; }
+
+in_workspace() { is_below_one_of "$CALLER_WORKSPACES" "$1"; }
+in_no_workspace() { ! is_below_one_of "${CMAKE_PREFIX_PATH-}" "$1"; }
+
+is_below_one_of() {  # a:b:c, path
+    local prefix prefixes
+    IFS=: read -ra prefixes <<<"$1"
+    for prefix in "${prefixes[@]}"; do
+        [[ -n $prefix && $2 == "$prefix"/* ]] && return 0
+    done
+    return 1
+}
+
+# In front of the companions, so that the caller's package of the same name is the one that is found.
+put_before_companions() {  # variable
+    local -n paths=$1
+    local theirs=${CALLER[$1]}
+    if [[ -z $theirs ]]; then
+        return 0
+    elif [[ $paths == *"$COMPANIONS"/* ]]; then
+        paths=${paths/"$COMPANIONS"/"$theirs:$COMPANIONS"}
+    else
+        paths+=${paths:+:}$theirs
+    fi
 }
 
 bind_to_loopback() {
@@ -51,8 +95,8 @@ enter_workspace() {
     # shellcheck disable=SC1091
     source "$WS/devel/setup.bash"
     set -u
-    # Behind ours: the caller's own packages are found, and none of them hides one of ours.
-    export ROS_PACKAGE_PATH=$ROS_PACKAGE_PATH${callers_packages:+:$callers_packages}
-    # Programs of the workspace before those that pip has put beside Python: xacro is bounded.
-    export PATH=$WS/devel/bin:$VENV/bin:$PATH
+    local variable
+    for variable in "${!CALLER[@]}"; do put_before_companions "$variable"; done
+    # Programs of the workspaces before those that pip has put beside Python: xacro is bounded.
+    export PATH=$WS/devel/bin:${CALLER[PATH]:+${CALLER[PATH]}:}$COMPANIONS/devel/bin:$VENV/bin:$PATH
 }

@@ -64,13 +64,15 @@ declare -A TITLE=(
     [venv]="installing Python packages into .ws/venv"
     [test_tools]="installing the tools for test and check into .ws/venv"
     [extras]="installing the extra Python packages (requirements/extras.txt) into .ws/venv"
+    [companions]="building the companions' catkin workspace"
     [build]="building the catkin workspace"
 )
 NETWORK="check the network, the free disk space and that the file under requirements/ is right"
+COMPILER="mend what the compiler or CMake complains of; if that is nothing of yours, ./ws clean"
 declare -A REMEDY=(
     [debian]="see the lines above; on other systems than Debian 12 build the package in a catkin workspace of your own"
     [venv]=$NETWORK [test_tools]=$NETWORK [extras]=$NETWORK
-    [build]="mend what the compiler or CMake complains of; if that is nothing of yours, ./ws clean"
+    [companions]=$COMPILER [build]=$COMPILER
 )
 
 # --- Debian packages -----------------------------------------------------------------------
@@ -141,45 +143,78 @@ make_venv() {
 make_test_tools() { pip_install base.txt test.txt; }
 make_extras() { pip_install base.txt extras.txt; }
 
-# --- catkin workspace ----------------------------------------------------------------------
+# --- catkin workspaces ---------------------------------------------------------------------
+
+# Two, so that a package of the caller's can stand between them (ws_environment.sh): in front the
+# package and what stands in for Gazebo, behind them the companions that the caller may have, too.
+COMPANIONS=$WS/companions
+FRONT=(bullet_gazebo_msgs gazebo_ros)
 
 # What CMake reads, and the names of what it links to; sources are used where they are.
 PARTS=(CMakeLists.txt LICENSE README.md package.xml pyproject.toml setup.py
     benchmark config docs launch rviz scripts src test urdf)  # of the package
 
-key_build() {
-    key_place
-    echo "${PARTS[@]}"
-    cd -- "$ROOT"
-    find scripts src -mindepth 1 -maxdepth 1 ! -name __pycache__ ! -name '*.egg-info' 2>/dev/null | sort || true
-    find CMakeLists.txt package.xml setup.py companions -type f ! -name '*.pyc' -print0 |
-        sort -z | xargs -0 sha256sum
+companions_behind() {
+    local folder
+    for folder in "$ROOT"/companions/*; do
+        [[ " ${FRONT[*]} " == *" ${folder##*/} "* ]] || echo "${folder#"$ROOT/"}"
+    done
 }
 
-# .ws/src holds links to the package and its companions. The package is a folder of links to its
-# parts, not a link to the root: rosrun looks for executables everywhere below a package, and would
-# find those in .ws, and in whatever folder a training leaves in the root, as well.
-link_sources() {
+key_companions() {
+    local folders
+    mapfile -t folders < <(companions_behind)
+    key_place
+    hash_files "${folders[@]}"
+}
+
+key_build() {
+    key_place
+    echo "${PARTS[@]}" "${FRONT[@]}"
+    cd -- "$ROOT"
+    find scripts src -mindepth 1 -maxdepth 1 ! -name __pycache__ ! -name '*.egg-info' 2>/dev/null | sort || true
+    hash_files CMakeLists.txt package.xml setup.py companions
+}
+
+hash_files() {  # path...
+    (cd -- "$ROOT" && find "$@" -type f ! -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum)
+}
+
+make_companions() {
+    local folder
+    rm -rf -- "$COMPANIONS/src"
+    mkdir -p -- "$COMPANIONS/src"
+    companions_behind | while read -r folder; do ln -s -- "$ROOT/$folder" "$COMPANIONS/src/"; done
+    leave_other_workspaces
+    catkin_workspace "$COMPANIONS"
+}
+
+# The package is a folder of links to its parts, not a link to the root: rosrun looks for executables
+# everywhere below a package, and would find those in .ws, and in whatever folder a training leaves in
+# the root, as well.
+make_build() {
     local entry
     rm -rf -- "$WS/src"
     mkdir -p -- "$WS/src/cartpole"
     for entry in "${PARTS[@]}"; do
         ln -s -- "$ROOT/$entry" "$WS/src/cartpole/"
     done
-    ln -s -- "$ROOT"/companions/* "$WS/src/"
+    ln -s -- "${FRONT[@]/#/$ROOT/companions/}" "$WS/src/"
+    leave_other_workspaces
+    CMAKE_PREFIX_PATH=$COMPANIONS/devel catkin_workspace "$WS"
 }
 
-make_build() {
-    local place=$WS/build/cartpole-place
-    if [[ ! -f $place || $(<"$place") != "$(key_place)" ]]; then
-        rm -rf -- "$WS/build" "$WS/devel"  # CMake's cache holds absolute paths
-        mkdir -p -- "$WS/build"
-        key_place >"$place"
+catkin_workspace() {  # folder
+    local made_for=$1/build/cartpole-place wanted
+    wanted=$(key_place; ls -- "$1/src")
+    if [[ ! -f $made_for || $(<"$made_for") != "$wanted" ]]; then
+        # CMake's cache holds absolute paths, and what a package left behind would still be found.
+        rm -rf -- "$1/build" "$1/devel"
+        mkdir -p -- "$1/build"
+        echo "$wanted" >"$made_for"
     fi
-    link_sources
-    leave_other_workspaces
     # pytest runs the tests, so catkin need not look for its test tools.
-    /usr/bin/catkin_make --directory "$WS" --force-cmake \
+    /usr/bin/catkin_make --directory "$1" --force-cmake \
         -DPYTHON_EXECUTABLE="$VENV/bin/python3" -DCATKIN_ENABLE_TESTING=OFF \
         -DCMAKE_BUILD_TYPE=Release
 }

@@ -7,6 +7,7 @@ import unittest
 
 import rospy
 import rostest
+from nodelet.srv import NodeletList
 from std_msgs.msg import String
 
 
@@ -33,6 +34,15 @@ class Workspace(unittest.TestCase):
         publisher.publish("hello")
         heard = rospy.wait_for_message("said", String, timeout=10)
         self.assertEqual(heard.data, "hello")
+
+    def test_topic_tools(self):
+        publisher = rospy.Publisher("fast", String, queue_size=1, latch=True)
+        publisher.publish("once")
+        self.assertEqual(rospy.wait_for_message("slow", String, timeout=30).data, "once")
+
+    def test_nodelet(self):
+        rospy.wait_for_service("manager/list", timeout=30)
+        self.assertEqual(rospy.ServiceProxy("manager/list", NodeletList)().nodelets, [])
 
 
 if __name__ == "__main__":

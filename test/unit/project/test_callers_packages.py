@@ -1,0 +1,153 @@
+"""A caller's own packages in `ws`: they win over the companions of the same name, and only over those."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+# Built once: the tests of a group run in one process.
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("callers_packages")]
+PACKAGE = """<package format="2"><name>{name}</name><version>9.9.9</version><description>d</description>
+<maintainer email="a@example.com">a</maintainer><license>BSD</license>
+<buildtool_depend>catkin</buildtool_depend><build_depend>message_generation</build_depend></package>"""
+CMAKE = """cmake_minimum_required(VERSION 3.10)
+project({name})
+find_package(catkin REQUIRED COMPONENTS message_generation)
+{messages}
+catkin_package()
+catkin_install_python(PROGRAMS scripts/{script} DESTINATION ${{CATKIN_PACKAGE_BIN_DESTINATION}})
+"""
+MESSAGES = "add_message_files(FILES Theirs.msg)\ngenerate_messages()"
+SCRIPT = "#!/usr/bin/env python3\nimport sys\nprint('theirs', sys.executable)\n"
+# A package of the caller's, and its program.
+PACKAGES = {
+    "control_msgs": "show",
+    "controller_manager": "spawner",
+    "xacro": "xacro",
+    "gazebo_ros": "spawn_model",
+    "cartpole": "pg_train.py",
+    "their_robot": "drive",
+}
+THEIRS = ["control_msgs", "controller_manager", "xacro", "their_robot"]
+ALWAYS_OURS = ["cartpole", "gazebo_ros", "bullet_gazebo_msgs"]
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory):
+    """A catkin workspace of the caller's, built without ws, which has six packages."""
+    workspace = tmp_path_factory.mktemp("their_ws")
+    for name, script in PACKAGES.items():
+        folder = workspace / "src" / name
+        (folder / "msg").mkdir(parents=True)
+        (folder / "scripts").mkdir()
+        messages = MESSAGES if name == "control_msgs" else ""
+        (folder / "package.xml").write_text(PACKAGE.format(name=name))
+        (folder / "CMakeLists.txt").write_text(
+            CMAKE.format(name=name, messages=messages, script=script)
+        )
+        (folder / "msg/Theirs.msg").write_text("float64 x\n")
+        (folder / "scripts" / script).write_text(SCRIPT)
+        (folder / "scripts" / script).chmod(0o755)
+    run(["/usr/bin/catkin_make", "-DPYTHON_EXECUTABLE=/usr/bin/python3"], cwd=workspace)
+    return workspace
+
+
+def run(command, **options):
+    done = subprocess.run(
+        command,
+        check=False,
+        env={"PATH": "/usr/bin:/bin", "HOME": os.environ["HOME"]} | options.pop("env", {}),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        **options,
+    )
+    assert done.returncode == 0, f"{done.stdout[-3000:]}\n{done.stderr[-3000:]}"
+    return done.stdout
+
+
+def sourced_before(root, workspace, *command):
+    enter = 'enter() { source "$1"; }; enter "$0/devel/setup.bash"; exec "$@"'
+    return run(["bash", "-c", enter, workspace, root / "ws", *command])
+
+
+def sourced_after(root, workspace, *command):
+    enter = 'enter() { source "$1" --extend; }; enter "$0/devel/setup.bash"; exec "$@"'
+    return run([root / "ws", "bash", "-c", enter, workspace, *command])
+
+
+def nested(root, workspace, *command):
+    return sourced_before(root, workspace, root / "ws", *command)
+
+
+EACH_WAY = pytest.mark.parametrize("way", [sourced_before, sourced_after, nested])
+
+
+@EACH_WAY
+def test_the_callers_package_is_found(root, workspace, way):
+    found = way(
+        root, workspace, "bash", "-c", f"for p in {' '.join(THEIRS)}; do rospack find $p; done"
+    )
+    assert found.split() == [str(workspace / "src" / name) for name in THEIRS]
+    assert "Theirs" in way(root, workspace, "rosmsg", "list")
+
+
+@EACH_WAY
+def test_the_callers_modules_are_imported_and_ours_where_there_is_none(root, workspace, way):
+    code = (
+        "import control_msgs.msg, gazebo_msgs, controller_manager_msgs, numpy, rospy\n"
+        "control_msgs.msg.Theirs(x=1.0)\n"
+        "for each in (control_msgs, gazebo_msgs, numpy): print(each.__file__)"
+    )
+    theirs, ours, numpy = way(root, workspace, "python3", "-c", code).splitlines()
+    assert Path(theirs).is_relative_to(workspace)
+    assert Path(ours).is_relative_to(root / ".ws/companions")
+    assert Path(numpy).is_relative_to(root / ".ws/venv")
+
+
+@EACH_WAY
+def test_the_callers_programs_run(root, workspace, way):
+    for name in THEIRS:
+        command = ["rosrun", name, PACKAGES[name]]
+        # All with the interpreter that they were built for.
+        assert way(root, workspace, *command) == "theirs /usr/bin/python3\n"
+
+
+@pytest.mark.parametrize("way", [sourced_before, nested])
+def test_what_stands_in_for_gazebo_stays_ours(root, workspace, way):
+    find = f"for p in {' '.join(ALWAYS_OURS)}; do rospack find $p; done"
+    for path in way(root, workspace, "bash", "-c", find).split():
+        assert Path(path).resolve().is_relative_to(root)
+    for name in ("cartpole", "gazebo_ros"):
+        assert "theirs" not in way(root, workspace, "rosrun", name, PACKAGES[name], "--help")
+
+
+def test_only_on_ros_package_path(root, workspace):
+    def ws(*command):
+        environment = {"ROS_PACKAGE_PATH": str(workspace / "src")}
+        return run([root / "ws", *command], env=environment).strip()
+
+    assert ws("rospack", "find", "their_robot") == str(workspace / "src/their_robot")
+    assert ws("rospack", "find", "control_msgs") == str(workspace / "src/control_msgs")
+    assert Path(ws("rospack", "find", "gazebo_ros")).is_relative_to(root)
+    # It isn't built, so ours has the Python module.
+    module = ws(
+        "python3", "-c", "import control_msgs.msg as m; m.JointControllerState; print(m.__file__)"
+    )
+    assert Path(module).is_relative_to(root)
+
+
+def test_a_whole_ros_is_left_out(root, tmp_path):
+    """Its rospy would be another one than Debian's, which the rest is made for."""
+    modules = tmp_path / "lib/python3/dist-packages"
+    for name in ("rospy", "control_msgs"):
+        (modules / name).mkdir(parents=True)
+        (modules / name / "__init__.py").write_text("raise ImportError('a stranger')")
+    (tmp_path / "share/rospy").mkdir(parents=True)
+    (tmp_path / ".catkin").touch()
+    environment = {"CMAKE_PREFIX_PATH": str(tmp_path), "PYTHONPATH": str(modules)}
+    run([root / "ws", "python3", "-c", "import rospy, control_msgs.msg"], env=environment)
