@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Iterator
 
+import numpy as np
+
 from bullet_gazebo.physics.description import DescriptionError, Joint, Link, ModelDescription
 
 MOST_JOINTS = 127  # of one body in PyBullet, fixed ones included
@@ -75,6 +77,8 @@ def _lengths(link: Link) -> Iterator[float]:
         yield from link.inertia.com.position
     for shape in (*link.collisions, *link.visuals):
         yield from shape.size
+        if shape.solid is not None:
+            yield from np.abs(shape.solid.vertices).max(axis=0) * shape.size
         yield from shape.pose.position
 
 
