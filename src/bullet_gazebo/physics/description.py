@@ -40,7 +40,7 @@ class Inertia:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles that were checked (meshes/arrays.py); equal to those of any other file with the same contents.
+    """Triangles that were checked (meshes/arrays.py); equal to those of a file with the same contents.
 
     `vertices` (n, 3) are finite, `faces` (m, 3) are indices inside of them. `hulls` are the points (k, 3) of
     the convex bodies that stand for the mesh where it moves: one for each object of a file that has several.

@@ -28,12 +28,12 @@ def make_mesh(parts: list[Part]) -> Mesh:
     if len(checked) > MOST_PARTS:
         checked = [_joined(checked)]
     vertices, faces = _joined(checked)
-    if len(np.unique(vertices, axis=0)) < 4:
-        raise DescriptionError("the physics engine finds nothing to touch in it")
     hulls = tuple(hull_points(points) for points, _ in checked)
+    if max(map(len, hulls)) < 3:
+        raise DescriptionError("the physics engine finds nothing to touch in it")
     state = hashlib.blake2b(digest_size=16)
     for array in (vertices, faces, *hulls):
-        array.flags.writeable = False
+        array.setflags(write=False)
         state.update(repr(array.shape).encode())
         state.update(array.tobytes())
     return Mesh(vertices, faces, hulls, state.hexdigest())

@@ -20,6 +20,8 @@ UP_AXES = {  # turned so that z is up
     "Y_UP": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
 }
 FACES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
+PLACED = ("node", "instance_node", "instance_geometry")
+MOVED = ("matrix", "translate", "rotate", "scale", "lookat", "skew")
 SHOWN = ("library_geometries", "library_nodes", "library_visual_scenes", "scene")
 MOST_OFFSET = 63  # of an input: the number of indices that a corner has, less one
 NO_INDEX = re.compile(r"[^0-9\s]|[0-9]{10}", re.ASCII)
@@ -73,8 +75,15 @@ def _prune(root: Element) -> None:
         root.remove(child)
     if not any(each.tag in FACES for mesh in root.iter("mesh") for each in mesh):
         raise DescriptionError("it holds no triangles and no polygons")
-    for instance in root.iter("instance_geometry"):
-        del instance[:]  # its materials
+    for node in (each for kind in ("visual_scene", "node") for each in root.iter(kind)):
+        node[:] = [child for child in node if child.tag in (*PLACED, *MOVED)]
+        for child in node:
+            if child.tag.startswith("instance"):
+                child[:] = []  # materials
+                if not child.get("url", "").startswith("#"):
+                    raise DescriptionError(
+                        f"node '{shown(node.get('id', ''))}' has an instance of nothing"
+                    )
     for geometry in root.iter("geometry"):
         for mesh in geometry.iter("mesh"):
             with place(f"geometry '{shown(geometry.get('id', ''))}'"):
@@ -112,16 +121,29 @@ def _check_faces(faces: Element, positions: str) -> None:
     for each in faces.iter():
         if each.tag in ("p", "vcount") and NO_INDEX.search(each.text or ""):
             raise DescriptionError(f"its <{each.tag}> holds what is no index")
-    for each in faces.iter("input"):
+    inputs = faces.findall("input")
+    if not any(each.get("semantic") == "VERTEX" for each in inputs):
+        raise DescriptionError("it has no input for VERTEX")
+    for each in inputs:
         offset = each.get("offset", "")
-        if not offset.isdecimal() or int(offset) > MOST_OFFSET:
+        if not (offset.isascii() and offset.isdecimal()) or int(offset) > MOST_OFFSET:
             raise DescriptionError(f"an input has the offset '{shown(offset)}'")
         if each.get("semantic") != "VERTEX":  # it only tells how many indices a corner has
             each.set("semantic", "TANGENT")
             each.set("source", f"#{positions}")
+    count = sum(len((p.text or "").split()) for p in faces.iter("p"))
+    if faces.tag == "triangles" and count % (3 * _stride(faces)):
+        raise DescriptionError(f"its <p> has {count} indices, which make no whole triangles")
     corners = sum(map(int, faces.findtext("vcount", "").split()))
-    if corners > len(faces.findtext("p", "")):  # memory would be taken for all of them
-        raise DescriptionError(f"its <vcount> claims {corners} corners, which its <p> doesn't have")
+    if corners > count:  # memory would be taken for all of them
+        raise DescriptionError(
+            f"its <vcount> claims {corners} corners, and its <p> has {count} indices"
+        )
+
+
+def _stride(faces: Element) -> int:
+    """The number of indices that a corner has."""
+    return 1 + max(int(each.get("offset", "0")) for each in faces.findall("input"))
 
 
 def _check_size(root: Element) -> None:
@@ -156,7 +178,5 @@ def _corners(geometry: Element) -> int:
     """The number of corners that the faces have together."""
     lists = [each for each in geometry.iter() if each.tag in FACES]
     return sum(
-        sum(len((p.text or "").split()) for p in each.iter("p"))
-        // (1 + max((int(i.get("offset", "0")) for i in each.iter("input")), default=0))
-        for each in lists
+        len((p.text or "").split()) // _stride(faces) for faces in lists for p in faces.iter("p")
     )

@@ -24,8 +24,10 @@ def hull_points(points: np.ndarray) -> np.ndarray:
 
 
 def _different(points: np.ndarray) -> np.ndarray:
-    _, first = np.unique(points, axis=0, return_index=True)
-    return points[np.sort(first)]
+    """Each point once. np.unique does it too, and holds all other threads for as long as it sorts rows."""
+    order = np.lexsort(points.T)
+    new = np.append(True, (np.diff(points[order], axis=0) != 0.0).any(axis=1))
+    return points[np.sort(order[new])]
 
 
 def _outermost(points: np.ndarray) -> np.ndarray:
@@ -33,13 +35,12 @@ def _outermost(points: np.ndarray) -> np.ndarray:
     turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(MOST_POINTS)
     height = 1.0 - (2.0 * np.arange(MOST_POINTS) + 1.0) / MOST_POINTS
     ring = np.sqrt(1.0 - height**2)
-    directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height])
+    directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
     centred = points - points.mean(axis=0)
     spread = np.abs(centred).max(axis=0)
-    centred = centred / np.where(spread > 0.0, spread, 1.0)  # a flat body has as fine an outline
-    farthest = [
-        int(index)
-        for some in np.split(directions, 64, axis=1)  # 64 directions at a time: memory
-        for index in (centred @ some).argmax(axis=0)
-    ]
-    return points[np.unique(farthest)]
+    centred = (
+        centred / np.where(spread > 0.0, spread, 1.0)
+    ).T  # a flat body has as fine an outline
+    some = np.split(directions, MOST_POINTS // 32)  # at a time: memory
+    farthest = [(each @ centred).argmax(axis=1) for each in some]
+    return points[np.unique(np.concatenate(farthest))]

@@ -9,7 +9,6 @@ from urllib.parse import unquote
 from bullet_gazebo.physics.description import DescriptionError, Mesh
 from bullet_gazebo.physics.meshes.reader import check_mesh, read_mesh
 
-
 MeshFile = tuple[str, Mesh | None]
 """A file's path, and what it holds if it was read."""
 

@@ -5,7 +5,7 @@ from io import StringIO
 import numpy as np
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.elements import shown
+from bullet_gazebo.physics.elements import numbers, shown
 from bullet_gazebo.physics.meshes.arrays import Part
 
 READ = ("v", "f", "o", "g")
@@ -15,8 +15,8 @@ def read_obj(data: bytes) -> list[Part]:
     """Returns a part for each object or group of the file.
 
     Raises:
-        DescriptionError: for a face that isn't made of three or more of the file's vertices.
-        ValueError: if a vertex isn't made of numbers.
+        DescriptionError: for a vertex that isn't three numbers, or a face that isn't made of three or more
+            of the file's vertices; the text names the line.
     """
     from trimesh.exchange.obj import load_obj
 
@@ -44,6 +44,7 @@ def _shape_lines(text: str) -> list[str]:
         if words[0] == "v":
             count += 1
             words[4:] = []  # a weight, or a colour
+            numbers(" ".join(words[1:]), f"line {number}: a vertex", 3)
         elif words[0] == "f":
             corners = [_index(word, count, number) for word in words[1:]]
             if len(corners) < 3:

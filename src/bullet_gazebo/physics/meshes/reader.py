@@ -3,12 +3,16 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from bullet_gazebo.physics.description import DescriptionError, Mesh
 from bullet_gazebo.physics.elements import place, shown
 from bullet_gazebo.physics.meshes.arrays import Part, make_mesh
 from bullet_gazebo.physics.meshes.collada import read_collada
 from bullet_gazebo.physics.meshes.obj import read_obj
 from bullet_gazebo.physics.meshes.stl import read_stl
+from file_reading.content import read_file
+from file_reading.errors import FileError
 
 READERS: dict[str, Callable[[bytes], list[Part]]] = {
     ".stl": read_stl,
@@ -17,7 +21,15 @@ READERS: dict[str, Callable[[bytes], list[Part]]] = {
 }
 MOST_BYTES = 200_000_000  # of a file: a million triangles as COLLADA writes them
 # What a library raises over a file that isn't as it expects: each of them was met.
-FAULTS = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError, RecursionError)
+FAULTS = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    LookupError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
 
 
 def read_mesh(path: Path) -> Mesh:
@@ -47,20 +59,17 @@ def check_mesh(path: Path) -> None:
 
 def _content(path: Path) -> bytes:
     try:
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise DescriptionError(f"{error.strerror}") from error
-    if len(data) > MOST_BYTES:
-        raise DescriptionError(f"the file is larger than {MOST_BYTES // 10**6} MB")
-    return data
+        return read_file(path, MOST_BYTES)
+    except FileError as error:
+        raise DescriptionError(str(error)) from error
 
 
 def _parts(read: Callable[[bytes], list[Part]], data: bytes) -> list[Part]:
     try:
-        return read(data)
-    except DescriptionError:
-        raise
+        with np.errstate(all="ignore"):  # what isn't finite is refused by make_mesh
+            return read(data)
+    except DescriptionError as error:  # a limit of XML's, too, is that of this file alone
+        raise DescriptionError(str(error)) from error
     except FAULTS as error:
         text = shown(str(error)) or type(error).__name__
         raise DescriptionError(f"it can't be read: {text}") from error

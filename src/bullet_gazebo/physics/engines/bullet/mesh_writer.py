@@ -39,7 +39,7 @@ def _stl(mesh: Mesh) -> bytes:
 
 
 def _obj(mesh: Mesh) -> bytes:
-    """An object for each hull, of which the engine makes a convex body each. Its faces only list the points."""
+    """An object for each hull: the engine makes a convex body of each. Faces only list the points."""
     lines, start = [], 1
     for number, points in enumerate(mesh.hulls):
         lines.append(f"o {number}")

@@ -134,7 +134,7 @@ class ModelWriter:
     def _add_mesh(self, shape: Shape) -> str:
         """Adds the points of a mesh, once for each scale; returns their name."""
         assert shape.solid is not None  # collisions are read
-        name = f"{shape.solid.digest}:{shape.size}"
+        name = f"{shape.mesh}:{shape.solid.digest}:{shape.size}"  # refusals show it
         if self._spec.mesh(name) is None:
             points = np.unique(np.concatenate(shape.solid.hulls), axis=0) * np.array(shape.size)
             self._spec.add_mesh(

@@ -88,7 +88,13 @@ class ShapeReader:
         else:
             positive(size, f"{where}, {solid.tag}")
         shape = Shape(
-            solid.tag, size, pose, mesh[0], _color(element, where), element.get("name", ""), solid=mesh[1]
+            solid.tag,
+            size,
+            pose,
+            mesh[0],
+            _color(element, where),
+            element.get("name", ""),
+            solid=mesh[1],
         )
         return replace(shape, mu=_friction(element, where)) if collides else shape
 
