@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
 from bullet_gazebo.physics.pose import Pose, Vector
 
 LONGEST = 4000  # characters of a fault
@@ -36,9 +38,32 @@ class Inertia:
     izz: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles that were checked (meshes/arrays.py); equal to those of a file with the same contents.
+
+    `vertices` (n, 3) are finite, `faces` (m, 3) are indices inside of them. `hulls` are the points (k, 3) of
+    the convex bodies that stand for the mesh where it moves: one for each object of a file that has several.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    hulls: tuple[np.ndarray, ...]
+    digest: str
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Mesh) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+
 @dataclass(frozen=True)
 class Shape:
-    """A collision or visual shape: box (x, y, z), cylinder (radius, length), sphere (radius), mesh."""
+    """A collision or visual shape: box (x, y, z), cylinder (radius, length), sphere (radius), mesh (scales).
+
+    `mesh` is the name of a mesh's file, `solid` what a collision's file held when it was read.
+    """
 
     kind: str
     size: tuple[float, ...] = ()
@@ -47,6 +72,7 @@ class Shape:
     rgba: tuple[float, float, float, float] | None = None
     name: str = ""
     mu: float = 1.0  # coefficient of friction; Gazebo's default
+    solid: Mesh | None = None
 
 
 @dataclass

@@ -2,7 +2,9 @@
 
 from collections.abc import Iterable, Iterator
 
-from bullet_gazebo.physics.description import DescriptionError, Joint, Link, ModelDescription
+import numpy as np
+
+from bullet_gazebo.physics.description import DescriptionError, Joint, Link, ModelDescription, Shape
 
 MOST_JOINTS = 127  # of one body in PyBullet, fixed ones included
 MOST_COORDINATES = 128  # a free base has 7
@@ -54,6 +56,8 @@ def _check_link(link: Link, static: bool) -> None:
     for length in _lengths(link):
         if not abs(length) <= FURTHEST:
             raise DescriptionError(f"link '{link.name}': {length} m is beyond {FURTHEST:g} m")
+    for shape in link.collisions:
+        _check_mesh(link, shape)
     inertia = link.inertia
     if inertia is None or static:
         return
@@ -67,6 +71,16 @@ def _check_link(link: Link, static: bool) -> None:
     if not largest <= LARGEST_MOMENT:
         raise DescriptionError(
             f"link '{link.name}': a moment of inertia of {largest} kg m² is beyond {LARGEST_MOMENT:g}"
+        )
+
+
+def _check_mesh(link: Link, shape: Shape) -> None:
+    if shape.solid is None:
+        return
+    reach = float((np.abs(shape.solid.vertices).max(axis=0) * np.abs(shape.size)).max())
+    if not reach <= FURTHEST:
+        raise DescriptionError(
+            f"link '{link.name}': mesh '{shape.mesh}' reaches to {reach:g} m, beyond {FURTHEST:g} m"
         )
 
 

@@ -1,23 +1,16 @@
-"""Mesh files: where a URI leads to, and whether the engine can read what lies there.
+"""Mesh files: where a URI leads to, and what is read of them."""
 
-PyBullet reads OBJ, binary STL, and COLLADA of triangles. Other STL and COLLADA is rewritten for it.
-"""
-
-import math
 import os
-import struct
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote
 
-from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.elements import place
-from bullet_gazebo.physics.meshes.collada import triangulated
+from bullet_gazebo.physics.description import DescriptionError, Mesh
+from bullet_gazebo.physics.meshes.reader import check_mesh, read_mesh
 
-SUFFIXES = (".stl", ".dae", ".obj")
-SIDES = 128  # of what stands for a cylinder
-STL_HEADER, STL_FACET = 84, 50  # [bytes]
+MeshFile = tuple[str, Mesh | None]
+"""A file's path, and what it holds if it was read."""
 
 
 def _no_packages(name: str) -> str:
@@ -76,14 +69,17 @@ class Resources:
 
 @dataclass
 class MeshFinder:
-    """Finds the mesh files of one model file; those of visuals may be missing, with a warning."""
+    """Finds and reads the mesh files of one model; those of visuals may be missing, with a warning."""
 
     resources: Resources
     folder: Path | None = None
     warnings: list[str] = field(default_factory=list)
+    _read: dict[Path, Mesh] = field(default_factory=dict)
 
-    def find(self, uri: str, where: str, needed: bool) -> str | None:
-        """Returns the file's path.
+    def find(self, uri: str, where: str, needed: bool) -> MeshFile | None:
+        """Returns the file's path and what it holds, or None for one that is left out.
+
+        What isn't `needed`, that of a visual, is looked for and not read: nothing is drawn in here.
 
         Raises:
             DescriptionError: if it is `needed` and can't be used.
@@ -91,109 +87,15 @@ class MeshFinder:
         try:
             if not uri.strip():
                 raise DescriptionError("the mesh has no file name")
-            return str(check_mesh(self.resources.find(uri, self.folder)).absolute())
+            path = self.resources.find(uri, self.folder).absolute()
+            if not needed:
+                check_mesh(path)
+                return str(path), None
+            if path not in self._read:
+                self._read[path] = read_mesh(path)
+            return str(path), self._read[path]
         except DescriptionError as error:
             if needed:
                 raise DescriptionError(f"{where}: {error}") from error
             self.warnings.append(f"{where}: {error}; it is left out")
             return None
-
-
-def check_mesh(path: Path) -> Path:
-    """Returns `path` if the engine can make a mesh of it.
-
-    Raises:
-        DescriptionError: if it can't.
-    """
-    if path.suffix.lower() not in SUFFIXES:
-        raise DescriptionError(f"mesh '{path}': only {', '.join(SUFFIXES)} files are read")
-    if not path.is_file():  # reading a pipe would wait for ever
-        raise DescriptionError(f"mesh '{path}': it is not a file")
-    try:
-        with path.open("rb") as file:
-            head = file.read(STL_HEADER)
-            size = os.fstat(file.fileno()).st_size
-    except OSError as error:
-        raise DescriptionError(f"mesh '{path}': {error.strerror}") from error
-    if path.suffix.lower() == ".stl" and not _is_ascii(head) and not _is_whole(head, size):
-        raise DescriptionError(f"mesh '{path}': the STL file is cut short or damaged")
-    if size == 0:
-        raise DescriptionError(f"mesh '{path}': the file is empty")
-    if path.suffix.lower() == ".obj" and not _has_faces(path):
-        raise DescriptionError(f"mesh '{path}': it holds no faces")
-    return path
-
-
-def _has_faces(path: Path) -> bool:
-    with path.open("rb") as file:
-        return any(line.startswith((b"f ", b"f\t")) for line in file)
-
-
-def engine_mesh(path: Path, folder: Path) -> Path:
-    """Returns `path`, or a file in `folder` with the same mesh in a form that the engine can read.
-
-    Raises:
-        DescriptionError: if it can't be read; the text names the file.
-    """
-    with place(f"mesh '{path}'"):
-        data = _rewritten(path)
-    if data is None:
-        return path
-    written = folder / f"{len(list(folder.iterdir()))}{path.suffix.lower()}"
-    written.write_bytes(data)
-    return written
-
-
-def drum(folder: Path) -> Path:
-    """Returns a file in `folder`: a cylinder of radius 1 and length 1 about z. It rests on a flat side."""
-    path = folder / "drum.obj"
-    if not path.exists():
-        angles = [2.0 * math.pi * (side + 0.5) / SIDES for side in range(SIDES)]
-        rims = [f"v {math.cos(a)!r} {math.sin(a)!r} {z}" for z in (-0.5, 0.5) for a in angles]
-        sides = [(i, i % SIDES + 1) for i in range(1, SIDES + 1)]
-        faces = [f"f {i} {j} {j + SIDES}\nf {i} {j + SIDES} {i + SIDES}" for i, j in sides]
-        path.write_text("\n".join([*rims, *faces, ""]))
-    return path
-
-
-def _rewritten(path: Path) -> bytes | None:
-    """None if the engine can read the file as it is."""
-    if path.suffix.lower() == ".dae":
-        return triangulated(path)
-    if path.suffix.lower() != ".stl":
-        return None
-    data = path.read_bytes()
-    if _is_whole(data[:STL_HEADER], len(data)) or not _is_ascii(data):
-        return None
-    return _binary_stl(data.decode("utf-8", "replace"))
-
-
-def _is_ascii(head: bytes) -> bool:
-    return head.lstrip()[:5].lower() == b"solid"
-
-
-def _is_whole(head: bytes, size: int) -> bool:
-    if len(head) < STL_HEADER:
-        return False
-    (count,) = struct.unpack_from("<I", head, STL_HEADER - 4)
-    return count > 0 and size >= STL_HEADER + STL_FACET * count
-
-
-def _binary_stl(text: str) -> bytes:
-    """The facets of an ASCII STL; their normals are left to the engine."""
-    words = text.split()
-    try:
-        values = [
-            float(number)
-            for index, word in enumerate(words)
-            if word.lower() == "vertex"
-            for number in words[index + 1 : index + 4]
-        ]
-    except ValueError as error:
-        raise DescriptionError(str(error)) from error
-    if not values or len(values) % 9:
-        raise DescriptionError("its facets don't have three vertices each")
-    facets = (
-        struct.pack("<12fH", 0.0, 0.0, 0.0, *values[i : i + 9], 0) for i in range(0, len(values), 9)
-    )
-    return bytes(STL_HEADER - 4) + struct.pack("<I", len(values) // 9) + b"".join(facets)

@@ -1,5 +1,6 @@
 """Models that come and go leave nothing behind, and what stays in the world doesn't notice."""
 
+import errno
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -107,17 +108,32 @@ def test_models_that_the_engine_refuses_leave_no_memory_behind(often, monkeypatc
     world.close()
 
 
-def test_a_model_whose_file_is_gone_keeps_the_old_world(often, tmp_path):
+def stays_among_others(tmp_path, done: Callable = lambda: None) -> bool:
+    """Whether a model was loaded anew while others came and went; it falls all the time."""
     world = World(bullet.BulletEngine())
     model = world.spawn("stays", model_of("mesh", tmp_path), Pose((0.0, 0.0, 9.0)))
     body = model.body
     Path(tmp_path, "mesh.obj").unlink()
+    done()
     for _ in range(CYCLES):
         world.spawn("m", model_of("cylinder", tmp_path), Pose())
         world.delete("m")
     world.step()
-    assert model.body is body and model.state()[1][0][2] < 0.0
+    assert model.state()[1][0][2] < 0.0
     world.close()
+    return model.body is not body
+
+
+def test_a_model_whose_file_is_gone_goes_on_in_the_new_world(often, tmp_path):
+    assert stays_among_others(tmp_path)
+
+
+def test_without_room_for_its_files_a_model_keeps_the_old_world(often, monkeypatch, tmp_path):
+    def full(*args: object, **kwargs: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    writer = "bullet_gazebo.physics.engines.bullet.urdf_writer.write_mesh"
+    assert not stays_among_others(tmp_path, lambda: monkeypatch.setattr(writer, full))
 
 
 def history(monkeypatch: pytest.MonkeyPatch, most_waste: int) -> list:

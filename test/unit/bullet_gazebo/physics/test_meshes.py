@@ -1,10 +1,11 @@
 """Mesh files: found by every kind of URI, and really colliding."""
 
-import itertools
 import os
-import struct
+import subprocess
+import sys
 
 import pytest
+from mesh_files import CORNERS, FACES, ascii_stl, binary_stl, dae, library, obj, polylist
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
@@ -14,77 +15,11 @@ from bullet_gazebo.physics.meshes.mesh_files import Resources
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
 
-CORNERS = [
-    tuple(c) for c in itertools.product((-1.0, 1.0), repeat=3)
-]  # of a cube with edges of 2 m
-FACES = [(0, 2, 1), (1, 2, 3), (4, 5, 6), (5, 7, 6), (0, 1, 4), (1, 5, 4),
-         (2, 6, 3), (3, 6, 7), (0, 4, 2), (2, 4, 6), (1, 3, 5), (3, 7, 5)]  # fmt: skip
-
-
-def binary_stl():
-    facets = (
-        struct.pack("<12fH", 0, 0, 0, *itertools.chain(*(CORNERS[i] for i in face)), 0)
-        for face in FACES
-    )
-    return bytes(80) + struct.pack("<I", len(FACES)) + b"".join(facets)
-
-
-def ascii_stl():
-    def vertex(i):
-        return "vertex " + " ".join(map(str, CORNERS[i]))
-
-    facets = (
-        "facet normal 0 0 0\nouter loop\n" + "\n".join(map(vertex, face)) + "\nendloop\nendfacet"
-        for face in FACES
-    )
-    return ("solid cube\n" + "\n".join(facets) + "\nendsolid cube\n").encode()
-
-
-def obj():
-    lines = [f"v {x} {y} {z}" for x, y, z in CORNERS]
-    return "\n".join([*lines, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in FACES), ""]).encode()
-
-
-def dae(unit="1", up="Z_UP"):
-    positions = " ".join(str(c) for corner in CORNERS for c in corner)
-    indices = " ".join(str(i) for face in FACES for i in face)
-    return f"""<?xml version="1.0"?>
-<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<asset><unit meter="{unit}" name="u"/><up_axis>{up}</up_axis></asset>
-<library_geometries><geometry id="g" name="g"><mesh>
-<source id="p"><float_array id="pa" count="24">{positions}</float_array><technique_common>
-<accessor source="#pa" count="8" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
-<param name="Z" type="float"/></accessor></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<triangles count="12"><input semantic="VERTEX" source="#v" offset="0"/><p>{indices}</p></triangles>
-</mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node>
-</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>
-""".encode()
-
-
-def library():
-    """A scene that shows a node of the library, which the engine doesn't look into."""
-    shown = '<instance_geometry url="#g"/>'
-    start, end = dae().decode().split(f'<node id="n">{shown}</node>')
-    nodes = f'<library_nodes><node id="l">{shown}</node></library_nodes>'
-    start = start.replace("<library_visual_scenes>", f"{nodes}<library_visual_scenes>")
-    return f'{start}<node id="n"><instance_node url="#l"/></node>{end}'.encode()
-
-
-def polylist():
-    """The cube by its six squares, as Blender exports it."""
-    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    indices = " ".join(str(i) for square in squares for i in square)
-    text = dae().decode()
-    start, end = text.index('<triangles count="12">'), text.index("</triangles>")
-    faces = (
-        '<polylist count="6"><input semantic="VERTEX" source="#v" offset="0"/>'
-        f"<vcount>4 4 4 4 4 4</vcount><p>{indices}</p></polylist>"
-    )
-    return (text[:start] + faces + text[end + len("</triangles>") :]).encode()
-
-
+SRC = os.pathsep.join(filter(None, sys.path))
+BALL = (
+    '<sdf version="1.6"><model name="b"><link name="l"><collision name="c"><geometry><sphere>'
+    "<radius>{}</radius></sphere></geometry></collision></link></model></sdf>"
+)
 FILES = {
     "cube.stl": binary_stl(),
     "ascii.stl": ascii_stl(),
@@ -94,10 +29,8 @@ FILES = {
     "polylist.dae": polylist(),
     "millimetres.dae": dae(unit="0.001"),
     "y_up.dae": dae(up="Y_UP"),
+    "library.dae": library(),
 }
-
-
-LIBRARY = library()
 
 
 @pytest.fixture
@@ -162,45 +95,13 @@ def test_a_static_mesh_is_hollow_where_it_is_hollow(tmp_path):
         '<sdf version="1.6"><model name="t"><static>1</static><link name="l"><collision name="c">'
         f"<geometry>{mesh}</geometry></collision></link></model></sdf>"
     )
-    ball = parse_sdf(
-        '<sdf version="1.6"><model name="b"><link name="l"><collision name="c"><geometry><sphere>'
-        "<radius>0.1</radius></sphere></geometry></collision></link></model></sdf>"
-    )
+    ball = parse_sdf(BALL.format(0.1))
     world = World(BulletEngine())
     world.spawn("t", trough, Pose())
     model = world.spawn("b", ball, Pose((0.0, 0.0, 0.6)))
     for _ in range(1500):
         world.step()
     assert model.state()[0].position[2] == pytest.approx(0.1 * 2**0.5, abs=0.03)
-    world.close()
-
-
-@pytest.mark.parametrize(
-    ("name", "data", "fault"),
-    [
-        ("none.stl", None, "none.stl' is not found"),
-        ("cut.stl", binary_stl()[:-10], "cut short or damaged"),
-        ("empty.obj", b"", "the file is empty"),
-        ("solid.stl", b"solid nothing\nendsolid", "three vertices"),
-        ("mesh.step", b"x", "only .stl, .dae, .obj files are read"),
-        ("broken.dae", b"<COLLADA><asset>", "not well-formed XML"),
-        ("broken.obj", b"no mesh at all", "no faces"),
-        ("rubbish.dae", bytes(range(256)) * 10, "can't be read"),
-        ("empty.dae", b"<COLLADA/>", "no triangles"),
-        ("library.dae", LIBRARY, "finds nothing to touch"),
-    ],
-)
-def test_a_mesh_that_can_not_be_used_is_named(tmp_path, name, data, fault):
-    path = tmp_path / name
-    if data is not None:
-        path.write_bytes(data)
-    world = World(BulletEngine())
-    with pytest.raises(DescriptionError) as raised:
-        world.spawn("m", parse_urdf(urdf(path)), Pose())
-    assert fault in str(raised.value)
-    assert name in str(raised.value)
-    assert "\n" not in str(raised.value)
-    assert world.models == {}
     world.close()
 
 
@@ -215,3 +116,69 @@ def test_a_missing_visual_is_only_a_warning():
     model = parse_urdf(urdf("package://gone/x.dae", tag="visual"))
     assert model.links["b"].visuals == []
     assert "link 'b', visual: 'package://gone/x.dae' is not found" in model.warnings[0]
+
+
+def test_a_mesh_has_the_shape_that_it_had_on_disk_when_it_was_spawned(new_engine, tmp_path):
+    path = tmp_path / "cube.stl"
+    world = World(new_engine())
+    world.spawn("ground_plane", ground_plane(), Pose())
+    for size in (1.0, 0.5, 2.0):  # the engine has seen the name before
+        path.write_bytes(binary_stl(size))
+        model = world.spawn("box", parse_urdf(urdf(path, "0.1 0.1 0.1")), Pose((0.0, 0.0, 0.3)))
+        for _ in range(1500):
+            world.step()
+        assert model.state()[0].position[2] == pytest.approx(0.1 * size, abs=0.005)
+        world.delete("box")
+    world.close()
+
+
+@pytest.mark.parametrize("static", [False, True])
+def test_an_engine_opens_no_mesh_file(new_engine, tmp_path, static):
+    """All of it is read before the world has to wait."""
+    path = tmp_path / "cube.stl"
+    path.write_bytes(binary_stl())
+    description = parse_urdf(urdf(path))
+    description.static = static
+    path.unlink()
+    world = World(new_engine())
+    world.spawn("box", description, Pose())
+    world.step()
+    world.close()
+
+
+def test_each_object_of_a_file_has_a_hull_of_its_own(tmp_path):
+    """A ball lies between two posts: one hull around both would carry it."""
+    posts = [[(x + dx, y, z) for x, y, z in CORNERS] for dx in (-3.0, 3.0)]
+    (tmp_path / "posts.obj").write_text(
+        "".join(
+            f"o post\ng {number}\n"
+            + "".join(f"v {x} {y} {z}\n" for x, y, z in corners)
+            + "".join(f"f {a - 8} {b - 8} {c - 8}\n" for a, b, c in FACES)
+            for number, corners in enumerate(posts)
+        )
+    )
+    ball = parse_sdf(BALL.format(0.5))
+    world = World(BulletEngine())
+    world.spawn("ground_plane", ground_plane(), Pose())
+    world.spawn("posts", parse_urdf(urdf(tmp_path / "posts.obj", "1 1 1")), Pose((0.0, 0.0, 1.01)))
+    model = world.spawn("ball", ball, Pose((0.0, 0.0, 3.0)))
+    for _ in range(1500):
+        world.step()
+    assert model.state()[0].position[2] == pytest.approx(0.5, abs=0.02)
+    world.close()
+
+
+def test_a_world_without_meshes_does_not_pay_for_them():
+    code = (
+        "import sys\nfrom bullet_gazebo.physics import world\n"
+        "from bullet_gazebo.physics.engines.bullet.engine import BulletEngine\n"
+        "from bullet_gazebo.physics.files.sdf.models import parse_sdf\n"
+        "there = world.World(BulletEngine())\n"
+        "there.spawn('m', parse_sdf(sys.argv[1]), world.Pose())\n"
+        "assert not {'trimesh', 'collada', 'scipy.spatial'} & set(sys.modules)"
+    )
+    subprocess.run(
+        [sys.executable, "-c", code, BALL.format(1)],
+        check=True,
+        env=os.environ | {"PYTHONPATH": SRC},
+    )

@@ -1,9 +1,7 @@
 """What the second engine does in its own way: a world compiled anew, motors, contacts and meshes."""
 
 import math
-import struct
 
-import numpy as np
 import pytest
 from robots import cartpole_urdf
 
@@ -11,19 +9,12 @@ from bullet_gazebo.physics.description import DescriptionError, Inertia, Shape
 from bullet_gazebo.physics.engines.registry import make_engine
 from bullet_gazebo.physics.files.sdf.models import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.meshes.points import mesh_points
 from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.world import World, ground_plane
 
 pytestmark = pytest.mark.extras("mujoco")
 
 CORNERS = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
-COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">
-<asset><unit meter="0.5"/><up_axis>Y_UP</up_axis></asset><library_geometries><geometry id="g"><mesh>
-<source id="s"><float_array count="12">0 0 0 2 0 0 0 4 0 0 0 6</float_array></source>
-<vertices id="v"><input semantic="POSITION" source="#s"/></vertices></mesh></geometry>
-</library_geometries><library_visual_scenes><visual_scene id="w"><node>{}<instance_geometry url="#g"/>
-</node></visual_scene></library_visual_scenes></COLLADA>"""
 
 
 @pytest.fixture
@@ -100,7 +91,7 @@ def test_a_model_that_is_refused_leaves_the_world_as_it_was(world, tmp_path):
     pole = world.spawn("a", parse_urdf(cartpole_urdf()), Pose())
     run(world, 0.01)
     before = pole.joint_states()
-    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\n")
+    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3 4\n")
     flat = block(geometry=f"<mesh><uri>{tmp_path}/flat.obj</uri></mesh>")
     with pytest.raises(DescriptionError, match=r"can't load the model: .*flat\.obj") as raised:
         world.spawn("b", flat, Pose())
@@ -213,7 +204,7 @@ def test_the_smaller_coefficient_of_friction_counts(mu, ground, slides):
 )
 def test_every_shape_rests_on_the_ground(world, tmp_path, geometry, height):
     (tmp_path / "cube.obj").write_text(
-        "\n".join(["v {} {} {}".format(*c) for c in CORNERS] + ["f 1 2 3"])
+        "\n".join(["v {} {} {}".format(*c) for c in CORNERS] + ["f 1 2 3 4 5 6 7 8"])
     )
     world.spawn("ground_plane", ground_plane(), Pose())
     model = world.spawn(
@@ -233,45 +224,6 @@ def test_a_fixed_base_stands_where_it_was_put_also_for_what_falls_on_it(world):
     run(world, 0.5)
     assert model.state()[0].position == (5.0, 0.0, 1.0)
     assert ball.state()[0].position[2] == pytest.approx(1.2, abs=1e-3)
-
-
-def stl(corners):
-    facets = b"".join(
-        struct.pack("<12fH", 0, 0, 0, *sum(corners[i : i + 3], ()), 0) for i in range(6)
-    )
-    return bytes(80) + struct.pack("<I", 6) + facets
-
-
-def test_points_of_every_kind_of_mesh_file(tmp_path):
-    text = "solid s\n" + "".join("vertex {} {} {}\n".format(*corner) for corner in CORNERS)
-    for name, data in (("a.stl", stl(CORNERS)), ("b.stl", text.encode()),
-                       ("c.obj", text.replace("vertex", "v").encode())):  # fmt: skip
-        (tmp_path / name).write_bytes(data)
-        assert mesh_points(tmp_path / name) == pytest.approx(np.array(sorted(CORNERS)))
-
-
-def test_points_of_collada_follow_its_nodes_unit_and_axes(tmp_path):
-    move = "<translate>1 0 0</translate><rotate>0 0 1 90</rotate><scale>1 1 2</scale>"
-    (tmp_path / "a.dae").write_text(COLLADA.format(move))
-    # (2 0 0) turns to (0 2 0), (0 4 0) to (-4 0 0); then y is up, and a unit is half a metre.
-    wanted = [(0.5, 0, 0), (0.5, 0, 1), (-1.5, 0, 0), (0.5, -6, 0)]
-    assert mesh_points(tmp_path / "a.dae") == pytest.approx(np.array(sorted(wanted)), abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "fault"),
-    [
-        ("a.obj", "v 1 x 2\nf 1 2 3", "can't be read"),
-        ("b.stl", "solid s\nvertex 1 2 3\n", "nothing to touch"),
-        ("c.dae", "<COLLADA", "not well-formed"),
-        ("d.dae", "<COLLADA/>", "nothing to touch"),
-        ("e.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3", "nothing to touch"),
-    ],
-)
-def test_a_mesh_without_points_is_named(tmp_path, name, text, fault):
-    (tmp_path / name).write_text(text)
-    with pytest.raises(DescriptionError, match=f"{name}.*{fault}"):
-        mesh_points(tmp_path / name)
 
 
 @pytest.mark.parametrize("speed", [math.nan, 1e200, -math.inf])

@@ -77,7 +77,7 @@ class BulletClient:
         with tempfile.TemporaryDirectory(prefix="bullet_gazebo_") as folder:
             path = Path(folder, "model.urdf")
             path.write_text(write_urdf(parents_first(engine_form), Path(folder)), encoding="utf-8")
-            size = _size(Path(folder), engine_form)
+            size = _size(Path(folder))
             try:
                 body = pybullet.loadURDF(
                     str(path), pose.position, pose.orientation, useFixedBase=description.fixed_base,
@@ -133,9 +133,6 @@ class BulletClient:
         pybullet.disconnect(self._client)
 
 
-def _size(folder: Path, model: ModelDescription) -> int:
-    """Bytes that the engine reads: what was written into `folder`, and meshes that are read as they are."""
-    written = sum(path.stat().st_size for path in folder.iterdir())
-    shapes = [shape for link in model.links.values() for shape in link.collisions]
-    meshes = [Path(shape.mesh) for shape in shapes if shape.mesh]
-    return written + sum(mesh.stat().st_size for mesh in meshes if mesh.exists())
+def _size(folder: Path) -> int:
+    """Bytes that the engine reads: what was written into `folder`."""
+    return sum(path.stat().st_size for path in folder.iterdir())

@@ -4,15 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from bullet_gazebo.physics.description import (
-    DescriptionError,
-    Inertia,
-    Joint,
-    Link,
-    ModelDescription,
-    Shape,
-)
-from bullet_gazebo.physics.meshes.mesh_files import drum, engine_mesh
+from bullet_gazebo.physics.description import Inertia, Joint, Link, ModelDescription, Shape
+from bullet_gazebo.physics.engines.bullet.mesh_writer import drum, write_mesh
 from bullet_gazebo.physics.pose import Pose, to_rpy
 
 MARGIN = 0.001  # [m]; PyBullet's, around convex hulls
@@ -21,10 +14,8 @@ MARGIN = 0.001  # [m]; PyBullet's, around convex hulls
 def write_urdf(model: ModelDescription, folder: Path | None = None) -> str:
     """Returns URDF text with the numbers of `model` to the last digit.
 
-    Meshes that the engine can't read as they are get rewritten into `folder`, if one is given.
-
-    Raises:
-        DescriptionError: for a mesh that can't be read.
+    Visuals are left out: nothing is drawn. Meshes are written into `folder`, if one is given: the engine
+    never opens a user's file, which it would crash on or take from its memory of files.
     """
     robot = Element("robot", name="model")
     for link in model.links.values():
@@ -39,16 +30,14 @@ def _write_link(robot: Element, link: Link, static: bool, folder: Path | None) -
     element = SubElement(robot, "link", name=link.name)
     # Without an inertial the engine would assume 1 kg; only the immovable link `world` has none.
     _write_inertia(element, link.inertia or Inertia(mass=0.0))
-    for tag, shapes in (("visual", link.visuals), ("collision", link.collisions)):
-        for given in shapes:
-            shape = _finer(given, folder) if tag == "collision" else given
-            mesh = _mesh_file(shape, folder, needed=tag == "collision")
-            if mesh is None:
-                continue
-            written = SubElement(element, tag)
-            if static and shape.kind == "mesh" and tag == "collision":
-                written.set("concave", "yes")  # what moves collides by its convex hull
-            _write_shape(written, shape, mesh)
+    for given in link.collisions:
+        shape = _finer(given, folder)
+        written = SubElement(element, "collision")
+        if static and shape.kind == "mesh":
+            written.set("concave", "yes")  # what moves collides by its convex hull
+        if shape.solid is not None and folder is not None:
+            shape = replace(shape, mesh=write_mesh(shape.solid, folder, concave=static))
+        _write_shape(written, shape)
 
 
 def _finer(shape: Shape, folder: Path | None) -> Shape:
@@ -63,18 +52,6 @@ def _finer(shape: Shape, folder: Path | None) -> Shape:
     return replace(shape, kind="mesh", size=(radius, radius, length), mesh=str(drum(folder)))
 
 
-def _mesh_file(shape: Shape, folder: Path | None, needed: bool) -> str | None:
-    """Returns the file that the engine reads; None for that of a visual that it can't read."""
-    if shape.kind != "mesh" or folder is None:
-        return shape.mesh
-    try:
-        return str(engine_mesh(Path(shape.mesh), folder))
-    except DescriptionError:
-        if needed:
-            raise
-        return None
-
-
 def _write_inertia(link: Element, inertia: Inertia) -> None:
     inertial = SubElement(link, "inertial")
     _write_origin(inertial, inertia.com)
@@ -85,7 +62,7 @@ def _write_inertia(link: Element, inertia: Inertia) -> None:
     SubElement(inertial, "inertia", tensor)
 
 
-def _write_shape(element: Element, shape: Shape, mesh: str) -> None:
+def _write_shape(element: Element, shape: Shape) -> None:
     _write_origin(element, shape.pose)
     geometry = SubElement(element, "geometry")
     if shape.kind == "box":
@@ -97,10 +74,7 @@ def _write_shape(element: Element, shape: Shape, mesh: str) -> None:
     elif shape.kind == "plane":
         SubElement(geometry, "plane", normal="0 0 1")
     else:
-        SubElement(geometry, "mesh", filename=mesh, scale=_words(shape.size))
-    if shape.rgba is not None:
-        material = SubElement(element, "material", name=f"rgba {_words(shape.rgba)}")
-        SubElement(material, "color", rgba=_words(shape.rgba))
+        SubElement(geometry, "mesh", filename=shape.mesh, scale=_words(shape.size))
 
 
 def _write_joint(robot: Element, joint: Joint) -> None:

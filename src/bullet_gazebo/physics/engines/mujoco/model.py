@@ -4,7 +4,6 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -17,7 +16,6 @@ from bullet_gazebo.physics.description import (
     Shape,
 )
 from bullet_gazebo.physics.mechanics.inertia import tensor_in
-from bullet_gazebo.physics.meshes.points import mesh_points
 from bullet_gazebo.physics.pose import IDENTITY, Pose, Quaternion, Vector, rotate
 
 GEOMS = {
@@ -134,10 +132,11 @@ class ModelWriter:
             geom.size = [0.0, 0.0, 1.0]  # without end
 
     def _add_mesh(self, shape: Shape) -> str:
-        """Adds the points of a mesh, once for each file and scale; returns their name."""
-        name = f"{shape.mesh}:{shape.size}"
+        """Adds the points of a mesh, once for each scale; returns their name."""
+        assert shape.solid is not None  # collisions are read
+        name = f"{shape.mesh}:{shape.solid.digest}:{shape.size}"  # refusals show it
         if self._spec.mesh(name) is None:
-            points = mesh_points(Path(shape.mesh)) * np.array(shape.size or (1.0, 1.0, 1.0))
+            points = np.unique(np.concatenate(shape.solid.hulls), axis=0) * np.array(shape.size)
             self._spec.add_mesh(
                 name=name, uservert=points.ravel().tolist(),
                 inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,

@@ -15,7 +15,7 @@ from bullet_gazebo.physics.description import (
 from bullet_gazebo.physics.elements import files_named_by_a_model, finite, numbers, positive, shown
 from bullet_gazebo.physics.files.reading import Reading
 from bullet_gazebo.physics.files.sdf.frames import Frames, read_pose
-from bullet_gazebo.physics.meshes.mesh_files import MeshFinder
+from bullet_gazebo.physics.meshes.mesh_files import MeshFile, MeshFinder
 from bullet_gazebo.physics.pose import Pose, Quaternion, cross, normalized
 
 MOMENTS = {"ixx": 1.0, "ixy": 0.0, "ixz": 0.0, "iyy": 1.0, "iyz": 0.0, "izz": 1.0}  # defaults
@@ -75,7 +75,8 @@ class ShapeReader:
         if relative_to and relative_to != link:
             frame = self.frames.resolve(relative_to)
             pose = frame.compose(pose).relative_to(self.frames.resolve(link))
-        mesh, size = "", _size(solid, where)
+        mesh: MeshFile = ("", None)
+        size = _size(solid, where)
         if solid.tag == "mesh":
             with files_named_by_a_model(where):
                 found = self.meshes.find(solid.findtext("uri") or "", where, collides)
@@ -86,7 +87,15 @@ class ShapeReader:
             pose = pose.compose(Pose(orientation=_onto_normal(solid, where)))
         else:
             positive(size, f"{where}, {solid.tag}")
-        shape = Shape(solid.tag, size, pose, mesh, _color(element, where), element.get("name", ""))
+        shape = Shape(
+            solid.tag,
+            size,
+            pose,
+            mesh[0],
+            _color(element, where),
+            element.get("name", ""),
+            solid=mesh[1],
+        )
         return replace(shape, mu=_friction(element, where)) if collides else shape
 
 

@@ -83,13 +83,13 @@ class LinkReader:
         uri, needed = _solid(element, place).get("filename", ""), element.tag == "collision"
         try:
             with files_named_by_a_model(place):
-                path = self.meshes.find(uri, place, needed)
+                found = self.meshes.find(uri, place, needed)
         except DescriptionError as error:
             if needed:
                 raise
             self.warnings.append(f"{error}; it is left out")
             return None
-        return None if path is None else replace(shape, mesh=path)
+        return None if found is None else replace(shape, mesh=found[0], solid=found[1])
 
     def _color(self, element: Element, place: str) -> Color | None:
         material = element.find("material")

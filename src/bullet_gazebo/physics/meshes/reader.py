@@ -1,0 +1,75 @@
+"""Mesh files into checked arrays. The libraries that parse them are imported with the first mesh."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from bullet_gazebo.physics.description import DescriptionError, Mesh
+from bullet_gazebo.physics.elements import place, shown
+from bullet_gazebo.physics.meshes.arrays import Part, make_mesh
+from bullet_gazebo.physics.meshes.collada import read_collada
+from bullet_gazebo.physics.meshes.obj import read_obj
+from bullet_gazebo.physics.meshes.stl import read_stl
+from file_reading.content import read_file
+from file_reading.errors import FileError
+
+READERS: dict[str, Callable[[bytes], list[Part]]] = {
+    ".stl": read_stl,
+    ".dae": read_collada,
+    ".obj": read_obj,
+}
+MOST_BYTES = 200_000_000  # of a file: a million triangles as COLLADA writes them
+# What a library raises over a file that isn't as it expects: each of them was met.
+FAULTS = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    LookupError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+
+
+def read_mesh(path: Path) -> Mesh:
+    """Returns the mesh of an STL, COLLADA or OBJ file.
+
+    Raises:
+        DescriptionError: if it can't be simulated: the file, the place in it and the fault, in one line.
+    """
+    check_mesh(path)
+    with place(f"mesh '{path}'"):
+        return make_mesh(_parts(READERS[path.suffix.lower()], _content(path)))
+
+
+def check_mesh(path: Path) -> None:
+    """Refuses what can't be a mesh, without reading it.
+
+    Raises:
+        DescriptionError: the text names the file.
+    """
+    if path.suffix.lower() not in READERS:
+        raise DescriptionError(f"mesh '{path}': only {', '.join(READERS)} files are read")
+    if not path.is_file():  # reading a pipe would wait for ever
+        raise DescriptionError(f"mesh '{path}': it is not a file")
+    if path.stat().st_size == 0:
+        raise DescriptionError(f"mesh '{path}': the file is empty")
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return read_file(path, MOST_BYTES)
+    except FileError as error:
+        raise DescriptionError(str(error)) from error
+
+
+def _parts(read: Callable[[bytes], list[Part]], data: bytes) -> list[Part]:
+    try:
+        with np.errstate(all="ignore"):  # what isn't finite is refused by make_mesh
+            return read(data)
+    except DescriptionError as error:  # a limit of XML's, too, is that of this file alone
+        raise DescriptionError(str(error)) from error
+    except FAULTS as error:
+        text = shown(str(error)) or type(error).__name__
+        raise DescriptionError(f"it can't be read: {text}") from error
