@@ -2,6 +2,9 @@
 
 import sys
 
-from rl_workbench.cli import main
+try:
+    from rl_workbench.cli import main
+except KeyboardInterrupt:  # Ctrl-C while it is still being read; main() sees to the rest
+    sys.exit(130)
 
 sys.exit(main())

@@ -29,6 +29,14 @@ def test_a_training_its_resumption_and_its_policy(
     assert json.loads(capsys.readouterr().out)["run"] == str(run)
 
 
+def test_ctrl_c_while_it_is_still_being_read(tmp_path: Path) -> None:
+    (tmp_path / "torch.py").write_text("raise KeyboardInterrupt\n")
+    done = subprocess.run(
+        [*PROGRAM, "train", "--algo=dqn"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
 @pytest.mark.parametrize("prog", ["rl-workbench", "workbench.py"])
 def test_errors_begin_with_the_commands_name(
     tmp_path: Path, prog: str, capsys: pytest.CaptureFixture[str]

@@ -5,17 +5,21 @@ was written, and TensorBoard's file is written anew from it: so neither has a ro
 """
 
 import os
+import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-from torch.utils.tensorboard import SummaryWriter
-from torch.utils.tensorboard.summary import hparams
+from tensorboard.compat.proto.event_pb2 import Event
+from tensorboard.compat.proto.summary_pb2 import Summary
+from tensorboard.summary.writer.record_writer import RecordWriter
+from torch.utils.tensorboard.summary import hparams, scalar, text
 
 NAME = "scalars.csv"
 HEADER = "step,tag,value,wall_time\n"
-EVENTS = "events.out.tfevents.*"
+EVENTS = "events.out.tfevents."
+VERSION = "brain.Event:2"  # of the file, as TensorBoard asks for in its first record
+SHOWN_AFTER = 10.0  # [s] at most until TensorBoard can see a point
 METRICS = ("eval/mean_reward", "charts/episodic_return")  # beside the settings, under HPARAMS
 
 Point = tuple[str, float, int, float]  # tag, value, step, wall time [s]
@@ -43,15 +47,15 @@ class ScalarLog:
     ) -> None:
         path = folder / NAME
         points = _cut(path, length, say) if length else []
-        if not points:  # a full disk fails here, and not in TensorBoard's thread
+        if not points:
             path.write_text(HEADER, encoding="utf-8")
         self._file = path.open("a", encoding="utf-8")
-        for old in folder.glob(EVENTS):
+        for old in folder.glob(f"{EVENTS}*"):
             old.unlink()
-        self._writer = SummaryWriter(str(folder))
-        _add_settings(self._writer, settings)
-        for point in points:
-            self._writer.add_scalar(*point)
+        self._events = EventFile(folder)
+        _add_settings(self._events, settings)
+        for tag, value, step, wall_time in points:
+            self._events.add(scalar(tag, value), step, wall_time)
 
     def add(self, step: int, values: dict[str, float]) -> None:
         """Writes one row for each tag.
@@ -62,7 +66,7 @@ class ScalarLog:
         now = time.time()
         for tag, value in values.items():
             self._file.write(f"{step},{tag},{float(value)!r},{now:.3f}\n")
-            self._writer.add_scalar(tag, value, step, now)
+            self._events.add(scalar(tag, value), step, now)
 
     def sync(self) -> int:
         """Puts the CSV on disk; returns its length [bytes].
@@ -70,13 +74,58 @@ class ScalarLog:
         Raises:
             OSError: if the disk refuses.
         """
+        self._events.flush()
         self._file.flush()
         os.fsync(self._file.fileno())
         return os.fstat(self._file.fileno()).st_size
 
     def close(self) -> None:
-        """Writes what is still in memory."""
-        self._writer.close()
+        """Writes what is still in memory.
+
+        Raises:
+            OSError: if the disk refuses.
+        """
+        try:
+            self._events.close()
+        finally:
+            self._file.close()
+
+
+class EventFile:
+    """TensorBoard's file, written by who calls.
+
+    TensorBoard's own writer has a thread, which a full disk ends in a traceback.
+
+    Args:
+        folder: where it is made, under a name of its own.
+
+    Raises:
+        OSError: if the disk refuses, as each method does.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._shown, now = time.monotonic(), time.time()
+        path = folder / f"{EVENTS}{now:.0f}.{socket.gethostname()}.{os.getpid()}"
+        self._file = path.open("wb")
+        self._records = RecordWriter(self._file)
+        self._write(Event(wall_time=now, file_version=VERSION))
+
+    def add(self, summary: Summary, step: int = 0, wall_time: float | None = None) -> None:
+        """Writes what TensorBoard is to show."""
+        self._write(Event(wall_time=wall_time or time.time(), step=step, summary=summary))
+        if time.monotonic() - self._shown > SHOWN_AFTER:
+            self._shown = time.monotonic()
+            self.flush()
+
+    def _write(self, event: Event) -> None:
+        self._records.write(event.SerializeToString())
+
+    def flush(self) -> None:
+        """Gives what was added to the disk."""
+        self._file.flush()
+
+    def close(self) -> None:
+        """The same, and nothing more will be added."""
         self._file.close()
 
 
@@ -109,15 +158,13 @@ def _point(row: bytes) -> Point | None:
         return None
 
 
-def _add_settings(writer: SummaryWriter, settings: dict[str, object]) -> None:
+def _add_settings(events: EventFile, settings: dict[str, object]) -> None:
     """Shows settings as a table under TEXT, and as columns under HPARAMS."""
     rows = "\n".join(f"|{name}|{value}|" for name, value in settings.items())
-    writer.add_text("hyperparameters", f"|parameter|value|\n|-|-|\n{rows}")
+    events.add(text("hyperparameters", f"|parameter|value|\n|-|-|\n{rows}"))
     plain = {
         name: value if type(value) in (int, float) else str(value)  # True would become 1
         for name, value in settings.items()
     }
-    # Into this file: `add_hparams` would make a run of its own beside this one.
-    file: Any = writer.file_writer  # which has no type
     for summary in hparams(plain, dict.fromkeys(METRICS, 0.0)):
-        file.add_summary(summary)
+        events.add(summary)
