@@ -3,9 +3,9 @@
 A xacro file is a program: it may include itself, compute without end or ask for all memory. It runs here,
 where the kernel ends it, and not in whoever asks for it.
 
-`expansion` runs this file by itself (``python -I``), so it imports nothing of this repository before the request
-has come: JSON on standard input, with the path of its caller's modules. The answer on standard output is the XML or,
-with exit code `BROKEN`, one line that says what is wrong.
+`expansion` runs this file by itself (``python -I``), so it imports nothing of this repository before the
+request has come: JSON on standard input, with the path of its caller's modules. The answer on standard output
+is the XML or, with exit code `BROKEN`, one line that says what is wrong.
 """
 
 from __future__ import annotations
