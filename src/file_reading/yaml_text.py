@@ -39,13 +39,13 @@ def load_documents(data: bytes | str) -> list[Any]:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        raise FileError(_line(f"{place}{error.problem or error.context}")) from error
+        raise FileError(f"{place}{error.problem or error.context}") from error
     except (yaml.YAMLError, UnicodeError) as error:
-        raise FileError(_line(str(error))) from error
+        raise FileError(str(error)) from error
     except FileError:
         raise
     except ValueError as error:  # of a date or number that is none, for which PyYAML gives no place
-        raise FileError(_line(f"a value can't be read: {error}")) from error
+        raise FileError(f"a value can't be read: {error}") from error
     except RecursionError as error:
         raise TooLarge(f"values are nested more than {MAX_DEPTH} deep (MAX_DEPTH)") from error
     _count(documents, {}, 0)
@@ -136,17 +136,12 @@ def _check_sendable(value: Any, place: str) -> None:
     if isinstance(value, dict):
         for name, each in value.items():
             if not isinstance(name, str):
-                raise FileError(_line(f"{place}: the name {name!r} is no text: put it in quotes"))
+                raise FileError(f"{place}: the name {name!r} is no text: put it in quotes")
             _check_sendable(each, f"{place}/{name}")
     elif isinstance(value, list):
         for number, each in enumerate(value):
             _check_sendable(each, f"{place}[{number}]")
     elif value is None:
-        raise FileError(_line(f"{place} has no value"))
+        raise FileError(f"{place} has no value")
     elif not isinstance(value, SIMPLE):
-        raise FileError(_line(f"{place}: a {type(value).__name__} can't be a parameter"))
-
-
-def _line(text: str) -> str:
-    line = " ".join(text.split())
-    return line if len(line) <= 1000 else f"{line[:1000]}…"
+        raise FileError(f"{place}: a {type(value).__name__} can't be a parameter")

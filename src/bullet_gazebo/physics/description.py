@@ -6,8 +6,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from bullet_gazebo.physics.pose import Pose, Vector
+from file_reading.errors import one_line
 
-LONGEST = 4000  # characters of a fault
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
@@ -15,9 +15,8 @@ class DescriptionError(ValueError):
     """A model file that can't be simulated: the text names the place in it and what is wrong."""
 
     def __init__(self, text: str) -> None:
-        """Names in the file may hold anything: `text` is made one line, and cut to a length for a log."""
-        line = " ".join(text.split())
-        super().__init__(line if len(line) <= LONGEST else f"{line[:LONGEST]}…")
+        """Names in the file may hold anything: `text` is made one line, of a length for a log."""
+        super().__init__(one_line(text))
 
 
 class LimitExceeded(DescriptionError):

@@ -13,6 +13,7 @@ from bullet_gazebo.control.trajectory.tolerances import Constraints, Tolerance
 
 SLOWEST = 1e-6  # [Hz]; below it, as at 0, no state is published
 STOPPED_VELOCITY = 0.01  # [rad/s, m/s]
+FOR_EVER = 1e12  # [s]; longer durations are cut, as no clock tells them
 
 
 class Settings(NamedTuple):
@@ -78,7 +79,7 @@ def _constraints(
 
 
 def _duration(params: Mapping[str, object], key: str, place: str) -> int:
-    return max(0, round(_number(params, key, 0.0, place) * NANOSECONDS))
+    return round(min(max(0.0, _number(params, key, 0.0, place)), FOR_EVER) * NANOSECONDS)
 
 
 def _tree(params: Mapping[str, object], key: str, place: str) -> Mapping[str, object]:

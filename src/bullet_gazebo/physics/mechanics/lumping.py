@@ -13,7 +13,7 @@ from bullet_gazebo.physics.description import (
     ModelDescription,
     Shape,
 )
-from bullet_gazebo.physics.mechanics.inertia import combine
+from bullet_gazebo.physics.mechanics.inertia import combine, is_positive_definite
 from bullet_gazebo.physics.pose import Pose
 
 WORLD = "world"
@@ -28,6 +28,7 @@ def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
         _lump(model, name)
     _drop_free_joints(model)
     drop_massless(model)
+    mend_moments(model)
     for link in model.links.values():
         link.collisions = _named(link, link.collisions, "_collision")
         link.visuals = _named(link, link.visuals, "_visual")
@@ -90,6 +91,21 @@ def _drop_free_joints(model: ModelDescription) -> None:
             )
         del model.joints[joint.name], model.links[WORLD]
         model.root, model.root_pose, model.world_joints = joint.child, joint.pose, []
+
+
+def mend_moments(model: ModelDescription) -> None:
+    """Gives links whose moments no body has, all of them 0 for the most part, those that ODE gives them: 1.
+
+    With the file's own the world would be lost to the first step.
+    """
+    for link in model.links.values():
+        inertia = link.inertia
+        if model.static or inertia is None or inertia.mass <= 0.0 or is_positive_definite(inertia):
+            continue
+        model.warnings.append(
+            f"link '{link.name}': no body has its moments of inertia; they are 1 kg m² instead, as in ODE"
+        )
+        link.inertia = Inertia(inertia.mass, inertia.com, ixx=1.0, iyy=1.0, izz=1.0)
 
 
 def drop_massless(model: ModelDescription) -> None:

@@ -115,6 +115,28 @@ def test_moments_that_are_missing_are_zero():
     assert (inertia.ixx, inertia.iyy, inertia.izz, inertia.ixy) == (1.0, 2.0, 3.0, 0.0)
 
 
+@pytest.mark.parametrize(
+    "moments", [(0, 0, 0), (0, 1, 1), (1e-40, 1, 0)], ids=["none", "one missing", "underflow"]
+)
+def test_moments_that_no_body_has_are_those_of_ode(new_engine, moments):
+    """PyBullet would lose the world to the first step, MuJoCo refuse the model."""
+    ixx, iyy, izz = moments
+    tensor = f'<inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" iyz="0"/>'
+    text = robot(arm=f'<inertial><mass value="1"/>{tensor}</inertial>', more="").replace(
+        TENSOR, tensor
+    )
+    world = World(new_engine())
+    description = parse_urdf(text)
+    inertia = description.links["arm"].inertia
+    assert (inertia.mass, inertia.ixx, inertia.iyy, inertia.izz) == (1.0, 1.0, 1.0, 1.0)
+    assert [warning[:11] for warning in description.warnings] == ["link 'body'", "link 'arm':"]
+    model = world.spawn("r", description, Pose())
+    for _ in range(10):
+        world.step()
+    assert model.state()[0].position[2] == pytest.approx(-9.8 * 0.01**2 / 2, rel=0.2)
+    world.close()
+
+
 def test_a_colour_that_cannot_be_read_leaves_the_shape():
     ball = '<geometry><sphere radius="1"/></geometry>'
     bad = '<material name="odd"><color rgba="red"/></material>'

@@ -25,7 +25,7 @@ from bullet_gazebo.physics.files.sdf.geometry import ShapeReader, read_inertia
 from bullet_gazebo.physics.files.sdf.include import FileContext, open_include
 from bullet_gazebo.physics.files.sdf.joints import WORLD, JointReader, ends
 from bullet_gazebo.physics.files.urdf.extensions import name_sensor, read_plugin
-from bullet_gazebo.physics.mechanics.lumping import detach_from_world
+from bullet_gazebo.physics.mechanics.lumping import detach_from_world, mend_moments
 from bullet_gazebo.physics.mechanics.tree import check_count, find_roots, unique
 from bullet_gazebo.physics.meshes.mesh_files import MeshFinder, Resources
 from bullet_gazebo.physics.pose import Pose
@@ -127,6 +127,7 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
     model.plugins, model.warnings, model.left_out = parts.plugins, parts.warnings, parts.left_out
     model.static = static
     detach_from_world(model)
+    mend_moments(model)
     return model
 
 

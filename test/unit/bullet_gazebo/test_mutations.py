@@ -1,0 +1,70 @@
+"""Mutated models and parameters, all through the public reading functions: a model, or one clear line."""
+
+from collections import Counter
+from xml.etree.ElementTree import fromstring
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mutations_models import CASES, CONTROLLERS, SDF, URDF, WORLD, XACRO, spawn
+
+from bullet_gazebo.physics.world import World
+
+EXAMPLES = {"xacro": 8}  # each takes a process; of the others 150
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_mutated_model_is_read_or_refused(name):
+    case = CASES[name]
+    seen: Counter[bool] = Counter()
+
+    @settings(max_examples=EXAMPLES.get(name, 150), deadline=None, database=None, derandomize=True,
+              suppress_health_check=list(HealthCheck))  # fmt: skip
+    @given(case.texts)
+    def look(text):
+        seen[case.read(text) == "read"] += 1
+
+    look()
+    # Without some of each, hardly anything was looked at.
+    assert name in EXAMPLES or (seen[True] and seen[False])
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("urdf", URDF),
+        ("sdf", SDF),
+        ("world", WORLD),
+        ("xacro", XACRO),
+        ("robot_description", URDF),
+        ("controllers", CONTROLLERS),
+        ("yaml", CONTROLLERS),
+    ],
+)
+def test_what_is_mutated_is_sound_itself(name, text):
+    assert CASES[name].read(text) == "read"
+
+
+def test_a_duration_beyond_all_clocks_is_one():
+    arm = CONTROLLERS["position_arm"] | {"constraints": {"goal_time": 1e308}}
+    assert CASES["controllers"].read(CONTROLLERS | {"position_arm": arm}) == "read"
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.data())
+def test_a_mutated_text_is_still_xml(data):
+    fromstring(data.draw(CASES["world"].texts))
+
+
+def test_a_mutated_model_that_is_read_stands_in_a_world(new_engine):
+    world, seen = World(new_engine()), Counter()
+
+    @settings(max_examples=60, deadline=None, database=None, derandomize=True,
+              suppress_health_check=list(HealthCheck))  # fmt: skip
+    @given(CASES["entity"].texts)
+    def look(text):
+        seen[spawn(world, text) == "read"] += 1
+
+    look()
+    assert seen[True]
+    world.close()
