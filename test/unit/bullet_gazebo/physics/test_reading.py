@@ -8,10 +8,13 @@ from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
 from bullet_gazebo.physics.files import reading as limits
 from bullet_gazebo.physics.files.model_file import read_entity
 from bullet_gazebo.physics.files.reading import Reading
-from bullet_gazebo.physics.files.sdf.models import parse_sdf
+from bullet_gazebo.physics.files.sdf.models import MAX_NESTING, parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.files.world_file import load_world, parse_world
+from bullet_gazebo.physics.mechanics.tree import MAX_LINKS
 from bullet_gazebo.physics.meshes.mesh_files import Resources
+from file_reading import yaml_text
+from file_reading.xml_parser import MAX_DEPTH
 
 WIDTH, LEVELS = 10, 7  # a bomb: ten includes of ten includes of ...
 MODEL = '<sdf version="1.6"><model name="{}">{}</model></sdf>'
@@ -213,3 +216,17 @@ def test_worlds_models_and_configurations_of_every_encoding(tmp_path, before, co
     put(tmp_path / "w", f'<sdf version="1.6"><world name="w">{include}</world></sdf>')
     world = load_world(tmp_path / "w", Resources(models=(tmp_path,)))
     assert (list(world.models), world.warnings) == (["Kiste für Äpfel"], [])
+
+
+def test_the_manual_names_the_limits_that_there_are(root):
+    lines = (root / "docs/gazebo.md").read_text(encoding="utf-8").splitlines()
+    rows = [line.split("|")[1:3] for line in lines if line.startswith("| `MAX_")]
+    told = {name.strip(" `"): float(figure) for name, figure in rows}
+    assert told == {
+        "MAX_BYTES": limits.MAX_BYTES, "MAX_ELEMENTS": limits.MAX_ELEMENTS, "MAX_DEPTH": MAX_DEPTH,
+        "MAX_FILES": limits.MAX_FILES, "MAX_MODELS": limits.MAX_MODELS, "MAX_NESTING": MAX_NESTING,
+        "MAX_LINKS": MAX_LINKS, "MAX_SECONDS": limits.MAX_SECONDS, "MAX_VALUES": yaml_text.MAX_VALUES,
+    }  # fmt: skip
+    text = "\n".join(lines)
+    assert f"a YAML file has {yaml_text.MAX_BYTES} " in text
+    assert f"of YAML's values {yaml_text.MAX_DEPTH} " in text
