@@ -51,7 +51,9 @@ def _outermost(points: np.ndarray) -> np.ndarray:
     directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
     centred = points - points.mean(axis=0)
     spread = np.abs(centred).max(axis=0)
-    centred = (centred / np.where(spread > 0.0, spread, 1.0)).T  # a flat body has as fine an outline
+    centred = (
+        centred / np.where(spread > 0.0, spread, 1.0)
+    ).T  # a flat body has as fine an outline
     best, farthest = np.full(MOST_POINTS, -np.inf), np.zeros(MOST_POINTS, int)
     for start in range(0, len(points), BLOCK):
         piece = np.ascontiguousarray(centred[:, start : start + BLOCK])
