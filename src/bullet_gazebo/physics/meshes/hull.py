@@ -3,6 +3,11 @@
 import numpy as np
 
 MOST_POINTS = 4096  # of a hull; PyBullet walks through all of them at each contact, in each step
+PIECE = 50_000  # points that are looked at together: memory
+LEFT = 0.9  # of the points; where more are left it is of no use to look again
+# Points and directions of one product: larger ones are shared among threads, which wait for each other on a
+# busy machine.
+BLOCK = 256
 
 
 def hull_points(points: np.ndarray) -> np.ndarray:
@@ -12,15 +17,13 @@ def hull_points(points: np.ndarray) -> np.ndarray:
     farthest out in as many directions: of a ball that takes 0.1 % of the radius.
     """
     points = _different(points)
-    if len(points) <= MOST_POINTS:
-        return points
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        corners = points[np.sort(ConvexHull(points).vertices)]
-    except QhullError:  # all of them lie in a plane, or on a line
-        corners = points
-    return corners if len(corners) <= MOST_POINTS else _outermost(corners)
+    while len(points) > MOST_POINTS:
+        pieces = np.array_split(points, len(points) // PIECE + 1)
+        corners = np.concatenate([_corners(piece) for piece in pieces])
+        if len(corners) > LEFT * len(points):
+            return _outermost(corners) if len(corners) > MOST_POINTS else corners
+        points = corners
+    return points
 
 
 def _different(points: np.ndarray) -> np.ndarray:
@@ -28,6 +31,16 @@ def _different(points: np.ndarray) -> np.ndarray:
     order = np.lexsort(points.T)
     new = np.append(True, (np.diff(points[order], axis=0) != 0.0).any(axis=1))
     return points[np.sort(order[new])]
+
+
+def _corners(points: np.ndarray) -> np.ndarray:
+    """The corners of the convex hull; all points, if it has no inside."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return points[np.sort(ConvexHull(points).vertices)]
+    except QhullError:
+        return points
 
 
 def _outermost(points: np.ndarray) -> np.ndarray:
@@ -41,6 +54,13 @@ def _outermost(points: np.ndarray) -> np.ndarray:
     centred = (
         centred / np.where(spread > 0.0, spread, 1.0)
     ).T  # a flat body has as fine an outline
-    some = np.split(directions, MOST_POINTS // 32)  # at a time: memory
-    farthest = [(each @ centred).argmax(axis=1) for each in some]
-    return points[np.unique(np.concatenate(farthest))]
+    best, farthest = np.full(MOST_POINTS, -np.inf), np.zeros(MOST_POINTS, int)
+    for start in range(0, len(points), BLOCK):
+        piece = np.ascontiguousarray(centred[:, start : start + BLOCK])
+        for some in np.array_split(np.arange(MOST_POINTS), MOST_POINTS // BLOCK):
+            reach = directions[some] @ piece
+            index = reach.argmax(axis=1)
+            value = reach[np.arange(len(some)), index]
+            better = value > best[some]
+            best[some[better]], farthest[some[better]] = value[better], start + index[better]
+    return points[np.unique(farthest)]

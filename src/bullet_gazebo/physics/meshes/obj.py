@@ -25,7 +25,7 @@ def read_obj(data: bytes) -> list[Part]:
         StringIO(text), group_material=False, skip_materials=True, maintain_order=True,
         split_objects=True, split_groups=True,
     )  # fmt: skip
-    parts = loaded.get("geometry", {}).values()
+    parts = reversed(loaded.get("geometry", {}).values())  # it begins with the last one
     return [(np.asarray(part["vertices"]), np.asarray(part["faces"])) for part in parts]
 
 

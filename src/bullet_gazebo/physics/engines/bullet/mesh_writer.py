@@ -11,11 +11,22 @@ SIDES = 128  # of what stands for a cylinder
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of STL
 
 
-def write_mesh(mesh: Mesh, folder: Path, concave: bool) -> str:
-    """Returns the name of a file in `folder`: its triangles if it is to be `concave`, else its hulls."""
-    path = folder / (f"{mesh.digest}.stl" if concave else f"{mesh.digest}.obj")
-    if not path.exists():
-        path.write_bytes(_stl(mesh) if concave else _obj(mesh))
+def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
+    """Returns the name of a file in `folder`: the triangles if they are to be `concave`, else the hulls.
+
+    PyBullet sorts the points of an OBJ file's `objects`, and takes those of an STL file as they come. Which
+    of two equal ones touches first decides on the last bits, so what was an OBJ file becomes one again.
+    """
+    path = folder / f"{mesh.digest}.{'stl' if concave or not objects else 'obj'}"
+    if path.exists():
+        return str(path)
+    if concave:
+        path.write_bytes(_stl(mesh.vertices[mesh.faces]))
+    elif objects:
+        path.write_text(_obj(mesh), encoding="ascii")
+    else:
+        points = np.concatenate(mesh.hulls)
+        path.write_bytes(_stl(points[np.arange(-(-len(points) // 3) * 3) % len(points)]))
     return str(path)
 
 
@@ -31,14 +42,14 @@ def drum(folder: Path) -> Path:
     return path
 
 
-def _stl(mesh: Mesh) -> bytes:
-    """The triangles in binary STL, which the engine reads fastest; normals are left to it."""
-    facets = np.zeros(len(mesh.faces), FACET)
-    facets["corners"] = mesh.vertices[mesh.faces]
+def _stl(corners: np.ndarray) -> bytes:
+    """Facets in binary STL, which the engine reads fastest; normals are left to it."""
+    facets = np.zeros(corners.size // 9, FACET)
+    facets["corners"] = corners.reshape(-1, 3, 3)
     return bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
 
 
-def _obj(mesh: Mesh) -> bytes:
+def _obj(mesh: Mesh) -> str:
     """An object for each hull: the engine makes a convex body of each. Faces only list the points."""
     lines, start = [], 1
     for number, points in enumerate(mesh.hulls):
@@ -47,4 +58,4 @@ def _obj(mesh: Mesh) -> bytes:
         corners = [f"{start + i % len(points)}" for i in range(len(points) + 2)]
         lines += [f"f {' '.join(corners[i : i + 3])}" for i in range(len(points))]
         start += len(points)
-    return "\n".join([*lines, ""]).encode()
+    return "\n".join([*lines, ""])

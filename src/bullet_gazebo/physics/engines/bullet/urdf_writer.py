@@ -36,7 +36,9 @@ def _write_link(robot: Element, link: Link, static: bool, folder: Path | None) -
         if static and shape.kind == "mesh":
             written.set("concave", "yes")  # what moves collides by its convex hull
         if shape.solid is not None and folder is not None:
-            shape = replace(shape, mesh=write_mesh(shape.solid, folder, concave=static))
+            objects = Path(shape.mesh).suffix.lower() == ".obj"
+            written_mesh = write_mesh(shape.solid, folder, concave=static, objects=objects)
+            shape = replace(shape, mesh=written_mesh)
         _write_shape(written, shape)
 
 
