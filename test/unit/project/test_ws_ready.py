@@ -55,6 +55,8 @@ def debian(tmp_path, checkout):
         (folder / name).chmod(0o755)
     state = tmp_path / "state"
     state.touch()
+    (checkout / "companions/broken").mkdir(parents=True)
+    (checkout / "companions/broken/package.xml").write_text("<package/>")
     (checkout / "requirements/debian.txt").write_text("one\ntwo\n")
     (checkout / "requirements/base.txt").write_text("# Size: 1 kB to fetch\n./no-such-folder\n")
     return {"PATH": f"{folder}:/usr/bin:/bin", "STATE_FILE": str(state)}
@@ -71,11 +73,12 @@ def test_the_plan_comes_first_and_a_second_call_goes_on(ws, checkout, debian):
     assert first.returncode == 1
     assert first.stdout == ""
     assert [re.sub(r"after \d+ s", "after 0 s", line) for line in lines(first)[1:]] == [
-        "[1/3] Debian packages: 12 packages, 34.5 MB to fetch, 120 MB on the disk",
-        "[2/3] Python packages: 1 kB to fetch",
-        "[3/3] catkin workspace: 0 packages",
-        f"[1/3] Debian packages ... (log: {place}/log/debian.log)",
-        "[1/3] Debian packages: failed after 0 s (exit code 100): "
+        "[1/4] Debian packages: 12 packages, 34.5 MB to fetch, 120 MB on the disk",
+        "[2/4] Python packages: 1 kB to fetch",
+        "[3/4] catkin workspace of the companions: 1 package",
+        "[4/4] catkin workspace: 3 packages",
+        f"[1/4] Debian packages ... (log: {place}/log/debian.log)",
+        "[1/4] Debian packages: failed after 0 s (exit code 100): "
         "E: Failed to fetch http://deb.example/one.deb",
         "what to do: check the network and the free disk space; on other systems than Debian 12 see "
         f"docs/catkin.md; then call ws again, it goes on from here (log: {place}/log/debian.log)",
@@ -84,9 +87,9 @@ def test_the_plan_comes_first_and_a_second_call_goes_on(ws, checkout, debian):
     second = ws("true", script=checkout / "ws", FREE="3M", **debian)
     assert second.returncode == 1
     told = "\n".join(lines(second))
-    assert "[1/3] Debian packages: done in " in told
+    assert "[1/4] Debian packages: done in " in told
     assert re.search(
-        r"\[2/3\] Python packages: failed after \d+ s \(exit code 1\): ERROR: .*no-such-folder",
+        r"\[2/4\] Python packages: failed after \d+ s \(exit code 1\): ERROR: .*no-such-folder",
         told,
     )
     assert "; its disk has 3 MB left\n" in told
@@ -94,9 +97,9 @@ def test_the_plan_comes_first_and_a_second_call_goes_on(ws, checkout, debian):
     (checkout / "requirements/base.txt").write_text("")
     third = ws("true", script=checkout / "ws", **debian)
     assert "Debian" not in third.stderr, "what was ready is not made again"
-    assert "[1/2] Python packages: done in " in third.stderr
-    assert third.returncode == 1, "there is no package to build in this checkout"
-    assert "[2/2] catkin workspace: failed" in third.stderr
+    assert "[1/3] Python packages: done in " in third.stderr
+    assert third.returncode == 1, "there is nothing in this checkout that could be built"
+    assert "[2/3] catkin workspace of the companions: failed" in third.stderr
     assert "mend what the compiler or CMake complains of" in third.stderr
 
     fourth = ws("true", script=checkout / "ws", **debian)
