@@ -5,14 +5,22 @@
 # has not changed is not run again, and a step that failed has no stamp, so the next call resumes.
 set -euo pipefail
 
-CHECKOUT=$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")
+# The sign at the end keeps a line feed at the end of the path, which $() would take away.
+CHECKOUT=$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")"; echo .)
+CHECKOUT=${CHECKOUT%$'\n.'}
 CHECKSUM=$(printf '%s' "$CHECKOUT" | cksum)
 CHECKSUM=${CHECKSUM%% *}
 
-# The kernel takes no blanks in the path of a script's interpreter and no more than 127 bytes, and
-# rosrun splits paths at blanks. Such a checkout is used through a link with a plain name.
+# The kernel takes no blanks in the path of a script's interpreter and no more than 127 bytes, rosrun
+# splits paths at blanks, ROS at colons, CMake at semicolons.
+is_plain() {  # path
+    local LC_ALL=C
+    [[ $1 != *[!A-Za-z0-9_./+@,=~-]* && ${#1} -le 90 ]]
+}
+
+# Such a checkout is used through a link with a plain name.
 ROOT=$CHECKOUT
-if [[ $CHECKOUT == *[[:space:]]* || ${#CHECKOUT} -gt 90 ]]; then
+if ! is_plain "$ROOT"; then
     ROOT=/tmp/cartpole-$UID-$CHECKSUM
     [[ -e $ROOT || -L $ROOT ]] || ln -s -- "$CHECKOUT" "$ROOT"
     # Whoever owns the link could lead it elsewhere later.
@@ -21,13 +29,15 @@ if [[ $CHECKOUT == *[[:space:]]* || ${#CHECKOUT} -gt 90 ]]; then
         exit 1
     fi
 fi
-WS=$ROOT/.ws
-VENV=$WS/venv
 SYSTEM_PYTHON=/usr/bin/python3  # rospy is Debian's, so is the interpreter, whatever PATH says
 
 # A port of this checkout's own for the master, so that two checkouts don't meet.
 DEFAULT_MASTER=http://127.0.0.1:$((20000 + CHECKSUM % 10000))
 
+# shellcheck source=tools/ws_place.sh
+source "$ROOT/tools/ws_place.sh"
+# shellcheck source=tools/ws_ready.sh
+source "$ROOT/tools/ws_ready.sh"
 # shellcheck source=tools/ws_steps.sh
 source "$ROOT/tools/ws_steps.sh"
 # shellcheck source=tools/ws_environment.sh
@@ -47,7 +57,7 @@ usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
                              those that take seconds each (marked slow or long), and those that
                              need requirements/extras.txt (marked extras)
        ws check [NAME...]    run the checks, or those named: ${CHECKS[*]}
-       ws shell              an interactive shell in the workspace
+       ws shell              an interactive bash in the workspace, with roscd and completion
        ws extras [CMD...]    install requirements/extras.txt too, then run CMD, if any
        ws clean              remove everything that ws made
        ws --help             this text
@@ -60,6 +70,7 @@ Ready means: the packages of requirements/debian.txt are installed (apt-get, thr
 not root), .ws/venv holds requirements/base.txt, and .ws is a catkin workspace built from this
 package and companions/. What is ready is not made again. Logs are in .ws/log.
 Apart from Debian's packages everything lies in $CHECKOUT/.ws.
+Where that can't be written, it lies in ~/.cache/cartpole; CARTPOLE_WS_DIR names another folder.
 
 ROS talks over loopback only, to a master on this checkout's own port: $DEFAULT_MASTER
 Set ROS_MASTER_URI, ROS_IP or ROS_HOSTNAME to use another master or network.
@@ -79,43 +90,48 @@ run_tests() {  # [--fast] [ARG...]
     [[ ${#arguments[@]} -gt 0 ]] || arguments=(--numprocesses 2 --dist loadgroup)
     [[ -z $fast ]] || arguments=(-m "not ($NOT_FAST)" "${arguments[@]}")
     cd -- "$ROOT"
-    exec "$VENV/bin/python3" -m pytest "${arguments[@]}"
+    exec "$VENV/bin/python3" -m pytest --override-ini "cache_dir=$STATE/pytest" "${arguments[@]}"
 }
 
 interactive_shell() {
-    # ~/.bashrc may put another Python first on PATH, so the workspace comes after it.
-    cat >"$WS/bashrc" <<END
-[[ -r ~/.bashrc ]] && source ~/.bashrc
-PATH=$(printf %q "$PATH")
-PYTHONPATH=$(printf %q "$PYTHONPATH")
-PS1="(cartpole) \${PS1-\$ }"
-END
-    exec bash --rcfile "$WS/bashrc" -i
+    export CARTPOLE_WS_CHECKS=${CHECKS[*]}
+    exec bash --rcfile "$ROOT/tools/ws_shell.sh" -i
+}
+
+# What a user who has just made the workspace ready may want to know.
+next_thing() {
+    case ${COMMAND%% *} in
+        true | extras | :) echo ". Next: ./ws rosrun cartpole pg_train.py, or ./ws --help" ;;
+        *) echo ". Now: $COMMAND" ;;
+    esac
 }
 
 clean() {
-    [[ -d $WS ]] || return 0
-    hold_lock
-    # The folder of the lock goes last, so that nobody builds in a half-removed one.
-    find "$WS" -mindepth 1 -maxdepth 1 ! -name lock -exec rm -rf -- {} +
-    rm -rf -- "$WS"
+    if [[ -d $WS ]]; then
+        hold_lock
+        # The folder of the lock goes last, so that nobody builds in a half-removed one.
+        find "$WS" -mindepth 1 -maxdepth 1 ! -name lock -exec rm -rf -- {} +
+        rm -rf -- "$WS"
+    fi
     [[ $ROOT == "$CHECKOUT" ]] || rm -f -- "$ROOT"
 }
 
 main() {
     case ${1-} in
         '' | -h | --help | help) usage; [[ -n ${1-} ]]; return ;;
-        clean) clean; return ;;
+        clean) choose_place; clean; return ;;
         -*) fail_usage "unknown option $1" ;;
     esac
-    local command=$1
-    case $command in
-        test | check) make_ready debian venv test_tools companions build ;;
-        extras) make_ready debian venv extras companions build ;;
-        *) make_ready debian venv companions build ;;
+    COMMAND=$*
+    local steps=(debian venv companions build)
+    case $1 in
+        test | check) steps=(debian venv test_tools companions build) ;;
+        extras) steps=(debian venv extras companions build) ;;
     esac
+    choose_place "${steps[@]}"
+    make_ready "${steps[@]}"
     enter_workspace
-    case $command in
+    case $1 in
         test) run_tests "${@:2}" ;;
         check) check "${@:2}" ;;
         shell) interactive_shell ;;

@@ -17,7 +17,7 @@ leave_other_workspaces() {
         ROSLISP_PACKAGE_DIRECTORIES CATKIN_SHELL CATKIN_TEST_RESULTS_DIR ROS_TEST_RESULTS_DIR
     export PYTHONNOUSERSITE=1  # ~/.local would otherwise come before the venv's base
     export PATH=$VENV/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin:$PATH
-    export HOME=${HOME:-$WS/home}
+    export HOME=${HOME:-$STATE/home}
 }
 
 declare -A CALLER=()  # of each path variable, what belongs to the caller's packages
@@ -88,9 +88,10 @@ bind_to_loopback() {
 enter_workspace() {
     leave_other_workspaces
     bind_to_loopback
-    export ROS_HOME=$WS/ros ROS_LOG_DIR=$WS/ros/log MPLCONFIGDIR=$WS/matplotlib \
-        HYPOTHESIS_STORAGE_DIRECTORY=$WS/hypothesis CARTPOLE_WS=$ROOT/ws
-    mkdir -p -- "$ROS_LOG_DIR" "$MPLCONFIGDIR" "$HOME"
+    export ROS_HOME=$STATE/ros ROS_LOG_DIR=$STATE/ros/log MPLCONFIGDIR=$STATE/matplotlib \
+        HYPOTHESIS_STORAGE_DIRECTORY=$STATE/hypothesis RUFF_CACHE_DIR=$STATE/ruff \
+        MYPY_CACHE_DIR=$STATE/mypy CARTPOLE_WS=$ROOT/ws
+    make_folders "$ROS_LOG_DIR" "$MPLCONFIGDIR" "$HOME"
     set +u  # catkin's setup file reads unset variables
     # shellcheck disable=SC1091
     source "$WS/devel/setup.bash"

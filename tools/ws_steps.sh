@@ -1,76 +1,24 @@
 # shellcheck shell=bash
 # Sourced by ws: the steps that make the workspace ready.
 #
-# A step NAME has two functions: key_NAME prints what the step depends on, make_NAME makes it.
+# A step NAME has three functions: key_NAME prints what the step depends on, plan_NAME how much it
+# will take, as far as that is known, and make_NAME makes it.
 
-say() { echo "ws: $*" >&2; }
-
-hash_of() { sha256sum | cut -d ' ' -f 1; }
-
-is_ready() {  # step
-    local stamp=$WS/stamp/$1
-    [[ -f $stamp && $(<"$stamp") == "$("key_$1" | hash_of)" ]]
-}
-
-make_ready() {  # step...
-    local step
-    for step in "$@"; do
-        is_ready "$step" && continue
-        hold_lock
-        is_ready "$step" || make_step "$step"  # somebody else may just have made it
-    done
-    drop_lock
-}
-
-make_step() {  # step
-    local log=$WS/log/$1.log status
-    mkdir -p -- "$WS/stamp" "$WS/log"
-    rm -f -- "$WS/stamp/$1"
-    say "${TITLE[$1]} (log: .ws/log/$1.log)"
-    # The lock stays with ws: a process that a step leaves behind must not keep it. The status is
-    # asked for afterwards, because `set -e` is off in a function that is tested with ||.
-    set +e
-    (set -e; "make_$1") >"$log" 2>&1 {LOCK}>&-
-    status=$?
-    set -e
-    if [[ $status -ne 0 ]]; then
-        say "failed (exit code $status): ${TITLE[$1]}. The last lines of $log:"
-        tail -n 15 -- "$log" | sed 's/^/    /' >&2
-        say "what to do: ${REMEDY[$1]}"
-        say "then call ws again: it goes on from here"
-        exit 1
-    fi
-    "key_$1" | hash_of >"$WS/stamp/$1"
-}
-
-LOCK=
-hold_lock() {
-    [[ -z $LOCK ]] || return 0
-    mkdir -p -- "$WS"
-    exec {LOCK}>"$WS/lock"
-    if ! flock --nonblock "$LOCK"; then
-        say "waiting for another ws that makes this workspace ready"
-        flock "$LOCK"
-    fi
-}
-
-drop_lock() {
-    [[ -z $LOCK ]] || exec {LOCK}>&-
-    LOCK=
-}
+# shellcheck disable=SC2034  # read in ws_ready.sh
 
 declare -A TITLE=(
-    [debian]="installing Debian packages"
-    [venv]="installing Python packages into .ws/venv"
-    [test_tools]="installing the tools for test and check into .ws/venv"
-    [extras]="installing the extra Python packages (requirements/extras.txt) into .ws/venv"
-    [companions]="building the companions' catkin workspace"
-    [build]="building the catkin workspace"
+    [debian]="Debian packages"
+    [venv]="Python packages"
+    [test_tools]="tools for test and check"
+    [extras]="extra Python packages"
+    [companions]="catkin workspace of the companions"
+    [build]="catkin workspace"
 )
-NETWORK="check the network, the free disk space and that the file under requirements/ is right"
+NETWORK="check the network and the free disk space"
 COMPILER="mend what the compiler or CMake complains of; if that is nothing of yours, ./ws clean"
+# shellcheck disable=SC2034
 declare -A REMEDY=(
-    [debian]="see the lines above; on other systems than Debian 12 build the package in a catkin workspace of your own"
+    [debian]="$NETWORK; on other systems than Debian 12 see docs/catkin.md"
     [venv]=$NETWORK [test_tools]=$NETWORK [extras]=$NETWORK
     [companions]=$COMPILER [build]=$COMPILER
 )
@@ -89,28 +37,57 @@ debian_missing() {
 # The key is what is missing, which is nothing when ready: a package removed later is noticed.
 key_debian() { debian_missing; }
 
+AS_ROOT=()
+become_root() {
+    [[ $EUID -ne 0 ]] || return 0
+    type -P sudo >/dev/null && { sudo -n true || { : </dev/tty; }; } 2>/dev/null || return 1
+    AS_ROOT=(sudo)
+}
+
+apt() {
+    "${AS_ROOT[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=600 "$@"
+}
+
+plan_debian() {
+    local missing
+    mapfile -t missing < <(debian_missing)
+    if [[ ${#missing[@]} -eq 0 ]]; then
+        echo "all there"
+        return 0
+    fi
+    sizes_of_debian "${missing[@]}" && return 0
+    # The lists of a fresh machine are empty.
+    type -P apt-get >/dev/null && become_root || return 0
+    say "asking for the lists of Debian packages"
+    apt update >"$WS/log/debian.log" 2>&1 </dev/null || return 0  # making it will say why
+    sizes_of_debian "${missing[@]}" || true
+}
+
+# From apt's own words; fails where it doesn't know one of them.
+sizes_of_debian() {  # package...
+    LC_ALL=C apt-get -o Debug::NoLocking=1 --assume-no --no-install-recommends install "$@" \
+        2>/dev/null </dev/null |
+        sed -nE 's/.* ([0-9]+) newly installed,.*/\1 packages/p
+            s/^Need to get ([0-9.,]+ [kMG]?B).*/\1 to fetch/p
+            s/^After this operation, (.*) of additional.*/\1 on the disk/p' |
+        paste --serial --delimiters ';' | sed 's/;/, /g' | grep .
+}
+
 make_debian() {
-    local missing as_root=()
+    local missing
     mapfile -t missing < <(debian_missing)
     [[ ${#missing[@]} -gt 0 ]] || return 0
     if ! type -P apt-get >/dev/null; then
         echo "This is no Debian: there is no apt-get. Needed: ${missing[*]}"
         return 1
     fi
-    if [[ $EUID -ne 0 ]]; then
-        if ! type -P sudo >/dev/null || { ! sudo -n true && ! { : </dev/tty; }; } 2>/dev/null; then
-            echo "Neither root nor able to use sudo. Ask an administrator to run:"
-            echo "    apt-get install --no-install-recommends ${missing[*]}"
-            return 1
-        fi
-        as_root=(sudo)
+    if ! become_root; then
+        echo "Neither root nor able to use sudo. Ask an administrator to run:" \
+            "apt-get install --no-install-recommends ${missing[*]}"
+        return 1
     fi
-    apt() {
-        "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=600 "$@"
-    }
-    # The lists of a fresh machine are empty, those of an old one name files that are gone.
     apt install --yes --no-install-recommends "${missing[@]}" && return 0
-    apt update
+    apt update  # old lists name files that are gone
     apt install --yes --no-install-recommends "${missing[@]}"
 }
 
@@ -122,11 +99,21 @@ key_venv() { key_place; cat -- "$ROOT/requirements/base.txt"; }
 key_test_tools() { key_venv; cat -- "$ROOT/requirements/test.txt"; }
 key_extras() { key_venv; cat -- "$ROOT/requirements/extras.txt"; }
 
+plan_venv() {
+    if [[ -d $VENV ]]; then echo "what has changed in requirements/base.txt"; else size_of base.txt; fi
+}
+plan_test_tools() { size_of test.txt; }
+plan_extras() { size_of extras.txt; }
+
+# What was measured is written in the files.
+size_of() { sed -n 's/^# Size: //p' -- "$ROOT/requirements/$1"; }
+
 pip_install() {  # file...
     local files=()
     for file in "$@"; do files+=(--requirement "$ROOT/requirements/$file"); done
     env -u PIP_USER -u PIP_TARGET -u PIP_PREFIX -u PYTHONPATH -u PYTHONHOME PYTHONNOUSERSITE=1 \
-        "$VENV/bin/python3" -m pip install --disable-pip-version-check --no-input "${files[@]}"
+        "$VENV/bin/python3" -m pip install --disable-pip-version-check --no-input --progress-bar off \
+        "${files[@]}"
 }
 
 make_venv() {
@@ -147,12 +134,11 @@ make_extras() { pip_install base.txt extras.txt; }
 
 # Two, so that a package of the caller's can stand between them (ws_environment.sh): in front the
 # package and what stands in for Gazebo, behind them the companions that the caller may have, too.
-COMPANIONS=$WS/companions
 FRONT=(bullet_gazebo_msgs gazebo_ros)
 
 # What CMake reads, and the names of what it links to; sources are used where they are.
 PARTS=(CMakeLists.txt LICENSE README.md package.xml pyproject.toml setup.py
-    benchmark config docs launch rviz scripts src test urdf)  # of the package
+    benchmark config docs launch requirements rviz scripts src test urdf)  # of the package
 
 companions_behind() {
     local folder
@@ -160,6 +146,10 @@ companions_behind() {
         [[ " ${FRONT[*]} " == *" ${folder##*/} "* ]] || echo "${folder#"$ROOT/"}"
     done
 }
+
+plan_companions() { count "$(companions_behind | wc -l)" package; }
+plan_build() { count $((${#FRONT[@]} + 1)) package; }
+count() { echo "$1 $2$([[ $1 -eq 1 ]] || echo s)"; }
 
 key_companions() {
     local folders
@@ -171,7 +161,7 @@ key_companions() {
 key_build() {
     key_place
     echo "${PARTS[@]}" "${FRONT[@]}"
-    cd -- "$ROOT"
+    cd -- "$ROOT" || return
     find scripts src -mindepth 1 -maxdepth 1 ! -name __pycache__ ! -name '*.egg-info' 2>/dev/null | sort || true
     hash_files CMakeLists.txt package.xml setup.py companions
 }

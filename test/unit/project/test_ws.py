@@ -2,38 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import pytest
 
 PROBE = "import os, sys; print(os.environ.get(sys.argv[1], '-'))"
-
-
-@pytest.fixture
-def ws(root):
-    """Returns a function that runs ws with a user's environment, not with the tests' own."""
-
-    def run(*arguments, cwd=None, script=root / "ws", **environment):
-        plain = {"PATH": "/usr/local/bin:/usr/bin:/bin", "HOME": os.environ["HOME"]} | environment
-        return subprocess.run(
-            [script, *arguments],
-            check=False,
-            cwd=cwd,
-            env={name: value for name, value in plain.items() if value is not None},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=120,
-        )
-
-    return run
 
 
 def variable(ws, name, **environment):
@@ -277,83 +254,6 @@ def test_an_unknown_check_is_a_usage_error(ws):
     result = ws("check", "nonsense")
     assert result.returncode == 2
     assert "no check 'nonsense', only lint format types" in result.stderr
-
-
-# --- checkouts of its own ----------------------------------------------------------------------
-
-
-@pytest.fixture
-def checkout(root, tmp_path, ws):
-    """A second checkout, with a blank in its path, that holds just what the first steps need."""
-    copy = tmp_path / "second checkout"
-    for name in ("tools", "requirements"):
-        shutil.copytree(root / name, copy / name)
-    shutil.copy(root / "ws", copy)
-    yield copy
-    ws("clean", script=copy / "ws")  # also removes the link that stands in for such a path
-
-
-def test_two_checkouts_have_two_masters(ws, checkout, root):
-    def line(result):
-        return next(text for text in result.stdout.splitlines() if "http://" in text)
-
-    assert line(ws("--help")) != line(ws("--help", script=checkout / "ws"))
-
-
-@pytest.mark.slow
-def test_failed_step_says_what_and_the_next_call_resumes(ws, checkout):
-    pinned = checkout / "requirements/base.txt"
-    pinned.write_text("./no-such-folder\n")
-    first = ws("true", script=checkout / "ws")
-    assert first.returncode == 1
-    assert "Python packages" in first.stderr  # which step
-    assert "no-such-folder" in first.stderr  # why
-    assert "what to do" in first.stderr
-    (log,) = re.findall(r"lines of (\S+):", first.stderr)
-    assert Path(log).resolve() == checkout / ".ws/log/venv.log"
-
-    pinned.write_text("")
-    second = ws("true", script=checkout / "ws")
-    assert "Debian" not in second.stderr, "what was ready is not made again"
-    assert second.returncode == 1, "there is no package to build in this checkout"
-    assert "catkin workspace" in second.stderr
-
-    third = ws("true", script=checkout / "ws")
-    assert "Python packages" not in third.stderr
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become a user without rights")
-def test_missing_package_without_root_or_sudo(root):
-    with tempfile.TemporaryDirectory() as folder:  # pytest's own are closed to other users
-        copy = Path(folder) / "checkout"
-        shutil.copytree(root / "tools", copy / "tools")
-        shutil.copy(root / "ws", copy)
-        (copy / "requirements").mkdir()
-        (copy / "requirements/debian.txt").write_text("no-such-package  # a comment\n")
-        for path in (Path(folder), copy):
-            path.chmod(0o777)
-        result = subprocess.run(
-            [copy / "ws", "true"],
-            check=False,
-            user=65534,
-            extra_groups=[],
-            env={"PATH": "/usr/bin:/bin"},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=60,
-            start_new_session=True,  # no terminal that sudo could ask on
-        )
-    assert result.returncode == 1
-    assert "administrator" in result.stderr
-    assert "apt-get install --no-install-recommends no-such-package" in result.stderr
-
-
-def test_clean_removes_what_ws_made(ws, checkout):
-    (checkout / ".ws/log").mkdir(parents=True)
-    assert ws("clean", script=checkout / "ws").returncode == 0
-    assert not (checkout / ".ws").exists()
-    assert (checkout / "requirements/base.txt").exists()
 
 
 def test_the_tests_run_in_the_workspace(root):

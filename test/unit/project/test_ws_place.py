@@ -1,0 +1,177 @@
+"""Where `ws` builds: in the checkout, wherever that lies, or elsewhere where it can't be written."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+NOBODY = 65534
+STRANGE = [
+    "a b",
+    "ü",
+    "new\nline",
+    "end\n",
+    "semi;colon",
+    "co:lon",
+    "$HOME",
+    'quo"te',
+    "ta\tb",
+    "l" * 99,
+]
+only_root = pytest.mark.skipif(
+    os.geteuid() != 0, reason="only root can become a user without rights"
+)
+
+
+# --- who may write -----------------------------------------------------------------------------
+
+
+def as_nobody(script, *arguments, **environment):
+    return subprocess.run(
+        [script, *arguments],
+        check=False,
+        user=NOBODY,
+        group=NOBODY,
+        extra_groups=[],
+        cwd="/",
+        env={"PATH": "/usr/bin:/bin"} | environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        start_new_session=True,  # no terminal that sudo could ask on
+    )
+
+
+@pytest.fixture
+def foreign(root):
+    """A checkout that belongs to somebody else, and an empty folder of one's own beside it."""
+    with tempfile.TemporaryDirectory() as name:  # pytest's own are closed to other users
+        folder = Path(name)
+        folder.chmod(0o755)
+        for part in ("tools", "requirements"):
+            shutil.copytree(root / part, folder / "checkout" / part)
+        shutil.copy(root / "ws", folder / "checkout")
+        (folder / "checkout/requirements/base.txt").write_text("./no-such-folder\n")
+        (folder / "own").mkdir()
+        os.chown(folder / "own", NOBODY, NOBODY)
+        yield folder
+
+
+@only_root
+def test_missing_package_without_root_or_sudo(foreign):
+    (foreign / "checkout/requirements/debian.txt").write_text("no-such-package  # a comment\n")
+    result = as_nobody(foreign / "checkout/ws", "true", HOME=str(foreign / "own"))
+    assert result.returncode == 1
+    assert "administrator" in result.stderr
+    assert "apt-get install --no-install-recommends no-such-package" in result.stderr
+
+
+@only_root
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("variable", "place"), [("HOME", "own/.cache/cartpole"), ("CARTPOLE_WS_DIR", "own")]
+)
+def test_what_cannot_be_made_in_the_checkout_is_made_elsewhere(foreign, variable, place):
+    result = as_nobody(foreign / "checkout/ws", "true", **{variable: str(foreign / "own")})
+    assert result.returncode == 1
+    assert f"ready once, in {foreign / place}/" in result.stderr
+    assert "no-such-folder" in result.stderr, "it came as far as the Python packages"
+    (made,) = (foreign / place).iterdir()
+    assert (made / "venv/bin/python3").exists()
+    assert not (foreign / "checkout/.ws").exists()
+    assert (
+        as_nobody(foreign / "checkout/ws", "clean", **{variable: str(foreign / "own")}).returncode
+        == 0
+    )
+    assert not made.exists()
+
+
+@only_root
+@pytest.mark.parametrize("home", [{}, {"HOME": "/no-home"}, {"CARTPOLE_WS_DIR": "own"}], ids=str)
+def test_nowhere_to_write_is_one_line(foreign, home):
+    result = as_nobody(foreign / "checkout/ws", "true", **home)
+    assert result.returncode == 1
+    (line,) = result.stderr.splitlines()
+    assert line.startswith(f"ws: nothing can be made in {foreign}/checkout/.ws")
+    assert "set CARTPOLE_WS_DIR to a folder that can" in line
+
+
+@only_root
+def test_a_workspace_that_is_ready_serves_who_cannot_write_it(root):
+    """As on a read-only disk; what commands write goes to the user's own folders."""
+    with tempfile.TemporaryDirectory() as home:
+        os.chown(home, NOBODY, NOBODY)
+        code = "import os, rospy, torch, bullet_gazebo_msgs.srv; print(os.environ['ROS_LOG_DIR'])"
+        result = as_nobody(root / "ws", "python3", "-c", code, HOME=home)
+        if "Permission denied" in result.stderr and not os.stat(root).st_mode & 0o001:
+            pytest.skip("this checkout is closed to others")
+        assert (result.returncode, result.stderr) == (0, "")
+        assert result.stdout.startswith(f"{home}/.cache/cartpole/")
+        files = as_nobody(
+            root / "ws", "roslaunch", "--files", "cartpole", "pg_train.launch", HOME=home
+        )
+        assert files.returncode == 0, files.stderr
+
+
+# --- where a checkout may lie ------------------------------------------------------------------
+
+
+@pytest.fixture(params=STRANGE, ids=ascii)
+def strange(request, root, tmp_path, ws):
+    """A checkout in a folder with a strange name; its link is gone afterwards."""
+    copy = tmp_path / request.param
+    shutil.copytree(root / "tools", copy / "tools")
+    shutil.copy(root / "ws", copy)
+    yield copy
+    ws("clean", script=copy / "ws")
+
+
+def links_to(folder):
+    found = [path for path in Path("/tmp").glob("cartpole-*") if path.is_symlink()]
+    return [path for path in found if os.readlink(path) == str(folder)]
+
+
+def test_a_strange_path_gets_a_plain_name(ws, strange):
+    assert ws("--help", script=strange / "ws").returncode == 0
+    (link,) = links_to(strange)
+    assert re.fullmatch(r"/tmp/cartpole-\d+-\d+", str(link))
+    assert ws("clean", script=strange / "ws").returncode == 0
+    assert links_to(strange) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ü b:c$d(e&f%g", "a;b\"c'd#e\\f\ng\n"], ids=ascii)
+def test_all_works_below_a_strange_path(ws, root, tmp_path, tmp_path_factory, name):
+    copy = tmp_path / name
+    hidden = shutil.ignore_patterns(".*", "__pycache__", "runs", "docs", "*_msgs")
+    shutil.copytree(
+        root, copy, ignore=hidden
+    )  # generating messages takes long, and isn't the point
+    (copy / "docs").mkdir()
+    (copy / "requirements/base.txt").write_text("")
+    home = tmp_path_factory.mktemp("home")
+    there = partial(ws, script=copy / "ws", HOME=str(home))
+    try:
+        built = there("rospack", "find", "gazebo_ros")
+        assert built.returncode == 0, built.stderr
+        code = "import rospy, ros_utils; print(ros_utils.__file__)"
+        found = there("python3", "-c", code)
+        assert found.returncode == 0, found.stderr
+        assert found.stdout.endswith("ros_utils/__init__.py\n")
+        for command in (
+            ("roslaunch", "--files", "gazebo_ros", "empty_world.launch"),
+            ("gz", "--help"),
+        ):
+            result = there(*command)
+            assert result.returncode == 0, result.stderr
+    finally:
+        there("clean")
+    assert not list(home.rglob("*venv*"))

@@ -1,0 +1,101 @@
+# shellcheck shell=bash
+# Sourced by ws: makes steps (ws_steps.sh) that aren't ready, and says what it does meanwhile.
+
+PERIOD=15  # [s] between two lines about a step that runs
+
+hash_of() { sha256sum | cut -d ' ' -f 1; }
+
+is_ready() {  # step
+    local stamp=$WS/stamp/$1
+    [[ -f $stamp && $(<"$stamp") == "$("key_$1" | hash_of)" ]]
+}
+
+are_ready() {  # step...
+    local step
+    for step in "$@"; do
+        is_ready "$step" || return 1
+    done
+}
+
+make_ready() {  # step...
+    local step number=0 begin=$SECONDS todo=()
+    are_ready "$@" && return 0
+    hold_lock
+    for step in "$@"; do  # somebody else may just have made them
+        is_ready "$step" || todo+=("$step")
+    done
+    if [[ ${#todo[@]} -gt 0 ]]; then
+        make_folders "$WS/stamp" "$WS/log"
+        tell_plan "${todo[@]}"
+        for step in "${todo[@]}"; do
+            number=$((number + 1))
+            make_step "$step" "[$number/${#todo[@]}] ${TITLE[$step]}"
+        done
+        say "ready after $(duration $((SECONDS - begin)))$(next_thing)"
+    fi
+    drop_lock
+}
+
+tell_plan() {  # step...
+    local step number=0 size
+    say "this has to be made ready once, in $WS; later calls start at once:"
+    for step in "$@"; do
+        number=$((number + 1))
+        size=$("plan_$step") || true
+        say "[$number/$#] ${TITLE[$step]}${size:+: $size}"
+    done
+}
+
+make_step() {  # step, title
+    local log=$WS/log/$1.log begin=$SECONDS watcher status
+    rm -f -- "$WS/stamp/$1"
+    { : >"$log"; } 2>/dev/null || fail "can't write $log$(space_left "$WS")"
+    say "$2 ... (log: $log)"
+    watch_step "$log" "$begin" {LOCK}>&- &
+    watcher=$!
+    # shellcheck disable=SC2064  # this watcher
+    trap "kill $watcher 2>/dev/null" EXIT
+    # The lock stays with ws: a process that a step leaves behind must not keep it. The status is
+    # asked for afterwards, because `set -e` is off in a function that is tested with ||.
+    set +e
+    (set -e; "make_$1") >"$log" 2>&1 {LOCK}>&-
+    status=$?
+    kill "$watcher" 2>/dev/null
+    wait "$watcher" 2>/dev/null
+    trap - EXIT
+    [[ $status -ne 0 ]] || "key_$1" | hash_of >"$WS/stamp/$1" || status=$?
+    set -e
+    [[ $status -eq 0 ]] || tell_failure "$1" "$2" "$status" "$((SECONDS - begin))"
+    say "$2: done in $(duration $((SECONDS - begin)))"
+}
+
+tell_failure() {  # step, title, exit code, seconds
+    local log=$WS/log/$1.log
+    if [[ $1 == build || $1 == companions ]]; then  # compilers and CMake say it in several lines
+        say "the last lines of $log:"
+        tail -n 15 -- "$log" | sed 's/^/    /' >&2
+    fi
+    say "$2: failed after $(duration "$4") (exit code $3): $(reason_in "$log")$(space_left "$WS")"
+    say "what to do: ${REMEDY[$1]}; then call ws again, it goes on from here (log: $log)"
+    exit 1
+}
+
+# Its last line that looks like a reason, or else its last one.
+reason_in() {  # log
+    grep -aE '^(E:|ERROR:|CMake Error)|[Ee]rror:' -- "$1" | tail -n 1 | grep . || tail -n 1 -- "$1"
+}
+
+# Tells now and then how far a step is, until it is killed or ws is gone.
+watch_step() {  # log, begin
+    local last
+    # Reading from a pipe into which nobody writes waits without a process of its own.
+    exec {silence}<> <(:)
+    while ! read -rt "$PERIOD" -u "$silence" && kill -0 $$ 2>/dev/null; do
+        last=$(tail -c 2000 -- "$1" | tr '\r' '\n' | grep -a '[[:alnum:]]' | tail -n 1 | cut -c 1-100) || true
+        say "    $(duration $((SECONDS - $2))): ${last#"${last%%[![:space:]]*}"}"
+    done
+}
+
+duration() {  # seconds
+    if [[ $1 -lt 120 ]]; then echo "$1 s"; else echo "$(($1 / 60)) min $(($1 % 60)) s"; fi
+}
