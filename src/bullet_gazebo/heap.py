@@ -1,4 +1,4 @@
-"""The C library's heap: memory that is free goes back to the system. Without effect where it isn't glibc's."""
+"""The C library's heap: what is free goes back to the system. Without effect where it isn't glibc's."""
 
 import ctypes
 
