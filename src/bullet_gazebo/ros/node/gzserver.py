@@ -9,6 +9,7 @@ from functools import partial
 
 import rospy
 
+from bullet_gazebo.heap import use_one_arena
 from bullet_gazebo.physics.engine import Engine
 from bullet_gazebo.physics.engines.registry import BULLET, ENGINES, EngineError, make_engine
 from bullet_gazebo.physics.world import World
@@ -110,6 +111,7 @@ def _clock_frequency() -> float:
 
 def main(argv: list[str] | None = None) -> int:
     """Runs the node; returns its exit code."""
+    use_one_arena()
     args = parse_args(rospy.myargv(argv)[1:])
     init_node("gazebo", sys.argv if argv is None else argv, anonymous=False)
     # Not before: while there is no master, a signal ends the process as such.

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from bullet_gazebo.heap import give_back
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.engine import Body, Engine
 from bullet_gazebo.physics.engines.bullet.body import BulletBody
@@ -37,6 +38,7 @@ class BulletEngine(Engine):
             self._most_waste = 2 * self._client.waste
             return super().renewed(bodies)
         self._client.close()
+        give_back()
         self._client, self._most_waste = fresh, MOST_WASTE
         return moved
 
