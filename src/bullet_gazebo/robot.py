@@ -1,13 +1,18 @@
 """A controlled robot: the seam between a model of the physics world and its ros_control hardware."""
 
+import logging
+from collections.abc import Sequence
 from math import ceil, isfinite
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
+from bullet_gazebo.physics.engine import FURTHEST
 from bullet_gazebo.physics.model import Model
+from bullet_gazebo.stability import StabilityWatch, Tell
 
 NANOSECONDS = 1_000_000_000
+FAST = 0.999 * FURTHEST  # [rad, m] in a step: nothing that is in order moves like that
 STRONGEST = 1e9  # [N m, N]; of a motor without a limit: the engine's solver wants a number
 
 
@@ -21,13 +26,14 @@ class ControlledRobot:
         manager: ControllerManager,
         control_period: float = 0.0,
         namespace: str = "/",
+        tell: Tell = logging.getLogger(__name__).log,
     ) -> None:
         """Controllers are updated every `control_period` [s], or with each step if that is longer.
 
-        `namespace` is the manager's, for those who look a controller up by its full name.
+        `namespace` is the manager's, for those who look a controller up by its full name. `tell` logs.
 
         Raises:
-            ControlError: if the model lacks a joint that a transmission names.
+            ControlError: if the model lacks a joint that a transmission names, or has a wrong setting.
         """
         self.model = model
         self.hardware = hardware
@@ -46,24 +52,46 @@ class ControlledRobot:
         self._effort_joints = [(j, enforce, indices[j.name]) for j, enforce in hardware.enforcers]
         self._drives = [(drive, indices[drive.joint.name]) for drive in hardware.drives]
         self._efforts = [0.0] * len(indices)
+        moved = {drive.joint.name for drive, _ in self._drives if drive.pid is None}
+        self._watched = [index for name, index in indices.items() if name not in moved]
+        self._watch = StabilityWatch(model, hardware, manager, tell)
         self.read()
         hardware.relatch()
+        manager.on_change = self.review_gains
+        self.review_gains()
 
-    def read(self) -> None:
-        """Copies positions and velocities from the engine."""
+    def review_gains(self) -> None:
+        """Looks for gains that the step of the physics can't follow."""
+        self._watch.review(self._control_period / NANOSECONDS)
+
+    def read(self) -> Sequence[Sequence[float]]:
+        """Copies positions and velocities from the engine, and returns them."""
         states = self.model.body.joint_states()
         for joint, index in self._joints:
             state = states[index]
             joint.position = state[0]
             joint.velocity = state[1]
+        return states
 
     def update(self, now: int, dt: float) -> None:
         """Reads, and updates the controllers if it is their turn; `now` [ns], `dt` [s] is the step."""
-        self.read()
+        states, fast = self.read(), FAST / dt
+        for index in self._watched:
+            if not -fast < states[index][1] < fast:
+                self._contain(states, fast)
+                break
         if self._control_period:
             self._update_in_time(now, round(dt * NANOSECONDS))
         else:
             self.manager.update(now, dt)
+
+    def _contain(self, states: Sequence[Sequence[float]], fast: float) -> None:
+        """What is as fast as that has its energy from nowhere: it is taken out, where ODE loses it by itself."""
+        names = self.model.joint_names
+        blown = [names[index] for index in self._watched if not abs(states[index][1]) < fast]
+        self._watch.blown_up(blown, fast)
+        self.model.calm()
+        self.read()
 
     def _update_in_time(self, now: int, step: int) -> None:
         """The control period is a whole number of steps, and always the nominal one."""
