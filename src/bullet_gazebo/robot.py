@@ -11,6 +11,7 @@ from bullet_gazebo.physics.engine import FURTHEST
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.stability import StabilityWatch, Tell
 
+JointStates = Sequence[Sequence[float]]
 NANOSECONDS = 1_000_000_000
 FAST = 0.999 * FURTHEST  # [rad, m] in a step: nothing that is in order moves like that
 STRONGEST = 1e9  # [N m, N]; of a motor without a limit: the engine's solver wants a number
@@ -55,43 +56,46 @@ class ControlledRobot:
         moved = {drive.joint.name for drive, _ in self._drives if drive.pid is None}
         self._watched = [index for name, index in indices.items() if name not in moved]
         self._watch = StabilityWatch(model, hardware, manager, tell)
+        self.review_gains()
+        manager.on_change = self.review_gains
         self.read()
         hardware.relatch()
-        manager.on_change = self.review_gains
-        self.review_gains()
 
     def review_gains(self) -> None:
-        """Looks for gains that the step of the physics can't follow."""
+        """Looks for gains that the step of the physics can't follow: when they change, or the step does."""
+        self._fast = FAST / self.model.time_step
+        self._slow = -self._fast
         self._watch.review(self._control_period / NANOSECONDS)
 
-    def read(self) -> Sequence[Sequence[float]]:
-        """Copies positions and velocities from the engine, and returns them."""
-        states = self.model.body.joint_states()
+    def read(self) -> None:
+        """Copies positions and velocities from the engine, once it is sure that nothing has blown up."""
+        states, slow, fast = self.model.body.joint_states(), self._slow, self._fast
+        for index in self._watched:
+            if not slow < states[index][1] < fast:
+                states = self._contain(states)
+                break
         for joint, index in self._joints:
             state = states[index]
             joint.position = state[0]
             joint.velocity = state[1]
-        return states
 
     def update(self, now: int, dt: float) -> None:
         """Reads, and updates the controllers if it is their turn; `now` [ns], `dt` [s] is the step."""
-        states, fast = self.read(), FAST / dt
-        for index in self._watched:
-            if not -fast < states[index][1] < fast:
-                self._contain(states, fast)
-                break
+        self.read()
         if self._control_period:
             self._update_in_time(now, round(dt * NANOSECONDS))
         else:
             self.manager.update(now, dt)
 
-    def _contain(self, states: Sequence[Sequence[float]], fast: float) -> None:
-        """What is as fast as that has its energy from nowhere: it is taken out, where ODE loses it by itself."""
+    def _contain(self, states: JointStates) -> JointStates:
+        """Energy from nowhere is taken out, where ODE's solver loses it by itself; returns the new state."""
         names = self.model.joint_names
-        blown = [names[index] for index in self._watched if not abs(states[index][1]) < fast]
-        self._watch.blown_up(blown, fast)
-        self.model.calm()
-        self.read()
+        blown = [names[index] for index in self._watched if not abs(states[index][1]) < self._fast]
+        self._watch.blown_up(blown, self._fast)
+        # What shakes brakes itself in the next step, if there is something to brake: at rest it would be
+        # pushed the same way for ever.
+        self.model.calm({name: 0.5 if name in self._watch.shaking else 0.0 for name in blown})
+        return self.model.body.joint_states()
 
     def _update_in_time(self, now: int, step: int) -> None:
         """The control period is a whole number of steps, and always the nominal one."""

@@ -17,7 +17,7 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import GAINS, RobotHardware
 from bullet_gazebo.control.manager import RUNNING, ControllerManager
 from bullet_gazebo.control.pid import Gains, Loop
-from bullet_gazebo.physics.mechanics.mass_matrix import mobility, poses_at_zero
+from bullet_gazebo.physics.mechanics.mass_matrix import mobility, most_inertias, poses_at_zero
 from bullet_gazebo.physics.model import Model
 
 Tell = Callable[[int, str], None]
@@ -52,6 +52,7 @@ class StabilityWatch:
         self._tell = tell
         self._damping_ratio = p_only_damping(model)
         self._told: set[object] = set()
+        self.shaking: set[str] = set()  # joints that are driven by gains that are too high
 
     def review(self, period: float) -> None:
         """Warns of gains that are too high, and damps what a P gain alone drives; `period` [s] is that of
@@ -60,10 +61,9 @@ class StabilityWatch:
         drives = [OwnedLoop(GAINS, loop) for loop in self._hardware.loops]
         acting = drives + _owned(c for c in loaded if c.state == RUNNING)
         groups = [acting, *(_owned([c]) for c in loaded if c.state != RUNNING)]
-        if not any(groups):
-            self._model.add_damping({})
-            return
-        for group in groups:
+        found = [self._too_high(group, max(period, self._model.time_step)) for group in groups]
+        self.shaking = {each.loop.joint for each, _ in found[0]}
+        for group in found:
             self._warn_of(group, max(period, self._model.time_step))
         self._damp(acting)
 
@@ -83,12 +83,12 @@ class StabilityWatch:
             self._tell(
                 logging.WARNING,
                 f"joint '{name}' of model '{self._model.name}' blew up: it went half a turn in a step "
-                f"({speed:.0f} rad/s or m/s; the step is {step:g} s). The model's joints were brought to rest. "
+                f"({speed:.0f} rad/s or m/s; the step is {step:g} s). It was slowed down. "
                 f"{driver[0].upper()}{driver[1:]}. Lower gains, a shorter step or heavier links help.",
             )
 
-    def _warn_of(self, group: list[OwnedLoop], dt: float) -> None:
-        for (owner, loop), excess in self._too_high(group, dt):
+    def _warn_of(self, found: list[tuple[OwnedLoop, float]], dt: float) -> None:
+        for (owner, loop), excess in found:
             gains = loop.pid.gains
             key = (owner, loop.joint, gains, dt)
             if key in self._told:
@@ -136,11 +136,7 @@ class StabilityWatch:
         model, added = self._model, {}
         loops = [each for each in acting if self._damping_ratio and _rings(each.loop, model)]
         if loops:
-            description = model.description
-            parts = np.diag(mobility(description, poses_at_zero(description)))
-            inertias = dict(
-                zip((j.name for j in description.movable_joints), 1.0 / parts, strict=True)
-            )
+            inertias = most_inertias(model.description)
             for owner, loop in loops:
                 stiffness = loop.pid.gains.p * inertias[loop.joint]
                 added[loop.joint] = float(2.0 * self._damping_ratio * math.sqrt(stiffness))

@@ -15,7 +15,7 @@ FURTHEST = math.pi
 """The way [rad, m] that a joint, or a free base that carries joints, goes in a step at most. Beyond half a turn
 a rotation has no direction, and what acts explicitly, as centrifugal forces do, feeds energy in without end."""
 FASTEST = 1e9
-"""The velocity [rad/s, m/s] of a body without joints at most: it has nobody to blow up with."""
+"""The velocity [rad/s, m/s] of a body without joints at most, and the one that a motor can be asked for."""
 
 
 class Body(ABC):

@@ -63,6 +63,27 @@ def poses_at_zero(model: ModelDescription) -> dict[str, Pose]:
     return poses
 
 
+def most_inertias(model: ModelDescription) -> dict[str, float]:
+    """Returns for each movable joint the inertia [kg m², kg] of all that it carries, stretched out: in no pose
+    has an effort on it to move more."""
+    below = defaultdict(list)
+    for joint in model.joints.values():
+        below[joint.parent].append(joint)
+    return {joint.name: _stretched(model, below, joint) for joint in model.movable_joints}
+
+
+def _stretched(model: ModelDescription, below: Mapping[str, list[Joint]], top: Joint) -> float:
+    total, todo = 0.0, [(top.child, float(np.linalg.norm(top.anchor.position)))]
+    for name, reach in todo:
+        inertia = model.links[name].inertia
+        if inertia is not None:
+            arm = reach + float(np.linalg.norm(inertia.com.position))
+            turning = inertia.mass * arm**2 + max(inertia.ixx, inertia.iyy, inertia.izz)
+            total += inertia.mass if top.kind == "prismatic" else turning
+        todo.extend((j.child, reach + float(np.linalg.norm(j.pose.position))) for j in below[name])
+    return total
+
+
 def _jacobian(
     model: ModelDescription,
     joints: list[Joint],

@@ -1,6 +1,7 @@
 """MuJoCo's model and data of the whole world. Both are made anew when a model comes or goes."""
 
 from dataclasses import dataclass, field
+from math import hypot
 from typing import NamedTuple
 
 import mujoco
@@ -45,7 +46,7 @@ class MujocoState:
 
     def step(self) -> None:
         """Integrates by one time step, after which nothing acts any more."""
-        np.copyto(self._before, self.data.qpos)
+        np.copyto(self._before, self._positions)
         if self.speeds:
             mujoco.mj_step1(self.model, self.data)
             self._drive()
@@ -53,8 +54,7 @@ class MujocoState:
         else:
             mujoco.mj_step(self.model, self.data)
         self.stale = True
-        speeds = self.data.qvel
-        if not speeds.dot(speeds) < self._fast:  # also if one of them is no number
+        if not hypot(*self._speeds()) < self._fast:  # also if one of them is no number
             self._slow_down()
         if self.loaded:
             self.data.qfrc_applied[:] = 0.0
@@ -68,10 +68,12 @@ class MujocoState:
         alone = np.bincount(model.dof_treeid)[model.dof_treeid] == FREE
         free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
         self._fastest = np.where(alone & free, FASTEST, FURTHEST / dt)
-        self._fast = (FURTHEST / dt) ** 2
+        self._fast = FURTHEST / dt
 
     def _watch(self) -> None:
-        self._before = self.data.qpos.copy()
+        # Each of MuJoCo's attributes is an array object made anew.
+        self._positions, self._speeds = self.data.qpos, self.data.qvel.tolist
+        self._before = self._positions.copy()
         self.set_time_step(self.model.opt.timestep)
 
     def _slow_down(self) -> None:
