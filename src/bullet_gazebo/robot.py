@@ -16,6 +16,8 @@ NANOSECONDS = 1_000_000_000
 FAST = 0.999 * FURTHEST  # [rad, m] in a step: nothing that is in order moves like that
 STRONGEST = 1e9  # [N m, N]; of a motor without a limit: the engine's solver wants a number
 
+logger = logging.getLogger(__name__)
+
 
 class ControlledRobot:
     """Reads joint states into handles and writes what controllers command, in place, once a tick."""
@@ -27,7 +29,7 @@ class ControlledRobot:
         manager: ControllerManager,
         control_period: float = 0.0,
         namespace: str = "/",
-        tell: Tell = logging.getLogger(__name__).log,
+        tell: Tell = logger.log,
     ) -> None:
         """Controllers are updated every `control_period` [s], or with each step if that is longer.
 

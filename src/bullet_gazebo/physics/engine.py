@@ -12,8 +12,8 @@ Twist = tuple[Vector, Vector]
 """Linear [m/s] and angular [rad/s] velocity in world axes."""
 
 FURTHEST = math.pi
-"""The way [rad, m] that a joint, or a free base that carries joints, goes in a step at most. Beyond half a turn
-a rotation has no direction, and what acts explicitly, as centrifugal forces do, feeds energy in without end."""
+"""The way [rad, m] that a joint, or a free base that carries joints, goes in a step at most. Beyond half a
+turn a rotation has no direction, and what acts explicitly, as centrifugal forces do, feeds energy in."""
 FASTEST = 1e9
 """The velocity [rad/s, m/s] of a body without joints at most, and the one that a motor can be asked for."""
 

@@ -139,7 +139,9 @@ class Model:
         """Hands the joints' damping to the engine, which would blow up if it were stiffer than a step."""
         self.time_step = time_step
         joints = self.description.joints
-        dampings = {name: joints[name].damping + self.damping_added.get(name, 0.0) for name in self._joints}
+        dampings = {
+            name: joints[name].damping + self.damping_added.get(name, 0.0) for name in self._joints
+        }
         damped = {name for name, damping in dampings.items() if damping > 0.0}
         if not damped | set(self._damped):
             return
@@ -157,8 +159,8 @@ class Model:
             self.apply_damping(self.time_step)
 
     def calm(self, kept: Mapping[str, float]) -> None:
-        """Leaves joints the given share of their speeds, puts them onto stops that they are beyond, and stills
-        a free base that spins."""
+        """Leaves joints the given share of their speeds, puts them onto stops that they are beyond, and
+        stills a free base that spins."""
         states = self.joint_states()
         for name, share in kept.items():
             position, speed = (x if isfinite(x) else 0.0 for x in states[self._joints[name]])

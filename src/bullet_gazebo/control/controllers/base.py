@@ -59,7 +59,9 @@ class Controller(ABC):
         self.inputs: list[Input] = []
         self.outputs: list[Output] = []
         self.pids: dict[str, Pid] = {}  # by namespace below the controller's; tunable while it runs
-        self.loops: list[Loop] = []  # those whose gains a step of the physics must be able to follow
+        self.loops: list[
+            Loop
+        ] = []  # those whose gains a step of the physics must be able to follow
 
     @classmethod
     @abstractmethod

@@ -64,8 +64,8 @@ def poses_at_zero(model: ModelDescription) -> dict[str, Pose]:
 
 
 def most_inertias(model: ModelDescription) -> dict[str, float]:
-    """Returns for each movable joint the inertia [kg m², kg] of all that it carries, stretched out: in no pose
-    has an effort on it to move more."""
+    """Returns for each movable joint the inertia [kg m², kg] of all that it carries, stretched out: in no
+    pose has an effort on it to move more."""
     below = defaultdict(list)
     for joint in model.joints.values():
         below[joint.parent].append(joint)

@@ -99,12 +99,20 @@ class ControlPlugin:
         manager = ControllerManager(hardware)
         with self._sim.lock:
             robot = ControlledRobot(
-                self._context.model, hardware, manager, self._control_period(), self._namespace, _tell
+                self._context.model,
+                hardware,
+                manager,
+                self._control_period(),
+                self._namespace,
+                _tell,
             )
         self._services = self._offer(manager)
         self._pids = [
             PidPorts(
-                self._sim, self._thinner, pid, rospy.names.ns_join(self._namespace, place),
+                self._sim,
+                self._thinner,
+                pid,
+                rospy.names.ns_join(self._namespace, place),
                 manager.loops_changed,
             )  # fmt: skip
             for place, pid in hardware.pids.items()
