@@ -107,9 +107,7 @@ class BulletClient:
             0.0, shape, -1, plane.position, plane.orientation, physicsClientId=self._client
         )
         self._sizes[body] = PLANE
-        return self._keep(
-            BulletBody(self._client, body, description, pose, self._weightless, {})
-        )
+        return self._keep(BulletBody(self._client, body, description, pose, self._weightless, {}))
 
     def _keep(self, body: BulletBody) -> BulletBody:
         body.set_time_step(self._time_step)
