@@ -1,14 +1,22 @@
 """A controlled robot: the seam between a model of the physics world and its ros_control hardware."""
 
+import logging
+from collections.abc import Sequence
 from math import ceil, isfinite
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
+from bullet_gazebo.physics.engine import FURTHEST
 from bullet_gazebo.physics.model import Model
+from bullet_gazebo.stability import StabilityWatch, Tell
 
+JointStates = Sequence[Sequence[float]]
 NANOSECONDS = 1_000_000_000
+FAST = 0.999 * FURTHEST  # [rad, m] in a step: nothing that is in order moves like that
 STRONGEST = 1e9  # [N m, N]; of a motor without a limit: the engine's solver wants a number
+
+logger = logging.getLogger(__name__)
 
 
 class ControlledRobot:
@@ -21,13 +29,14 @@ class ControlledRobot:
         manager: ControllerManager,
         control_period: float = 0.0,
         namespace: str = "/",
+        tell: Tell = logger.log,
     ) -> None:
         """Controllers are updated every `control_period` [s], or with each step if that is longer.
 
-        `namespace` is the manager's, for those who look a controller up by its full name.
+        `namespace` is the manager's, for those who look a controller up by its full name. `tell` logs.
 
         Raises:
-            ControlError: if the model lacks a joint that a transmission names.
+            ControlError: if the model lacks a joint that a transmission names, or has a wrong setting.
         """
         self.model = model
         self.hardware = hardware
@@ -46,12 +55,27 @@ class ControlledRobot:
         self._effort_joints = [(j, enforce, indices[j.name]) for j, enforce in hardware.enforcers]
         self._drives = [(drive, indices[drive.joint.name]) for drive in hardware.drives]
         self._efforts = [0.0] * len(indices)
+        moved = {drive.joint.name for drive, _ in self._drives if drive.pid is None}
+        self._watched = [index for name, index in indices.items() if name not in moved]
+        self._watch = StabilityWatch(model, hardware, manager, tell)
+        self.review_gains()
+        manager.on_change = self.review_gains
         self.read()
         hardware.relatch()
 
+    def review_gains(self) -> None:
+        """Looks for gains that the step of the physics can't follow: when they change, or the step does."""
+        self._fast = FAST / self.model.time_step
+        self._slow = -self._fast
+        self._watch.review(self._control_period / NANOSECONDS)
+
     def read(self) -> None:
-        """Copies positions and velocities from the engine."""
-        states = self.model.body.joint_states()
+        """Copies positions and velocities from the engine, once it is sure that nothing has blown up."""
+        states, slow, fast = self.model.body.joint_states(), self._slow, self._fast
+        for index in self._watched:
+            if not slow < states[index][1] < fast:
+                states = self._contain(states)
+                break
         for joint, index in self._joints:
             state = states[index]
             joint.position = state[0]
@@ -64,6 +88,16 @@ class ControlledRobot:
             self._update_in_time(now, round(dt * NANOSECONDS))
         else:
             self.manager.update(now, dt)
+
+    def _contain(self, states: JointStates) -> JointStates:
+        """Energy from nowhere is taken out, where ODE's solver loses it by itself; returns the new state."""
+        names = self.model.joint_names
+        blown = [names[index] for index in self._watched if not abs(states[index][1]) < self._fast]
+        self._watch.blown_up(blown, self._fast)
+        # What shakes brakes itself in the next step, if there is something to brake: at rest it would be
+        # pushed the same way for ever.
+        self.model.calm({name: 0.5 if name in self._watch.shaking else 0.0 for name in blown})
+        return self.model.body.joint_states()
 
     def _update_in_time(self, now: int, step: int) -> None:
         """The control period is a whole number of steps, and always the nominal one."""

@@ -208,6 +208,8 @@ class Simulator:
         """Sets the length of a tick [s], to the nanosecond; the caller holds the lock."""
         self._period = round(time_step * NANOSECONDS)
         self.world.set_time_step(time_step)
+        for robot in self.robots:
+            robot.review_gains()
 
     def reset_world(self) -> None:
         """Returns models to their initial poses, at rest; time and joint positions stay."""

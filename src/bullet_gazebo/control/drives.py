@@ -19,6 +19,8 @@ class Drive(ABC):
         self.pid = pid
         limit = joint.limits.effort
         self._most = UNLIMITED if limit is None else limit
+        speed = joint.limits.velocity
+        self._fastest = UNLIMITED if speed is None else speed
 
     @abstractmethod
     def relatch(self) -> None:
@@ -44,8 +46,11 @@ class Drive(ABC):
         """Returns speed [rad/s, m/s] and most effort [N m, N] of the motor for a step of `dt` [s]."""
 
     def _clipped(self, error: float, dt: float) -> float:
+        """The PID's effort within the limit, and none that speeds a joint up beyond its velocity limit."""
         assert self.pid is not None
-        return clamp(self.pid.compute(error, dt), -self._most, self._most)
+        effort = clamp(self.pid.compute(error, dt), -self._most, self._most)
+        speed = self.joint.velocity
+        return 0.0 if abs(speed) > self._fastest and speed * effort > 0.0 else effort
 
 
 class PositionDrive(Drive):

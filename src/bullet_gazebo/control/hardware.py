@@ -7,7 +7,7 @@ from bullet_gazebo.control.drives import Drive, PositionDrive, VelocityDrive
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.limits import Enforcer, effort_enforcer
-from bullet_gazebo.control.pid import Pid
+from bullet_gazebo.control.pid import Loop, Pid
 
 EFFORT = "EffortJointInterface"
 POSITION = "PositionJointInterface"
@@ -50,6 +50,15 @@ class RobotHardware:
     def pids(self) -> dict[str, Pid]:
         """The PIDs of the drives, by their namespace below the robot's."""
         return {f"{GAINS}/{d.joint.name}": d.pid for d in self.drives if d.pid is not None}
+
+    @property
+    def loops(self) -> list[Loop]:
+        """The PIDs of the drives, and what they are around."""
+        return [
+            Loop(d.joint.name, d.pid, isinstance(d, VelocityDrive))
+            for d in self.drives
+            if d.pid is not None
+        ]
 
     def joint(self, interface: str, name: str) -> JointHandle:
         """Returns joint `name` of `interface`.

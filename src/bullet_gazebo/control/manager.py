@@ -43,6 +43,8 @@ class ControllerManager:
         self._running: list[Controller] = []
         self._now = 0
         self.on_fault: Callable[[Controller, BaseException], None] = _ignore
+        # Called when other controllers are loaded or run, and when somebody has changed gains.
+        self.on_change: Callable[[], None] = _leave
 
     def update(self, now: int, dt: float) -> None:
         """Updates the running controllers; `now` [ns], `dt` [s]."""
@@ -92,6 +94,7 @@ class ControllerManager:
             reason = error if isinstance(error, ControlError) else repr(error)
             raise ControlError(f"Initializing controller '{name}' failed: {reason}") from error
         self._controllers[name] = controller
+        self.on_change()
         return controller
 
     def unload(self, name: str) -> Controller:
@@ -123,6 +126,7 @@ class ControllerManager:
             self._stop(controller)
         failed = [c.name for c in starting if not self._start(c)]
         self._running = [c for c in self._controllers.values() if c.state == RUNNING]
+        self.on_change()
         if failed:
             raise ControlError(f"Could not start {failed}: see the error above.")
 
@@ -149,6 +153,10 @@ class ControllerManager:
         gone = list(self._controllers.values())
         self._controllers.clear()
         return gone
+
+    def loops_changed(self) -> None:
+        """Takes note of gains that somebody has changed."""
+        self.on_change()
 
     def joints_moved(self, now: int, relatch: bool) -> None:
         """Tells controllers that joints moved by other means than time.
@@ -191,6 +199,7 @@ class ControllerManager:
         # A new list: the old one may be in use by the update that is going on.
         self._running = [c for c in self._running if c is not controller]
         self.hardware.relatch(controller.claimed)
+        self.on_change()
         self.on_fault(controller, error)
 
     def _known(self, names: Iterable[str], strict: bool) -> list[Controller]:
@@ -205,6 +214,10 @@ class ControllerManager:
 
 def _ignore(controller: Controller, error: BaseException) -> None:
     """For a manager that nobody listens to."""
+
+
+def _leave() -> None:
+    """The same, of changes."""
 
 
 def _check_claims(controller: object, hardware: RobotHardware) -> None:

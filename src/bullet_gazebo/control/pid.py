@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.samples import PidSample
@@ -115,3 +116,11 @@ class Pid:
             dt, self.p_error, self.d_error, self.p_error, self.i_error, self.d_error,
             gains.p * self.p_error, i_term, gains.d * self.d_error, gains.i_max, gains.i_min, self.output,
         )  # fmt: skip
+
+
+class Loop(NamedTuple):
+    """A PID whose output is an effort on a joint, and whose error is one of its position or velocity."""
+
+    joint: str
+    pid: Pid
+    of_velocity: bool = False

@@ -1,7 +1,9 @@
 """The interface between our physics world and the engine that integrates it."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import ClassVar
 
 from bullet_gazebo.physics.description import Inertia, ModelDescription
 from bullet_gazebo.physics.pose import Pose, Vector
@@ -9,10 +11,18 @@ from bullet_gazebo.physics.pose import Pose, Vector
 Twist = tuple[Vector, Vector]
 """Linear [m/s] and angular [rad/s] velocity in world axes."""
 
+FURTHEST = math.pi
+"""The way [rad, m] that a joint, or a free base that carries joints, goes in a step at most. Beyond half a
+turn a rotation has no direction, and what acts explicitly, as centrifugal forces do, feeds energy in."""
+FASTEST = 1e9
+"""The velocity [rad/s, m/s] of a body without joints at most, and the one that a motor can be asked for."""
+
 
 class Body(ABC):
     """A model inside the engine. Joints are the movable ones, in document order."""
 
+    implicit_damping: ClassVar[bool]
+    """Whether the damping of joints acts on their velocity after the step, not before it."""
     joint_names: tuple[str, ...]
     link_names: tuple[str, ...]
 
@@ -75,7 +85,10 @@ class Body(ABC):
 
 
 class Engine(ABC):
-    """A dynamics engine with velocity-stepped articulated bodies."""
+    """A dynamics engine with velocity-stepped articulated bodies.
+
+    A velocity beyond FURTHEST in a step, or FASTEST, is cut before positions follow it.
+    """
 
     @abstractmethod
     def load(self, description: ModelDescription, pose: Pose) -> Body:

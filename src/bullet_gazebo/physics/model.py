@@ -1,16 +1,17 @@
 """A model in the world: a description, a body in the engine, and where it stands."""
 
 from collections.abc import Mapping
+from math import isfinite
 
 from bullet_gazebo.physics.description import ModelDescription, Shape
-from bullet_gazebo.physics.engine import Body, Twist
+from bullet_gazebo.physics.engine import FASTEST, Body, Twist
 from bullet_gazebo.physics.mechanics.lumping import WORLD
 from bullet_gazebo.physics.mechanics.mass_matrix import effective_inertias
 from bullet_gazebo.physics.pose import ZERO, Pose
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
-FASTEST = 1e9  # [rad/s, m/s] that a motor can be asked for
 GENTLEST = 0.5  # of the damping that would stop a joint in one step
+SPINNING = 0.1  # [rad] in a step: no base of a robot turns that fast by itself
 AT_REST: Twist = (ZERO, ZERO)
 
 
@@ -22,7 +23,9 @@ class Model:
         self.description = description
         self.body = body
         self.initial_pose = pose
+        self.time_step = 0.0  # [s], the world's
         self._damped: dict[str, float] = {}  # the engine's damping [N m s/rad, N s/m] by joint
+        self.damping_added: Mapping[str, float] = {}  # [N m s/rad, N s/m] beside the file's
         self._motors: dict[str, tuple[float, float]] = {}  # speed [rad/s, m/s] and effort [N m, N]
         self._joints = {joint: index for index, joint in enumerate(body.joint_names)}
 
@@ -134,15 +137,38 @@ class Model:
 
     def apply_damping(self, time_step: float) -> None:
         """Hands the joints' damping to the engine, which would blow up if it were stiffer than a step."""
-        damped = {n for n in self._joints if self.description.joints[n].damping > 0.0}
+        self.time_step = time_step
+        joints = self.description.joints
+        dampings = {
+            name: joints[name].damping + self.damping_added.get(name, 0.0) for name in self._joints
+        }
+        damped = {name for name, damping in dampings.items() if damping > 0.0}
         if not damped | set(self._damped):
             return
         poses = {name: self.body.link_state(name)[0] for name in self.body.link_names}
         inertias = effective_inertias(self.description, poses)
         for name in damped | set(self._damped):
             most = GENTLEST * inertias[name] / time_step
-            self._damped[name] = min(self.description.joints[name].damping, most)
+            self._damped[name] = min(dampings[name], most)
             self.body.set_damping(self._joints[name], self._damped[name])
+
+    def add_damping(self, added: Mapping[str, float]) -> None:
+        """Damps joints by [N m s/rad, N s/m] beside what the file says, in place of what was added before."""
+        if added != self.damping_added:
+            self.damping_added = added
+            self.apply_damping(self.time_step)
+
+    def calm(self, kept: Mapping[str, float]) -> None:
+        """Leaves joints the given share of their speeds, puts them onto stops that they are beyond, and
+        stills a free base that spins."""
+        states = self.joint_states()
+        for name, share in kept.items():
+            position, speed = (x if isfinite(x) else 0.0 for x in states[self._joints[name]])
+            self.body.reset_joint(self._joints[name], self.clamped(name, position), share * speed)
+        if not self.description.fixed_base:
+            pose, (linear, angular) = self.root_state()
+            if not max(map(abs, angular)) * self.time_step < SPINNING:
+                self.body.reset_base(pose, (linear, ZERO))
 
     def move_into(self, body: Body) -> None:
         """Goes on in another body of the engine, loaded from the same description, in the same state."""

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointHandle
-from bullet_gazebo.control.pid import Pid
+from bullet_gazebo.control.pid import Loop, Pid
 
 
 class Output:
@@ -59,6 +59,9 @@ class Controller(ABC):
         self.inputs: list[Input] = []
         self.outputs: list[Output] = []
         self.pids: dict[str, Pid] = {}  # by namespace below the controller's; tunable while it runs
+        self.loops: list[
+            Loop
+        ] = []  # those whose gains a step of the physics must be able to follow
 
     @classmethod
     @abstractmethod

@@ -10,7 +10,7 @@ from bullet_gazebo.control.controllers.base import Controller, Input, joints_par
 from bullet_gazebo.control.controllers.forward import check_length
 from bullet_gazebo.control.controllers.loops import PositionLoop
 from bullet_gazebo.control.hardware import EFFORT, RobotHardware
-from bullet_gazebo.control.pid import Pid
+from bullet_gazebo.control.pid import Loop, Pid
 
 
 class EffortGroupPosition(Controller):
@@ -25,6 +25,7 @@ class EffortGroupPosition(Controller):
         self.claimed = tuple(sorted(loop.joint.name for loop in loops))
         self.inputs = [Input("command", "Float64MultiArray", self.command_all)]
         self.pids = {f"{loop.joint.name}/pid": loop.pid for loop in loops}
+        self.loops = [Loop(loop.joint.name, loop.pid) for loop in loops]
 
     @classmethod
     def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:

@@ -9,6 +9,7 @@ from typing import Self
 from bullet_gazebo.control.controllers.base import Controller, Output, joints_param
 from bullet_gazebo.control.controllers.trajectory_params import Settings, read_axes, read_settings
 from bullet_gazebo.control.hardware import EFFORT, POSITION, VELOCITY, RobotHardware
+from bullet_gazebo.control.pid import Loop
 from bullet_gazebo.control.trajectory.axis import Axis
 from bullet_gazebo.control.trajectory.goal import (
     CANCELED,
@@ -42,6 +43,8 @@ class JointTrajectoryController(Controller):
         self.joint_names = tuple(axis.joint.name for axis in axes)
         self.claimed = tuple(sorted(self.joint_names))
         self.pids = {f"gains/{axis.joint.name}": axis.pid for axis in axes if axis.pid is not None}
+        if self.interface == EFFORT:
+            self.loops = [Loop(a.joint.name, a.pid) for a in axes if a.pid is not None]
         self._state = Output("state", "TrajectorySample")
         self.outputs = [self._state]
         self._axes = axes

@@ -14,6 +14,7 @@ class EffortJointVelocity(PidJoint):
 
     type_name = "effort_controllers/JointVelocityController"
     interface = EFFORT
+    of_velocity = True
 
     def __init__(self, name: str, joint: JointHandle, pid: Pid) -> None:
         super().__init__(name, joint, pid)

@@ -2,12 +2,12 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Self
+from typing import ClassVar, Self
 
 from bullet_gazebo.control.controllers.base import Controller, Input, Output, joint_param
-from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.hardware import EFFORT, RobotHardware
 from bullet_gazebo.control.joint import JointHandle
-from bullet_gazebo.control.pid import Pid
+from bullet_gazebo.control.pid import Loop, Pid
 from bullet_gazebo.control.samples import JointControllerSample
 
 REPORT_EVERY = 10  # updates
@@ -74,6 +74,8 @@ class StateReport:
 class PidJoint(Controller):
     """A controller of one joint with one PID and the topics `command` and `state`."""
 
+    of_velocity: ClassVar[bool] = False  # whether the error is one of velocity
+
     def __init__(self, name: str, joint: JointHandle, pid: Pid) -> None:
         super().__init__(name)
         self.joint = joint
@@ -82,6 +84,8 @@ class PidJoint(Controller):
         self.inputs = [Input("command", "Float64", self.command)]
         self.outputs = [self._report.output]
         self.pids = {"pid": pid}
+        if self.interface == EFFORT:
+            self.loops = [Loop(joint.name, pid, self.of_velocity)]
 
     @classmethod
     def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> Self:

@@ -1,5 +1,6 @@
 """libgazebo_ros_control.so: ros_control for a model (docs/contract/gazebo_ros_control.md 6.1 to 6.5)."""
 
+import logging
 import threading
 import time
 
@@ -98,11 +99,22 @@ class ControlPlugin:
         manager = ControllerManager(hardware)
         with self._sim.lock:
             robot = ControlledRobot(
-                self._context.model, hardware, manager, self._control_period(), self._namespace
+                self._context.model,
+                hardware,
+                manager,
+                self._control_period(),
+                self._namespace,
+                _tell,
             )
         self._services = self._offer(manager)
         self._pids = [
-            PidPorts(self._sim, self._thinner, pid, rospy.names.ns_join(self._namespace, place))
+            PidPorts(
+                self._sim,
+                self._thinner,
+                pid,
+                rospy.names.ns_join(self._namespace, place),
+                manager.loops_changed,
+            )  # fmt: skip
             for place, pid in hardware.pids.items()
         ]
         with self._sim.lock:
@@ -148,6 +160,13 @@ class ControlPlugin:
                 f"there is a controller manager in the namespace '{self._namespace}' already; "
                 "give each robot a robot_namespace of its own"
             ) from error
+
+
+def _tell(level: int, text: str) -> None:
+    if level >= logging.WARNING:
+        rospy.logwarn("gazebo_ros_control: %s", text)
+    else:
+        rospy.loginfo("gazebo_ros_control: %s", text)
 
 
 def find_param(namespace: str, name: str) -> object:

@@ -14,6 +14,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from bullet_gazebo.control.controllers.base import Controller, Input, Output
 from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryController
 from bullet_gazebo.control.errors import FAULTS, ControlError
+from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.ros.control.pid_ports import PidPorts
 from bullet_gazebo.ros.control.trajectory_conversions import to_controller_state
 from bullet_gazebo.ros.control.trajectory_ports import TrajectoryPorts
@@ -41,10 +42,16 @@ class ControllerPorts:
     """Publishers and subscribers of one controller, and what tunes its PIDs."""
 
     def __init__(
-        self, sim: Simulator, thinner: Thinner, controller: Controller, namespace: str
+        self,
+        sim: Simulator,
+        thinner: Thinner,
+        manager: ControllerManager,
+        controller: Controller,
+        namespace: str,
     ) -> None:
         """`namespace` is the manager's; the controller's own is below it."""
         self._sim = sim
+        self._manager = manager
         self._thinner = thinner
         self._closing = ExitStack()  # what shutdown() takes away, the last one first
         with ExitStack() as opened:  # if one can't be opened, those before it are closed
@@ -57,7 +64,10 @@ class ControllerPorts:
         for output in controller.outputs:
             self._publish(output, namespace if output.shared else own)
         for place, pid in controller.pids.items():
-            ports = PidPorts(self._sim, self._thinner, pid, rospy.names.ns_join(own, place))
+            ports = PidPorts(
+                self._sim, self._thinner, pid, rospy.names.ns_join(own, place),
+                self._manager.loops_changed,
+            )  # fmt: skip
             self._closing.callback(ports.shutdown)
         if isinstance(controller, JointTrajectoryController):
             self._closing.callback(TrajectoryPorts(self._sim, controller, own).shutdown)

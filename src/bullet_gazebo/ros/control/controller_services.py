@@ -110,7 +110,9 @@ class ControllerServices:
 
     def _open(self, controller: Controller) -> ControllerPorts:
         try:
-            return ControllerPorts(self._sim, self._thinner, controller, self._namespace)
+            return ControllerPorts(
+                self._sim, self._thinner, self._manager, controller, self._namespace
+            )
         except (rospy.ROSException, KeyError, TypeError, ValueError) as error:
             with self._sim.lock:
                 self._manager.unload(controller.name)

@@ -1,6 +1,7 @@
 """A PID's gains at run time, and the topic that tells its state (docs/contract/ros_control.md 4)."""
 
 import math
+from collections.abc import Callable
 
 import rospy
 from control_msgs.msg import PidState
@@ -30,10 +31,19 @@ class PidPorts:
     Gains are written back to the parameter server, at the start and whenever they change.
     """
 
-    def __init__(self, sim: Simulator, thinner: Thinner, pid: Pid, namespace: str) -> None:
+    def __init__(
+        self,
+        sim: Simulator,
+        thinner: Thinner,
+        pid: Pid,
+        namespace: str,
+        changed: Callable[[], None],
+    ) -> None:
+        """`changed` is called under the simulator's lock when there are other gains."""
         self._sim = sim
         self._pid = pid
         self._namespace = namespace
+        self._changed = changed
         self._server = DynamicServer(PARAMETERS, self._apply, namespace)
         self._publisher: rospy.Publisher | None = None
         if pid.publish_state:
@@ -58,6 +68,7 @@ class PidPorts:
             else:
                 with self._sim.lock:
                     self._pid.gains = _gains(config)
+                    self._changed()
         gains = self._pid.gains
         config.update(
             p=gains.p, i=gains.i, d=gains.d, i_clamp_min=gains.i_min, i_clamp_max=gains.i_max,

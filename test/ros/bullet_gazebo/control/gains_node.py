@@ -9,6 +9,8 @@ import rostest
 from control_msgs.msg import JointControllerState, PidState
 from dynamic_reconfigure.msg import BoolParameter, Config, ConfigDescription, DoubleParameter
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
+from gazebo_msgs.srv import SetLinkProperties, SetLinkPropertiesRequest
+from rosgraph_msgs.msg import Log
 from slides_client import SlidesTest, Topic, call
 
 PID = "/slides/effort_position/pid"
@@ -73,6 +75,22 @@ class GainsTest(SlidesTest):
         self.assertEqual(rospy.get_param(f"{PID}/antiwindup"), True)
         self.assertEqual(self.step(1)["effort_a"][2], 2.0)
         self.assertLess(self.step(1, effort_position=-1.0)["effort_a"][2], 1.0)
+
+    def test_gains_that_the_step_cannot_follow_are_told_in_the_log(self):
+        self.run_controllers("effort_position")
+        light = SetLinkPropertiesRequest(link_name="slides::effort_a_carriage", mass=0.1)
+        light.ixx = light.iyy = light.izz = 0.01
+        self.assertTrue(call("/gazebo/set_link_properties", SetLinkProperties, light).success)
+        log = Topic("/rosout", Log)
+        reconfigure(PID, p=400.0, d=800.0)
+        wanted = (
+            "controller 'effort_position' drives joint 'effort_a' of model 'slides' with d = 800"
+        )
+        self.assertTrue(log.wait_for(lambda got: any(wanted in each.msg for each in got)))
+        [told] = [each for each in log.messages if wanted in each.msg]
+        self.assertEqual(told.level, Log.WARN)
+        self.assertIn("(about 200)", told.msg)
+        log.close()
 
     def test_gains_that_are_no_numbers_are_refused(self):
         self.run_controllers("effort_position")

@@ -39,7 +39,9 @@ class Topic:
 
     def __init__(self, name, kind):
         self.messages = []
-        self._subscriber = rospy.Subscriber(f"/slides/{name}", kind, self.messages.append)
+        self._subscriber = rospy.Subscriber(
+            rospy.names.ns_join("/slides", name), kind, self.messages.append
+        )
         assert wait_until(lambda: self._subscriber.get_num_connections() > 0), name
 
     def wait_for(self, condition):

@@ -335,3 +335,23 @@ def test_parameters_of_limits_that_are_no_numbers_are_a_warning():
         .limits.lower
         is None
     )
+
+
+@pytest.mark.parametrize(
+    ("interface", "controller"), [("Position", POSITION), ("Velocity", VELOCITY)]
+)
+def test_the_effort_of_a_drive_speeds_no_joint_up_beyond_its_velocity_limit(
+    make, interface, controller
+):
+    """Gazebo cuts every effort there; the limit is 2 m/s, and brakes act beyond it too."""
+    lift = make(interface, controller, gains={"rail": {"p": 5000.0, "i_clamp": 0.0}})
+    lift.model.body.reset_joint(0, 0.0, 2.5)
+    lift.command(0.9 if interface == "Position" else 2.0)
+    lift.advance(DT)
+    lift.advance(DT)
+    assert (lift.joint.effort == 0.0) == (interface == "Position")
+    lift.model.body.reset_joint(0, 0.5, 2.5)
+    lift.command(-0.9)
+    lift.advance(DT)
+    lift.advance(DT)
+    assert lift.joint.effort == -100.0

@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 
 from bullet_gazebo.physics.engines.registry import BULLET, EngineError, make_engine
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import World
 
 
 def test_the_rate_of_the_linear_equations_is_what_the_masses_say():
@@ -85,3 +88,38 @@ def test_an_engine_that_is_not_installed_is_named_with_the_command_that_installs
     with pytest.raises(EngineError, match="'mujoco' is not installed; './ws extras'") as raised:
         make_engine("mujoco")
     assert "\n" not in str(raised.value)
+
+
+CHAIN = """<robot name="chain"><link name="base"><inertial><mass value="1"/>
+  <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <link name="slider"><inertial><mass value="1"/>
+  <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <joint name="rail" type="prismatic"><parent link="base"/><child link="slider"/><axis xyz="1 0 0"/>
+  <limit lower="-1e6" upper="1e6" effort="0" velocity="0"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("step", [0.001, 0.01])
+def test_a_joint_goes_no_further_than_3_14_in_a_step(new_engine, step):
+    world = World(new_engine(), time_step=0.005, gravity=(0.0, 0.0, 0.0))
+    model = world.spawn("chain", parse_urdf(CHAIN), Pose())
+    world.set_time_step(step)
+    model.body.reset_joint(0, 0.0, 1.9 * math.pi / step)
+    world.step()
+    assert model.joint_state("rail") == pytest.approx((math.pi, math.pi / step), rel=1e-9)
+    model.body.reset_joint(0, 0.0, -0.9 * math.pi / step)
+    world.step()
+    assert model.joint_state("rail")[0] == pytest.approx(-0.9 * math.pi, rel=1e-6)
+    world.close()
+
+
+@pytest.mark.extras("mujoco")
+def test_in_mujoco_many_fast_joints_that_are_each_slow_enough_go_on():
+    world = World(make_engine("mujoco"), gravity=(0.0, 0.0, 0.0))
+    models = [
+        world.spawn(f"chain{n}", parse_urdf(CHAIN), Pose((0.0, 3.0 * n, 0.0))) for n in range(4)
+    ]
+    for model in models:
+        model.body.reset_joint(0, 0.0, 3000.0)
+    world.step()
+    assert [model.joint_state("rail")[1] for model in models] == pytest.approx([3000.0] * 4)
+    world.close()

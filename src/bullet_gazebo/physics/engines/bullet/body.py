@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from bullet_gazebo.physics.description import Inertia, ModelDescription
-from bullet_gazebo.physics.engine import Body, Twist
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Body, Twist
 from bullet_gazebo.physics.engines.bullet.contacts import (
     check_meshes,
     choose_self_collisions,
@@ -13,12 +13,13 @@ from bullet_gazebo.physics.engines.bullet.contacts import (
 from bullet_gazebo.physics.engines.bullet.library import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
 
-NO_SPEED_LIMIT = 1e9  # [rad/s, m/s]; PyBullet clamps joint speeds at 100 unless told otherwise
 BASE = -1
 
 
 class BulletBody(Body):
     """A multi-body of PyBullet; its default motors and dampings are off."""
+
+    implicit_damping = False
 
     def __init__(
         self,
@@ -71,16 +72,15 @@ class BulletBody(Body):
         return [pybullet.getJointInfo(self.id, i, self._client)[1].decode() for i in range(count)]
 
     def _free_from_defaults(self, description: ModelDescription) -> None:
-        """Nothing acts but what the model says: no damping, no friction motors, no clamped speeds."""
+        """Nothing acts but what the model says: no damping, no friction motors."""
         pybullet.changeDynamics(
-            self.id, BASE, linearDamping=0.0, angularDamping=0.0, maxJointVelocity=NO_SPEED_LIMIT,
-            physicsClientId=self._client,
-        )  # fmt: skip
+            self.id, BASE, linearDamping=0.0, angularDamping=0.0, physicsClientId=self._client
+        )
         for name, index in zip(self.joint_names, self._indices, strict=True):
             joint = description.joints[name]
             pybullet.changeDynamics(
                 self.id, index, linearDamping=0.0, angularDamping=0.0, jointDamping=joint.damping,
-                maxJointVelocity=NO_SPEED_LIMIT, physicsClientId=self._client,
+                physicsClientId=self._client,
             )  # fmt: skip
             # A velocity motor at speed 0 with a bounded force is dry friction; force 0 switches it off.
             pybullet.setJointMotorControl2(
@@ -157,6 +157,13 @@ class BulletBody(Body):
     def set_damping(self, index: int, damping: float) -> None:
         pybullet.changeDynamics(
             self.id, self._indices[index], jointDamping=damping, physicsClientId=self._client
+        )
+
+    def set_time_step(self, dt: float) -> None:
+        """Cuts speeds at what a step of `dt` [s] can bear; the engine has one figure for joints and base."""
+        fastest = FURTHEST / dt if self._indices else FASTEST
+        pybullet.changeDynamics(
+            self.id, BASE, maxJointVelocity=fastest, physicsClientId=self._client
         )
 
     def set_limits(self, index: int, lower: float, upper: float) -> None:

@@ -45,6 +45,8 @@ class BulletClient:
         )
         self._step = partial(pybullet.stepSimulation, self._client)
         self._gravity: Vector = ZERO
+        self._time_step = 0.0
+        self._bodies: dict[int, BulletBody] = {}
         self._weightless: set[tuple[int, int]] = set()  # body and link, where gravity doesn't act
         self._sizes: dict[int, int] = {}  # [bytes] by body
         self.waste = 0
@@ -56,13 +58,15 @@ class BulletClient:
 
     def apply(self, settings: BulletSettings) -> None:
         """Hands the settings to the engine."""
-        self._gravity = settings.gravity
+        self._gravity, self._time_step = settings.gravity, settings.time_step
         iterations = max(1, min(settings.iterations, MOST_ITERATIONS))
         pybullet.setGravity(*settings.gravity, physicsClientId=self._client)
         pybullet.setTimeStep(settings.time_step, physicsClientId=self._client)
         pybullet.setPhysicsEngineParameter(
             numSolverIterations=iterations, physicsClientId=self._client
         )
+        for body in self._bodies.values():
+            body.set_time_step(settings.time_step)
 
     def load(self, description: ModelDescription, pose: Pose) -> BulletBody:
         """See `Engine.load`."""
@@ -90,10 +94,11 @@ class BulletClient:
                 ) from error
         self._sizes[body] = size
         try:
-            return BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
+            made = BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
         except DescriptionError:
             self.remove(body)
             raise
+        return self._keep(made)
 
     def _load_plane(self, description: ModelDescription, pose: Pose) -> BulletBody:
         shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
@@ -102,13 +107,19 @@ class BulletClient:
             0.0, shape, -1, plane.position, plane.orientation, physicsClientId=self._client
         )
         self._sizes[body] = PLANE
-        return BulletBody(self._client, body, description, pose, self._weightless, {})
+        return self._keep(BulletBody(self._client, body, description, pose, self._weightless, {}))
+
+    def _keep(self, body: BulletBody) -> BulletBody:
+        body.set_time_step(self._time_step)
+        self._bodies[body.id] = body
+        return body
 
     def remove(self, body: int) -> None:
         """Takes a body out of the world."""
         pybullet.removeBody(body, physicsClientId=self._client)
         self._weightless -= {key for key in self._weightless if key[0] == body}
         self.waste += self._sizes.pop(body)
+        self._bodies.pop(body, None)
 
     def step(self) -> None:
         """Integrates by one time step."""

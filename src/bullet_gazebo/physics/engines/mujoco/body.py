@@ -38,6 +38,8 @@ class JointSettings:
 class MujocoBody(Body):
     """The bodies and joints of one model; `bind` finds them again after the world was compiled anew."""
 
+    implicit_damping = True
+
     def __init__(
         self,
         state: MujocoState,

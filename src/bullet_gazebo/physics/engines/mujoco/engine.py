@@ -100,7 +100,7 @@ class MujocoEngine(Engine):
 
     def _configure(self) -> None:
         model, option = self._state.model, self._state.model.opt
-        option.timestep = self._time_step
+        self._state.set_time_step(self._time_step)
         option.gravity[:] = self._gravity
         option.iterations = self._iterations
         integrators = mujoco.mjtIntegrator

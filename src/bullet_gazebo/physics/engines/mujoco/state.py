@@ -1,19 +1,18 @@
 """MuJoCo's model and data of the whole world. Both are made anew when a model comes or goes."""
 
 from dataclasses import dataclass, field
+from math import hypot
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from bullet_gazebo.physics.engine import Twist
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Twist
 from bullet_gazebo.physics.engines.mujoco.model import xyzw
 from bullet_gazebo.physics.pose import Pose
 
+FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
-LARGEST = 1e10  # of a position, velocity or acceleration: beyond that, MuJoCo warns
-# The warnings of that kind.
-BAD = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
 
 
 class BodyArrays(NamedTuple):
@@ -47,7 +46,7 @@ class MujocoState:
 
     def step(self) -> None:
         """Integrates by one time step, after which nothing acts any more."""
-        np.copyto(self._before, self.data.qpos)
+        np.copyto(self._before, self._positions)
         if self.speeds:
             mujoco.mj_step1(self.model, self.data)
             self._drive()
@@ -55,27 +54,38 @@ class MujocoState:
         else:
             mujoco.mj_step(self.model, self.data)
         self.stale = True
-        if self._warnings.tobytes() != self._quiet:
-            self._mend()
+        if not hypot(*self._speeds()) < self._fast:  # also if one of them is no number
+            self._slow_down()
         if self.loaded:
             self.data.qfrc_applied[:] = 0.0
             self.data.xfrc_applied[:] = 0.0
             self.loaded = False
 
-    def _watch(self) -> None:
-        self._before = self.data.qpos.copy()
-        self._warnings = self.data.warning.number[BAD]
-        self._quiet = np.zeros_like(self._warnings).tobytes()  # the fastest of comparisons
+    def set_time_step(self, dt: float) -> None:
+        """Sets the length of a step [s]."""
+        model = self.model
+        model.opt.timestep = dt
+        alone = np.bincount(model.dof_treeid)[model.dof_treeid] == FREE
+        free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
+        self._fastest = np.where(alone & free, FASTEST, FURTHEST / dt)
+        self._fast = FURTHEST / dt
 
-    def _mend(self) -> None:
-        """What has grown beyond all bounds stops where it was: NaN would spread over the whole world."""
-        data = self.data
-        fast = ~(np.abs(data.qvel) < LARGEST)
-        far = ~(np.abs(data.qpos) < LARGEST)
-        data.qvel[fast] = 0.0
-        data.qpos[far] = self._before[far]
-        if not fast.any() and not far.any():
-            self._warnings[:] = 0  # so that the next time is told again
+    def _watch(self) -> None:
+        # Each of MuJoCo's attributes is an array object made anew.
+        self._positions, self._speeds = self.data.qpos, self.data.qvel.tolist
+        self._before = self._positions.copy()
+        self.set_time_step(self.model.opt.timestep)
+
+    def _slow_down(self) -> None:
+        """Cuts what is too fast, and takes the positions' step anew. What is no number counts as rest: it
+        would spread over the whole world."""
+        model, data, fastest = self.model, self.data, self._fastest
+        if (np.abs(data.qvel) <= fastest).all():
+            return  # there are many, and none of them is too fast
+        data.qvel[np.isnan(data.qvel)] = 0.0
+        np.clip(data.qvel, -fastest, fastest, out=data.qvel)
+        np.copyto(data.qpos, self._before)
+        mujoco.mj_integratePos(model, data.qpos, data.qvel, model.opt.timestep)
 
     def _drive(self) -> None:
         """Dry friction brakes towards speed 0; a motor is dry friction towards another speed."""

@@ -1,0 +1,192 @@
+"""Whether a robot's gains are too high for the step of the physics, and what rings for want of damping.
+
+The engines step semi-implicitly, v' = v - dt/M (p x + d v), x' = x + dt v', with the effort of the state
+before the step. Such a loop shakes from step to step, and more each time, where an eigenvalue of
+M^-1 (p dt² + 2 d dt) is beyond 4; for a loop on velocity, where one of M^-1 (2 p dt + 4 d) is.
+"""
+
+import logging
+import math
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from bullet_gazebo.control.controllers.base import Controller
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import GAINS, RobotHardware
+from bullet_gazebo.control.manager import RUNNING, ControllerManager
+from bullet_gazebo.control.pid import Loop
+from bullet_gazebo.physics.mechanics.mass_matrix import mobility, most_inertias, poses_at_zero
+from bullet_gazebo.physics.model import Model
+
+Tell = Callable[[int, str], None]
+"""Takes what is to be logged: a level of `logging`, and the text."""
+
+MOST = 4.0  # of the eigenvalue
+P_ONLY_DAMPING = 0.05  # of critical damping
+P_ONLY_TAG = "pOnlyDamping"
+CONTROL_PLUGIN = "libgazebo_ros_control.so"
+
+
+class OwnedLoop(NamedTuple):
+    """A loop and whose it is: a controller's, or a drive's."""
+
+    owner: str
+    loop: Loop
+
+
+class StabilityWatch:
+    """Looks at a robot's gains whenever they or its controllers change, and tells each fault once."""
+
+    def __init__(
+        self, model: Model, hardware: RobotHardware, manager: ControllerManager, tell: Tell
+    ) -> None:
+        """
+        Raises:
+            ControlError: if the model's `<pOnlyDamping>` is no number from 0 to 1.
+        """
+        self.shaking: set[str] = set()  # joints that are driven by gains that are too high
+        self._model = model
+        self._hardware = hardware
+        self._manager = manager
+        self._tell = tell
+        self._damping_ratio = p_only_damping(model)
+        self._told: set[object] = set()
+
+    def review(self, period: float) -> None:
+        """Warns of gains that are too high, and damps what a P gain alone drives; `period` [s] is that of
+        the controllers, or 0 if they are updated on each step."""
+        dt = max(period, self._model.time_step)
+        acting = self._acting()
+        found = too_high(self._model, acting, dt)
+        self.shaking = {each.loop.joint for each, _ in found}
+        for controller in self._manager.loaded:
+            if controller.state != RUNNING:
+                found += too_high(self._model, _owned([controller]), dt)
+        for each, excess in found:
+            self._warn_of(each, excess, dt)
+        self._damp(acting)
+
+    def blown_up(self, joints: Iterable[str], speed: float) -> None:
+        """Tells, once of each, that `joints` have reached `speed` [rad/s, m/s], and what drives them."""
+        for name in joints:
+            if name in self._told:
+                continue
+            self._told.add(name)
+            driver = "No controller with gains drives it"
+            for owner, loop in self._acting():
+                if loop.joint == name:
+                    gains = loop.pid.gains
+                    driver = f"The {owner} drives it with p = {gains.p:g}, i = {gains.i:g}, d = {gains.d:g}"
+            self._tell(
+                logging.WARNING,
+                f"joint '{name}' of model '{self._model.name}' blew up: it went half a turn in a step "
+                f"({speed:.0f} rad/s or m/s; the step is {self._model.time_step:g} s). It was slowed down. "
+                f"{driver}. Lower gains, a shorter step or heavier links help.",
+            )
+
+    def _acting(self) -> list[OwnedLoop]:
+        drives = [OwnedLoop(f"drive '{GAINS}/{each.joint}'", each) for each in self._hardware.loops]
+        return drives + _owned(c for c in self._manager.loaded if c.state == RUNNING)
+
+    def _warn_of(self, each: OwnedLoop, excess: float, dt: float) -> None:
+        owner, loop = each
+        key = (owner, loop.joint, loop.pid.gains, dt)
+        if key in self._told:
+            return
+        self._told.add(key)
+        p, d = _stiffness(loop, dt)
+        gain, value = ("d", loop.pid.gains.d) if d > p else ("p", loop.pid.gains.p)
+        self._tell(
+            logging.WARNING,
+            f"{owner} drives joint '{loop.joint}' of model '{self._model.name}' with {gain} = {value:g}, "
+            f"{excess:.3g} times what a step of {dt:g} s can follow (about {value / excess:.3g}): "
+            "it will shake. Lower the gain, or take a shorter step.",
+        )
+
+    def _damp(self, acting: list[OwnedLoop]) -> None:
+        """Gives joints that a P gain alone drives some damping: nothing else would ever still them."""
+        added = {}
+        loops = [each for each in acting if self._damping_ratio and _rings(each.loop, self._model)]
+        inertias = most_inertias(self._model.description) if loops else {}
+        for owner, loop in loops:
+            critical = 2.0 * math.sqrt(loop.pid.gains.p * inertias[loop.joint])
+            added[loop.joint] = self._damping_ratio * critical
+            if (owner, loop.joint) not in self._told:
+                self._told.add((owner, loop.joint))
+                self._tell(
+                    logging.INFO,
+                    f"{owner} drives joint '{loop.joint}' of model '{self._model.name}' with p alone: it "
+                    f"gets {self._damping_ratio:g} of critical damping, unless <{P_ONLY_TAG}> of the plugin "
+                    "or <dynamics damping> of the joint say otherwise",
+                )
+        self._model.add_damping(added)
+
+
+def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[tuple[OwnedLoop, float]]:
+    """Returns the loops whose gains are too high for steps of `dt` [s], and how many times so: the worst
+    first. Each joint's inertia is that with all joints at zero."""
+    left = {each.loop.joint: each for each in loops if sum(_stiffness(each.loop, dt)) > 0.0}
+    order = [joint.name for joint in model.description.movable_joints]
+    left = {name: left[name] for name in order if name in left}
+    if not left:
+        return []
+    own = {name: model.description.joints[name].damping * dt for name in left}
+    implicit = model.body.implicit_damping
+    added = {name: damping / 2.0 for name, damping in own.items()} if implicit else {}
+    matrix = mobility(model.description, poses_at_zero(model.description), added)
+    stiffness = {name: sum(_stiffness(each.loop, dt)) for name, each in left.items()}
+    if not implicit:  # it is cut at half of what stops the joint in one step (Model.apply_damping)
+        for name in left:
+            place = order.index(name)
+            stiffness[name] += min(2.0 * own[name], 1.0 / matrix[place, place])
+    found = []
+    while left:
+        places = [order.index(name) for name in left]
+        root = np.sqrt([stiffness[name] for name in left])
+        values, vectors = np.linalg.eigh(root[:, None] * matrix[np.ix_(places, places)] * root)
+        if not values[-1] >= MOST:
+            break
+        worst = list(left)[int(np.argmax(np.abs(vectors[:, -1])))]
+        found.append((left.pop(worst), float(values[-1]) / MOST))
+    return found
+
+
+def p_only_damping(model: Model) -> float:
+    """Returns the share of critical damping for joints that a P gain alone drives: `<pOnlyDamping>` of the
+    model's control plugin.
+
+    Raises:
+        ControlError: if it is no number from 0 to 1.
+    """
+    for plugin in model.description.plugins:
+        text = plugin.element.findtext(P_ONLY_TAG)
+        if text is None or not plugin.filename.endswith(CONTROL_PLUGIN):
+            continue
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not 0.0 <= value <= 1.0:
+            raise ControlError(f"<{P_ONLY_TAG}> '{text}' is not a number from 0 to 1")
+        return value
+    return P_ONLY_DAMPING
+
+
+def _owned(controllers: Iterable[Controller]) -> list[OwnedLoop]:
+    return [OwnedLoop(f"controller '{c.name}'", loop) for c in controllers for loop in c.loops]
+
+
+def _stiffness(loop: Loop, dt: float) -> tuple[float, float]:
+    """What p and d of a loop add to M times the eigenvalue [kg m², kg], in steps of `dt` [s]."""
+    p, d = max(loop.pid.gains.p, 0.0), max(loop.pid.gains.d, 0.0)
+    return (2.0 * p * dt, 4.0 * d) if loop.of_velocity else (p * dt * dt, 2.0 * d * dt)
+
+
+def _rings(loop: Loop, model: Model) -> bool:
+    gains = loop.pid.gains
+    if loop.of_velocity or not gains.p > 0.0 or gains.d or loop.joint not in model.joint_names:
+        return False
+    joint = model.description.joints[loop.joint]
+    return joint.damping == joint.friction == 0.0
