@@ -46,7 +46,7 @@ source "$ROOT/tools/ws_environment.sh"
 source "$ROOT/tools/ws_check.sh"
 
 # The markers (pyproject.toml) of what `ws test --fast` leaves out.
-NOT_FAST="rostest or slow or long or extras"
+NOT_FAST="rostest or slow or long or stress or extras"
 
 usage() {
     cat <<END
@@ -54,8 +54,8 @@ usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
        ws test [ARG...]      run all tests; ARGs go to pytest, e.g. -k gazebo
        ws test --fast [ARG...]
                              run the tests of about a minute, without those through ROS (test/ros),
-                             those that take seconds each (marked slow or long), and those that
-                             need requirements/extras.txt (marked extras)
+                             those that take seconds each (marked slow, long or stress), and
+                             those that need requirements/extras.txt (marked extras)
        ws check [NAME...]    run the checks, or those named: ${CHECKS[*]}
        ws shell              an interactive bash in the workspace, with roscd and completion
        ws extras [CMD...]    install requirements/extras.txt too, then run CMD, if any

@@ -10,11 +10,24 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
+import progress_plugin
 import pytest
-from progress_plugin import pytest_configure
+import stress_plugin
 from rostest_plugin import pytest_collect_file
+from stress_plugin import (
+    pytest_addoption,
+    pytest_report_header,
+    pytest_terminal_summary,
+    scenario,
+)
 
-__all__ = ["pytest_collect_file", "pytest_configure"]
+__all__ = [
+    "pytest_addoption",
+    "pytest_collect_file",
+    "pytest_report_header",
+    "pytest_terminal_summary",
+    "scenario",
+]
 
 # Nodes of rostest files: only roslaunch can run them.
 collect_ignore_glob = ["ros/**/*.py"]
@@ -62,3 +75,13 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         return
     subprocess.run([ROOT / "ws", "extras"], check=True)
     importlib.invalidate_caches()
+
+
+@pytest.hookimpl(trylast=True)  # the reporter has to be there
+def pytest_configure(config: pytest.Config) -> None:
+    progress_plugin.pytest_configure(config)
+    stress_plugin.prepare(config)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    stress_plugin.deselect_full(config, items)

@@ -95,6 +95,15 @@ class Process:
             self._lines.append(line)
 
     @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def send(self, number: signal.Signals) -> None:
+        """To the command alone."""
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self._process.pid, number)
+
+    @property
     def output(self) -> str:
         return "".join(self._lines)
 

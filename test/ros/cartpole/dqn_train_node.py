@@ -2,9 +2,14 @@
 """dqn_train.py as a ROS node, and with no ROS around."""
 
 import json
+import sys
 import unittest
+from pathlib import Path
 
 import rostest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+
 from pg_train_runs import Place
 
 SHORT = ["total_timesteps:=300", "eval_frequency:=0"]

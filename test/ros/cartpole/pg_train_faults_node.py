@@ -4,10 +4,15 @@
 import json
 import signal
 import socket
+import sys
 import time
 import unittest
+from pathlib import Path
 
 import rostest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+
 from pg_train_runs import NETWORKS, Place, Process
 
 ENDLESS = ("--episodes=100000", "--stop-at-length=0")

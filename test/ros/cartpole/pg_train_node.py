@@ -5,12 +5,17 @@ import contextlib
 import json
 import os
 import signal
+import sys
 import unittest
+from pathlib import Path
 
 import rostest
 import torch
-from pg_train_runs import NETWORKS, Place
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+
+from pg_train_runs import NETWORKS, Place
 
 TAGS = {
     "Reward",

@@ -4,10 +4,12 @@ from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+import rospy
 from dynamic_reconfigure.encoding import Config, encode_config
 from dynamic_reconfigure.server import Server
 from dynamic_reconfigure.srv import ReconfigureRequest, ReconfigureResponse
 
+GONE = "the parameters are gone"
 FIRST = -1  # the level of the call at the start
 
 
@@ -40,7 +42,7 @@ class DynamicServer(Server):
 
     def shutdown(self) -> None:
         """Takes service and topics away; the parameters stay on the server."""
-        self.set_service.shutdown("the parameters are gone")
+        self.set_service.shutdown(GONE)
         self.descr_topic.unregister()
         self.update_topic.unregister()
 
@@ -56,7 +58,12 @@ class DynamicServer(Server):
         }
         given = {(kind, p.name): p.value for kind, group in groups.items() for p in group}
         changes = {name: given[kind, name] for kind, name in self._kinds if (kind, name) in given}
-        return ReconfigureResponse(encode_config(self.update_configuration(changes)))
+        try:
+            return ReconfigureResponse(encode_config(self.update_configuration(changes)))
+        except (
+            rospy.ROSException
+        ) as fault:  # a client's connection outlives the service and its topics
+            raise rospy.ServiceException(GONE) from fault
 
 
 def _configuration(parameters: Sequence[Parameter]) -> SimpleNamespace:

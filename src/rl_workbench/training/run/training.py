@@ -92,7 +92,7 @@ class Training:
             self._train()
         except WorkbenchError as error:
             failure = error
-        except OSError as error:
+        except (OSError, MemoryError) as error:
             failure = self._not_written(error)
         finally:
             self._evaluator.close()
@@ -299,7 +299,7 @@ class Training:
         try:
             self._algorithm.export(self.folder)
             outcome.write(str(failure) if failure else None)
-        except OSError as error:
+        except (OSError, MemoryError) as error:
             problem = self._not_written(error)
             failure = problem if self._interrupt.requested() else failure or problem
         outcome.tell()
@@ -307,6 +307,8 @@ class Training:
         if failure and not (self._interrupt.requested() and self._is_written):
             raise WorkbenchError(f"{failure}; {outcome.what_is_left(self._is_written)}")
 
-    def _not_written(self, error: OSError) -> WorkbenchError:
+    def _not_written(self, error: OSError | MemoryError) -> WorkbenchError:
         self._is_written = False
+        if isinstance(error, MemoryError):
+            return WorkbenchError("there is no memory left")
         return WorkbenchError(f"can't write {error.filename or self.folder}: {error.strerror}")

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Gains at run time: dynamic_reconfigure, write-back, PID state (docs/contract/ros_control.md 4)."""
 
+import contextlib
 import math
 import subprocess
 
@@ -135,6 +136,16 @@ class GainsTest(SlidesTest):
             self.assertTrue(self.unload("effort_position"))
             with self.assertRaises(rospy.ROSException):
                 rospy.wait_for_service(service, 0.3)
+
+    def test_a_connection_that_was_kept_is_told_that_they_are_gone(self):
+        self.assertTrue(self.load("effort_position"))
+        with contextlib.closing(
+            rospy.ServiceProxy(f"{PID}/set_parameters", Reconfigure, persistent=True)
+        ) as kept:
+            kept(ReconfigureRequest())
+            self.assertTrue(self.unload("effort_position"))
+            with self.assertRaisesRegex(rospy.ServiceException, "the parameters are gone"):
+                kept(ReconfigureRequest())
 
 
 if __name__ == "__main__":

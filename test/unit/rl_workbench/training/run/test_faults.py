@@ -23,7 +23,9 @@ from training_runs import (
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.run import checkpoints as run_checkpoints
+from rl_workbench.training.run.history import History
 from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.outcome import TrainingOutcome
 
 ON_A_ROBOT = {"env_id": POLE, "env_kwargs": {"noise": 0.05}}
 LEARNERS = [*EXACT, OTHERS[0]]  # from single actions
@@ -99,6 +101,38 @@ def test_ctrl_c_on_a_full_disk_tells_that_it_could_not_save(
     fill_disk(monkeypatch, lambda: interrupt.signal is not None)
     line = failure(lambda: train(tmp_path, name, interrupt))
     assert "No space left on device" in line and "--resume" in line and "is saved" not in line
+
+
+# No memory.
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_memory_that_ends_in_the_training(whole, tmp_path: Path, monkeypatch, name: str) -> None:
+    def learn(self: History) -> dict:
+        if len(list(run.glob("checkpoints/step_*.pt"))) == 3:
+            raise MemoryError("std::bad_alloc")
+        return keep(self)
+
+    run, keep = tmp_path / "run", History.state_dict
+    with monkeypatch.context() as patched:
+        patched.setattr(History, "state_dict", learn)
+        line = failure(lambda: train(run, name, keep_checkpoints=0))
+    assert "there is no memory left; stopped after" in line and "is saved" not in line
+    assert f"--resume {run} goes on from the last checkpoint" in line
+    resume(run)
+    assert summary(run)["complete"]
+    assert summary(run)["returns"] == summary(whole(name))["returns"]
+
+
+def test_memory_that_ends_in_the_picture(tmp_path: Path, monkeypatch) -> None:
+    def write(*_: object) -> None:
+        raise MemoryError("std::bad_alloc")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(TrainingOutcome, "write", write)
+        assert "there is no memory left" in failure(lambda: train(tmp_path, "dqn"))
+    resume(tmp_path)
+    assert summary(tmp_path)["complete"]
 
 
 # Numbers that are none.

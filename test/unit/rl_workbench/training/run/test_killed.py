@@ -91,14 +91,10 @@ def newer_checkpoint(run: Path, process: subprocess.Popen) -> None:
         time.sleep(0.005)
 
 
-MORE = [pytest.param(name, seed, marks=pytest.mark.long) for seed in (1, 2, 3) for name in EXACT]
-
-
-@pytest.mark.parametrize(("name", "seed"), [*((name, 0) for name in EXACT), *MORE])
-def test_killed_at_random_moments(
-    start: Start, whole, tmp_path: Path, name: str, seed: int
-) -> None:
-    run, moments, killed = tmp_path / "run", random.Random(seed), 0
+@pytest.mark.parametrize("name", EXACT)
+def test_killed_at_random_moments(start: Start, whole, tmp_path: Path, name: str) -> None:
+    """Hundreds of times: test/stress/test_kills.py."""
+    run, moments, killed = tmp_path / "run", random.Random(0), 0
     process = start(*new(name, run))
     for _ in range(3):
         newer_checkpoint(run, process)

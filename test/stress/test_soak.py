@@ -1,0 +1,105 @@
+"""Thousands of resets, spawns and deletions: the same bits each time, and nothing that grows."""
+
+import random
+
+import pytest
+from stress.scenario import Row, Scenario
+from stress.worlds import Usage, World, world
+
+from cartpole.robot import ROBOT
+from robot_envs.backends import bring_up
+from ros_utils.step_client import StepClient
+
+ENGINES = [
+    pytest.param("ode", marks=pytest.mark.stress),
+    pytest.param("mujoco", marks=[pytest.mark.stress(full=True), pytest.mark.extras("mujoco")]),
+]
+CART = "stand_cart_position_controller"
+GROWTH = 12.0  # [MiB] at most, over all cases: what is kept of one is told by thousands
+LINK = """<link name="{name}"><inertial><origin xyz="0 0 {z}"/><mass value="{mass}"/>
+<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
+<collision><geometry>{shape}</geometry></collision><visual><geometry>{shape}</geometry></visual></link>"""
+JOINT = """<joint name="{name}" type="{type}"><parent link="{parent}"/><child link="{child}"/>
+<origin xyz="0 0 {z}"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="10" velocity="5"/></joint>"""
+
+
+def random_robot(dice: random.Random) -> str:
+    """A chain of some links, each of another shape and size than any before."""
+    parts = []
+    for number in range(dice.randint(1, 5)):
+        length, radius = dice.uniform(0.05, 0.6), dice.uniform(0.01, 0.1)
+        shape = dice.choice(
+            [
+                f'<cylinder length="{length}" radius="{radius}"/>',
+                f'<box size="{radius} {length} {radius}"/>',
+                f'<sphere radius="{radius}"/>',
+                f'<mesh filename="package://cartpole/test/data/models/crate/meshes/cube.obj"'
+                f' scale="{radius} {radius} {length}"/>',
+            ]
+        )
+        about = {"z": length, "mass": dice.uniform(0.1, 3.0), "shape": shape}
+        parts.append(LINK.format(name=f"l{number}", **about))
+        if number:
+            kind = dice.choice(["revolute", "prismatic", "fixed", "continuous"])
+            ends = {"parent": f"l{number - 1}", "child": f"l{number}", "z": length}
+            parts.append(JOINT.format(name=f"j{number}", type=kind, **ends))
+    return f'<robot name="r">{"".join(parts)}</robot>'
+
+
+def steady(row: Row, here: World, usage: list[Usage]) -> None:
+    """Takes down what was used at first and is used now, and that it didn't grow."""
+    before = usage[0] if usage else here.usage()
+    after = here.usage_again(before)
+    row.notes.append(f"{before} → {after}")
+    assert after.memory - before.memory < GROWTH, row.notes
+    assert all(now <= old for now, old in zip(after[1:], before[1:], strict=True)), row.notes
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_resets(scenario: Scenario, engine: str) -> None:
+    with world(engine, "lockstep:=true") as here, here.active():
+        bring_up.bring_up(ROBOT, lambda text: None)
+        client, dice = StepClient(), scenario.dice("resets", 0)
+        states = {}
+        usage: list[Usage] = []
+
+        def case(number: int, _: random.Random) -> None:
+            """An episode of some steps from one of three states: the same as each time before."""
+            if number == settled:
+                usage.append(here.usage())
+            start = number % 3
+            answers = [
+                client.reset(
+                    {"stand_cart": 0.0, "cart_pole": 0.1 * start}, {"cart_pole": -0.5}, seed=1,
+                    everything=bool(start),
+                )
+            ]  # fmt: skip
+            answers += [client.step(3, {CART: command}) for command in commands]
+            moved = [(a.joint_states.position, a.joint_states.velocity) for a in answers]
+            assert states.setdefault(start, moved) == moved
+
+        commands = [dice.uniform(-0.1, 0.1) for _ in range(3)]
+        settled = scenario.share(10_000) // 10  # what a world keeps anyway it has by then
+        row = scenario.run(f"resets over ROS, bit-equal: {engine}", 10_000, case)
+        steady(row, here, usage)
+        client.close()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_spawns(scenario: Scenario, engine: str) -> None:
+    with world(engine) as here:
+        settled, usage = scenario.share(5_000) // 10, []
+
+        def case(number: int, dice: random.Random) -> None:
+            if number == settled:
+                usage.append(here.usage())
+            name = f"robot_{number}"
+            answer = here.spawn(name, random_robot(dice))
+            assert answer.success, answer.status_message
+            answer = here.delete(name)
+            assert answer.success, answer.status_message
+
+        row = scenario.run(f"spawns and deletions: {engine}", 5_000, case)
+        assert here.models() == ["ground_plane"]
+        here.check_time()
+        steady(row, here, usage)

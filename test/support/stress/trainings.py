@@ -1,0 +1,159 @@
+"""Trainings in processes of their own, forked off one that has imported all: that takes longest."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import random
+import resource
+import shlex
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from training_runs import SMALL, flags
+
+BOUND = 120.0  # [s] for anything that a training does
+# Trainings of about two seconds, with checkpoints and evaluations as often as a kill is to find one.
+OPTIONS: dict[str, dict[str, Any]] = {
+    "dqn": {"total_timesteps": 6000, "eval_frequency": 1000, "checkpoint_frequency": 250},
+    "reinforce": {"episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
+    "reinforce-document": {"episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
+    "ppo": {"total_timesteps": 5000, "eval_frequency": 1000, "checkpoint_frequency": 250},
+}
+_ANYWHERE = {"env_id": "CartPole-v1", "env_kwargs": None}
+IMPORTED = [
+    "rl_workbench.training.cli",
+    "rl_workbench.training.run.training",
+    "rl_workbench.training.dqn.algorithm",
+    "rl_workbench.training.pg.algorithm",
+    "torch._dynamo",
+    "torch.utils.tensorboard",
+    "matplotlib.pyplot",
+]
+
+
+def new(name: str, run: Path, **changed: object) -> list[str]:
+    """The arguments of such a training; no file's options count."""
+    options = {**SMALL[name], **_ANYWHERE, **OPTIONS[name], **changed, "run_dir": run}
+    chosen = {key: value for key, value in options.items() if value is not None}
+    return ["--algo", name, "--config", "/dev/null", *flags(chosen)]
+
+
+class Forked:
+    """A training command under way.
+
+    Args:
+        arguments: of `rl-workbench train`.
+        folder: it runs in; its output goes to a file there.
+        limits: of its process, by their numbers in `resource`; RLIMIT_AS is what it may take besides.
+    """
+
+    def __init__(
+        self, arguments: list[str], folder: Path, limits: Mapping[int, int] | None = None
+    ) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self.log = folder / "output.txt"
+        self._arguments = arguments
+        self._process = _forking().Process(
+            target=_command, args=(arguments, folder, self.log, dict(limits or {})), daemon=True
+        )
+        self._process.start()
+
+    @property
+    def pid(self) -> int:
+        """The process's id."""
+        assert self._process.pid is not None
+        return self._process.pid
+
+    @property
+    def output(self) -> str:
+        """What it has said so far."""
+        return self.log.read_text(errors="replace") if self.log.exists() else ""
+
+    def is_running(self) -> bool:
+        return self._process.is_alive()
+
+    def kill(self) -> bool:
+        """Ends it by SIGKILL; returns whether it was under way still."""
+        self._process.kill()
+        self._process.join(BOUND)
+        return self._process.exitcode == -9
+
+    def code(self) -> int:
+        """Waits for its end; returns the exit code."""
+        self._process.join(BOUND)
+        told = f"{shlex.join(self._arguments)}\n{self.output[-3000:]}"
+        assert self._process.exitcode is not None, f"no end after {BOUND:.0f} s: {told}"
+        return self._process.exitcode
+
+    def ended(self, *codes: int) -> str:
+        """Waits for an end with one of these codes and without a traceback; returns what it said."""
+        code, told = self.code(), self.output
+        assert code in (codes or (0,)), f"exit code {code}:\n{told[-3000:]}"
+        assert "Traceback" not in told, told[-3000:]
+        return told
+
+
+def _forking() -> multiprocessing.context.ForkServerContext:
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(IMPORTED)
+    return context
+
+
+def _command(arguments: list[str], folder: Path, log: Path, limits: dict[int, int]) -> None:
+    from rl_workbench.training.cli import main
+
+    os.chdir(folder)
+    with log.open("ab") as output:
+        for stream in (1, 2):
+            os.dup2(output.fileno(), stream)
+    # As after a start with its output in a file.
+    sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w", buffering=1)
+    for number, most in limits.items():
+        taken = _size() if number == resource.RLIMIT_AS else 0
+        resource.setrlimit(number, (taken + most, taken + most))
+    sys.exit(main(arguments))
+
+
+def _size() -> int:
+    """This process's memory, with all that was imported [bytes]."""
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+
+
+@contextlib.contextmanager
+def forked(
+    arguments: list[str], folder: Path, limits: Mapping[int, int] | None = None
+) -> Iterator[Forked]:
+    """One for the length of a block; nothing of it outlives that."""
+    training = Forked(arguments, folder, limits)
+    try:
+        yield training
+    finally:
+        training.kill()
+
+
+def wait_for_newer_checkpoint(run: Path, training: Forked) -> None:
+    """Or for the training's end."""
+
+    def written() -> int:
+        with contextlib.suppress(FileNotFoundError):
+            return (run / "last.pt").stat().st_mtime_ns
+        return 0
+
+    before, deadline = written(), time.monotonic() + BOUND
+    while written() == before and training.is_running():
+        assert time.monotonic() < deadline, f"no checkpoint after {BOUND:.0f} s"
+        time.sleep(0.002)
+
+
+def random_moment(dice: random.Random, run: Path, training: Forked) -> None:
+    """Waits for one: in the start, or after a checkpoint in a step, an evaluation, another checkpoint."""
+    if dice.random() < 0.2:
+        time.sleep(dice.uniform(0.0, 1.0))
+    else:
+        wait_for_newer_checkpoint(run, training)
+        time.sleep(dice.uniform(0.0, 0.3))
