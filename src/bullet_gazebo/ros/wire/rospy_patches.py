@@ -73,11 +73,12 @@ def answer_xmlrpc(method: str, answer: Callable[..., tuple[int, str, Any]]) -> N
 
     Args:
         method: the call's name.
-        answer: called with what follows the caller's name; returns code (1 is success), text, value.
+        answer: called with what follows the caller's name, whatever it is; returns code (1 is success),
+            text, value.
     """
 
-    def handle(_handler: ROSHandler, _caller: str, *args: Any) -> tuple[int, str, Any]:
-        return answer(*args)
+    def handle(_handler: ROSHandler, *args: Any) -> tuple[int, str, Any]:
+        return answer(*args[1:])  # the first one is the caller's name
 
     setattr(ROSHandler, method, handle)
 

@@ -5,10 +5,12 @@ it advertises a service it holds a lock that the shutdown needs too, and the pro
 """
 
 import math
+import os
 import queue
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from types import FrameType
@@ -43,14 +45,17 @@ class SignalHandler:
         """Returns whether a signal has come that nobody has waited for yet; for long work before `wait`."""
         return not self._news.empty()
 
-    def wait(self) -> bool:
+    def wait(self, over: Callable[[], bool] = lambda: False) -> bool:
         """Returns once a signal came, or the node was shut down otherwise, and the node is down.
+
+        Args:
+            over: asked again and again; where it says so the node is shut down, too.
 
         Returns:
             False if it was the work of `run` that came to its end.
         """
         reason = "shut down"
-        while not rospy.is_shutdown():
+        while not rospy.is_shutdown() and not over():
             try:
                 reason = self._news.get(timeout=POLL)
                 break
@@ -89,6 +94,24 @@ class SignalHandler:
             if not ended:
                 raise
             return interrupted
+
+
+def end_within(bound: float, code: int) -> None:
+    """Has the process end with that exit code, whatever may be left in it that waits for ever.
+
+    Python itself waits for threads, and calls what was registered for its end.
+
+    Args:
+        bound: [s]
+    """
+
+    def insist() -> None:
+        time.sleep(bound)
+        sys.stderr.write(f"ended after {bound:g} s: something in this process doesn't end\n")
+        sys.stderr.flush()
+        os._exit(code)
+
+    threading.Thread(target=insist, name="insist on the end", daemon=True).start()
 
 
 def init_node(name: str, command_line: Sequence[str], anonymous: bool = True) -> None:
