@@ -14,6 +14,7 @@ from bullet_gazebo.ros.control.control_plugin import FILENAME as CONTROL_PLUGIN
 from bullet_gazebo.ros.control.control_plugin import ControlPlugin
 from bullet_gazebo.ros.node.joint_state_plugin import FILENAME as JOINT_STATE_PLUGIN
 from bullet_gazebo.ros.node.joint_state_plugin import JointStatePlugin
+from bullet_gazebo.ros.node.one_world import NameLoss, NameTaken, full_name, refuse_twin
 from bullet_gazebo.ros.node.server_args import parse_args
 from bullet_gazebo.ros.node.state_topics import advertise_states
 from bullet_gazebo.ros.node.watchdog import Watchdog
@@ -25,10 +26,11 @@ from bullet_gazebo.ros.services.step_service import StepService
 from bullet_gazebo.ros.services.world_services import advertise_world_services
 from bullet_gazebo.ros.wire.rospy_patches import greet_clients_apart, hang_up_on_nonsense
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
-from bullet_gazebo.ros.wire.signals import SignalHandler, end_within, init_node
+from bullet_gazebo.ros.wire.signals import SignalHandler, end_within, init_node, wait_for_master
 from bullet_gazebo.ros.wire.thinning import Thinner
 from bullet_gazebo.simulator import Simulator
 
+NAME = "gazebo"
 MOST_FREQUENT = 1e9  # [Hz]; time is counted in nanoseconds
 EXIT_TIMEOUT = 10.0  # [s] for what plugins may have left to be done at the end
 
@@ -105,8 +107,18 @@ def _clock_frequency() -> float:
 
 def main(argv: list[str] | None = None) -> int:
     """Runs the node; returns its exit code."""
-    args = parse_args(rospy.myargv(argv)[1:])
-    init_node("gazebo", sys.argv if argv is None else argv, anonymous=False)
+    command_line = sys.argv if argv is None else argv
+    args = parse_args(rospy.myargv(command_line)[1:])
+    name = full_name(command_line, NAME)
+    try:
+        wait_for_master(NAME)
+        if not args.replace:
+            refuse_twin(name)
+    except NameTaken as error:
+        print(f"gzserver: {error}", file=sys.stderr)
+        return 1
+    init_node(NAME, command_line, anonymous=False)
+    loss = NameLoss()
     # Not before: while there is no master, a signal ends the process as such.
     signals = SignalHandler()
     if args.physics not in ENGINES:
@@ -120,5 +132,8 @@ def main(argv: list[str] | None = None) -> int:
         rospy.logfatal("%s", error)
         return 1
     code = GazeboNode(args, engine, signals.noted).run(signals)
+    if loss.happened:
+        print(f"gzserver: {loss.text(name)}", file=sys.stderr)
+        code = code or 1
     end_within(EXIT_TIMEOUT, code)
     return code

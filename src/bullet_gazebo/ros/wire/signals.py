@@ -114,10 +114,11 @@ def end_within(bound: float, code: int) -> None:
     threading.Thread(target=insist, name="insist on the end", daemon=True).start()
 
 
-def init_node(name: str, command_line: Sequence[str], anonymous: bool = True) -> None:
-    """Initialises a node without rospy's handlers, once there is a master.
+def wait_for_master(name: str) -> None:
+    """Waits until there is a master, which rospy itself does in a way that can't be interrupted.
 
-    rospy itself would wait for the master as well, but in a way that can't be interrupted.
+    Args:
+        name: of the node that waits, for its message.
 
     Raises:
         rospy.ROSInterruptException: a signal came while there was none.
@@ -129,4 +130,13 @@ def init_node(name: str, command_line: Sequence[str], anonymous: bool = True) ->
             flush=True,
         )
         wait_until(master.is_up, math.inf, "a master")
+
+
+def init_node(name: str, command_line: Sequence[str], anonymous: bool = True) -> None:
+    """Initialises a node without rospy's handlers, once there is a master.
+
+    Raises:
+        rospy.ROSInterruptException: a signal came while there was none.
+    """
+    wait_for_master(name)
     rospy.init_node(name, anonymous=anonymous, argv=list(command_line), disable_signals=True)
