@@ -24,7 +24,12 @@ from bullet_gazebo.ros.plugins import PluginRegistry
 from bullet_gazebo.ros.services.spawn_services import SpawnServices
 from bullet_gazebo.ros.services.step_service import StepService
 from bullet_gazebo.ros.services.world_services import advertise_world_services
-from bullet_gazebo.ros.wire.rospy_patches import greet_clients_apart, hang_up_on_nonsense
+from bullet_gazebo.ros.wire.rospy_patches import (
+    Reception,
+    bound_calls,
+    bound_messages,
+    hang_up_on_nonsense,
+)
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.ros.wire.signals import SignalHandler, end_within, init_node, wait_for_master
 from bullet_gazebo.ros.wire.thinning import Thinner
@@ -53,7 +58,9 @@ class GazeboNode:
 
     def _advertise(self, network: bool) -> None:
         WorldControl(self.sim, self._watchdog).offer()
-        greet_clients_apart()
+        bound_messages()
+        bound_calls()
+        Reception.open()
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
