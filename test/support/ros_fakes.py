@@ -21,6 +21,7 @@ class FakeMaster:
         self.services = {}
         self.nodes = {}
         self.params = {}
+        self.told = {}  # answers to getName and getMasterUri, as a node's
         self.questions = []
         self._server = SimpleXMLRPCServer((LOOPBACK, 0), logRequests=False)
         self._server.register_function(lambda caller: [1, "", 1], "getPid")
@@ -30,6 +31,8 @@ class FakeMaster:
             ("getParam", self.params),
         ):
             self._server.register_function(partial(self._lookup, known), method)
+        for method in ("getName", "getMasterUri"):
+            self._server.register_function(partial(self._tell, method), method)
         self._server.register_function(lambda caller, name: "nonsense", "nonsense")
         self.uri = f"http://{LOOPBACK}:{self._server.server_address[1]}"
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.01,))
@@ -38,6 +41,9 @@ class FakeMaster:
     def _lookup(self, known, caller, name):
         self.questions.append(name)
         return [1, "", known[name]] if name in known else [-1, "unknown", ""]
+
+    def _tell(self, method, caller):
+        return [1, "", self.told[method]] if method in self.told else [-1, "unknown", ""]
 
     def close(self):
         self._server.shutdown()

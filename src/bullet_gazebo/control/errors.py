@@ -1,9 +1,8 @@
-"""Errors of the control room."""
+"""Errors of the control room, and what a user's code is caught at."""
+
+import threading
 
 from file_reading.errors import one_line
-
-# What a user's code is caught at: a script's sys.exit() must not end the simulator either.
-FAULTS = (Exception, SystemExit)
 
 
 class ControlError(ValueError):
@@ -12,3 +11,14 @@ class ControlError(ValueError):
     def __init__(self, text: str) -> None:
         """Names in a file may hold anything: `text` is made one line, of a length for a log."""
         super().__init__(one_line(text))
+
+
+def faults() -> tuple[type[BaseException], ...]:
+    """What a user's code is caught at, as in ``except faults()``: whatever it may raise.
+
+    A script's sys.exit() must not end the simulator, nor stop its time. Only an interrupt in the main
+    thread is not the code's own: it is somebody's Ctrl-C, wherever it comes up.
+    """
+    if threading.current_thread() is threading.main_thread():
+        return (Exception, SystemExit, GeneratorExit)
+    return (BaseException,)

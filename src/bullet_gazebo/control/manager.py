@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from bullet_gazebo.control.controllers import BUILT_IN
 from bullet_gazebo.control.controllers.base import Controller
-from bullet_gazebo.control.errors import FAULTS, ControlError
+from bullet_gazebo.control.errors import ControlError, faults
 from bullet_gazebo.control.hardware import RobotHardware
 
 BEST_EFFORT = 1
@@ -52,7 +52,7 @@ class ControllerManager:
         for controller in self._running:
             try:
                 controller.update(now, dt)
-            except FAULTS as error:  # a user's code must not stop the world
+            except faults() as error:  # a user's code must not stop the world
                 self._fail(controller, error)
 
     @property
@@ -89,8 +89,8 @@ class ControllerManager:
             )
         try:
             controller = self.types[kind].create(name, params, self.hardware)
-            _check_claims(controller, self.hardware)
-        except FAULTS as error:
+            _check_made(controller, name, self.hardware)
+        except faults() as error:
             reason = error if isinstance(error, ControlError) else repr(error)
             raise ControlError(f"Initializing controller '{name}' failed: {reason}") from error
         self._controllers[name] = controller
@@ -172,13 +172,13 @@ class ControllerManager:
         for controller in self._running:
             try:
                 controller.joints_moved(now)
-            except FAULTS as error:  # a user's code must not stop the world
+            except faults() as error:  # a user's code must not stop the world
                 self._fail(controller, error)
 
     def _start(self, controller: Controller) -> bool:
         try:
             controller.starting(self._now)
-        except FAULTS as error:
+        except faults() as error:
             controller.state = STOPPED
             self._fail(controller, error)
             return False
@@ -189,7 +189,7 @@ class ControllerManager:
         controller.state = STOPPED
         try:
             controller.stopping()
-        except FAULTS as error:
+        except faults() as error:
             self._fail(controller, error)
 
     def _fail(self, controller: Controller, error: BaseException) -> None:
@@ -220,10 +220,16 @@ def _leave() -> None:
     """The same, of changes."""
 
 
-def _check_claims(controller: object, hardware: RobotHardware) -> None:
-    """Refuses a user's controller whose claims would break list_controllers or the check of conflicts."""
+def _check_made(controller: object, name: str, hardware: RobotHardware) -> None:
+    """Refuses a user's controller that would break list_controllers or the check of conflicts."""
     if not isinstance(controller, Controller):
         raise ControlError(f"create() returned {controller!r}, which is no controller")
+    if controller.name != name:
+        raise ControlError(
+            f"it calls itself {controller.name!r}: __init__ must get create()'s name"
+        )
+    if not isinstance(getattr(controller, "interface", None), str):
+        raise ControlError("its class lacks `interface`, the name of a hardware interface")
     claimed = controller.claimed
     if not isinstance(claimed, (tuple, list)) or not all(
         name in hardware.joints for name in claimed

@@ -1,8 +1,10 @@
 """Model plugins: what stands in for the shared libraries that a model file names.
 
-How to add one's own: docs/plugins.md.
+How to add one's own: docs/plugins.md. It is a user's code, and caught wherever it is called, sys.exit() and
+KeyboardInterrupt included: in this process a Ctrl-C raises nothing (ros/wire/signals.py).
 """
 
+import ast
 import importlib
 import os
 import traceback
@@ -14,6 +16,7 @@ from typing import Protocol
 
 import rospy
 
+from bullet_gazebo.definitions import Definition, defines, find_file
 from bullet_gazebo.physics.description import Plugin
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.simulator import Simulator
@@ -47,7 +50,7 @@ class PluginContext:
         def guarded(now: int) -> None:
             try:
                 update(now)
-            except Exception:  # noqa: BLE001 - a user's code must not stop the world
+            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
                 self._report("is not called any more, because it raised")
                 self.sim.listeners = [each for each in self.sim.listeners if each is not guarded]
 
@@ -111,7 +114,7 @@ class PluginRegistry:
             context = PluginContext(self._sim, model, plugin, own or default)
             try:
                 loaded.append((context, factory(context)))
-            except Exception:  # noqa: BLE001 - a user's code must not stop the world
+            except BaseException:  # noqa: BLE001 - a user's code must not leave the model half there
                 context._report("is left out, because it raised")
                 context.release()
 
@@ -122,7 +125,7 @@ class PluginRegistry:
             try:
                 if plugin is not None:
                     plugin.shutdown()
-            except Exception:  # noqa: BLE001 - a user's code must not keep a model from going
+            except BaseException:  # noqa: BLE001 - a user's code must not keep a model from going
                 context._report("raised when it was ended")
 
     def _find(self, plugin: Plugin, model: Model, places: dict[str, object]) -> Factory | None:
@@ -137,10 +140,10 @@ class PluginRegistry:
             model.description.left_out.append(unknown)
             return None
         try:
-            return _imported(str(place))
-        except Exception as error:  # noqa: BLE001 - importing runs a user's code
+            return _imported(place)
+        except BaseException as error:  # noqa: BLE001 - importing runs a user's code
             rospy.logerr(
-                "Model '%s': the plugin %s is left out: %s of the parameter %s can't be imported: %s",
+                "Model '%s': the plugin %s is left out: %s of the parameter %s can't be imported: %r",
                 model.name, library, place, rospy.resolve_name(PARAMETER), error,
             )  # fmt: skip
             return None
@@ -154,14 +157,37 @@ def _tell_late(models: str) -> None:
 
 def _registered() -> dict[str, object]:
     """Read for each model, so that a plugin can be added while the simulator runs."""
-    places = rospy.get_param(PARAMETER, {})
-    return places if isinstance(places, dict) else {}
+    try:
+        places = rospy.get_param(PARAMETER, {})
+    except OSError as error:  # the master; the model is in the world already
+        rospy.logerr("The parameter %s can't be read: %s", rospy.resolve_name(PARAMETER), error)
+        return {}
+    if isinstance(places, dict):
+        return places
+    rospy.logwarn(
+        "The parameter %s is no table of libraries and what stands for them: %r",
+        rospy.resolve_name(PARAMETER), places,
+    )  # fmt: skip
+    return {}
 
 
-def _imported(place: str) -> Factory:
-    """Returns what `module:name` stands for."""
-    module, _, name = place.partition(":")
+def _imported(place: object) -> Factory:
+    """Returns what `module:name` stands for; the module is imported only if its source has that."""
+    module, _, name = str(place).partition(":")
+    if not defines(module, name, _may_make_plugins):
+        file = find_file(module)
+        raise ImportError(
+            f"{module} (of {file}) has no function or class {name}" if file
+            else f"there is no Python source of a module {module}"
+        )  # fmt: skip
     factory: Factory = getattr(importlib.import_module(module), name)
     if not callable(factory):
         raise TypeError(f"{place} can't be called")
     return factory
+
+
+def _may_make_plugins(definition: Definition) -> bool:
+    """A function, a class, or what is called or looked up to get one, such as functools.partial(...)."""
+    return isinstance(
+        definition, (ast.FunctionDef, ast.ClassDef, ast.Lambda, ast.Call, ast.Attribute)
+    )

@@ -7,6 +7,7 @@ from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 
 from robot_envs.backends.bring_up import STEP_SERVICE
 from robot_envs.backends.joint_states import read_state
+from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.ros_variation import RosVariation
 from robot_envs.backends.service import ServiceClient
 from robot_envs.errors import SimulatorError
@@ -28,6 +29,7 @@ class LockstepRobot(Generic[State]):
 
     def __init__(self, robot: Robot[State], ticks: int) -> None:
         self._robot = robot
+        self._simulator = OwnSimulator()
         self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True)
         self._begin = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=list(robot.joints))
         self._advance = StepWorldRequest(ticks=ticks, controllers=list(robot.commanded))
@@ -49,10 +51,11 @@ class LockstepRobot(Generic[State]):
         return self._call(self._advance)
 
     def _call(self, request: genpy.Message) -> State:
-        answer = self._step(request)
-        if not answer.success:
-            raise SimulatorError(f"{STEP_SERVICE}: {answer.status_message}")
-        return read_state(self._robot, answer.joint_states)
+        with self._simulator:
+            answer = self._step(request)
+            if not answer.success:
+                raise SimulatorError(f"{STEP_SERVICE}: {answer.status_message}")
+            return read_state(self._robot, answer.joint_states)
 
     def vary(self, variation: Variation) -> None:
         """See `RobotBackend.vary`."""

@@ -7,7 +7,8 @@ import rosgraph
 import rospy
 
 from robot_envs.errors import RobotEnvError
-from ros_calls import master, xmlrpc
+from ros_calls import master
+from ros_calls.nodes import living_address
 from ros_calls.xmlrpc import NoAnswer, Refused
 
 
@@ -84,13 +85,11 @@ def refuse_twin(name: str) -> None:
     Raises:
         RobotEnvError: if there is one, or the master doesn't answer.
     """
-    address = _ask_master("lookupNode", name)
-    if address is None:
-        return
     try:
-        xmlrpc.call(address, "getPid")
-    except (NoAnswer, Refused):  # registered by one that died
-        return
+        if living_address(name) is None:
+            return
+    except NoAnswer as error:
+        raise RobotEnvError(f"the ROS master at {master.uri()}: {error}") from error
     raise RobotEnvError(
         f"a node {name} runs at {master.uri()} already; end it, or set "
         "ROS_MASTER_URI to a free port to run beside it"

@@ -12,6 +12,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Empty
 
 from robot_envs.backends.joint_states import read_state
+from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.ros_variation import RosVariation
 from robot_envs.backends.service import ServiceClient
 from robot_envs.errors import SimulatorError
@@ -108,6 +109,7 @@ class RealtimeRobot(Generic[State]):
     def __init__(self, robot: Robot[State], control_period: float | None = None) -> None:
         self._robot = robot
         self._period = control_period
+        self._simulator = OwnSimulator()
         self._variation = RosVariation(robot)
         self._reset = _Resetter(robot)
         self._pause = ServiceClient("/gazebo/pause_physics", Empty)
@@ -132,11 +134,12 @@ class RealtimeRobot(Generic[State]):
         Waits for the joint state that the reset publishes. A simulator that is silent while
         paused is believed to have done what it said.
         """
-        for topic in self._topics:
-            topic.wait()
         positions = state[::2]
-        self._pause()
-        self._reset(positions)
+        with self._simulator:
+            for topic in self._topics:
+                topic.wait()
+            self._pause()
+            self._reset(positions)
         self._wait_for(positions)
         return self._robot.state_of(number for place in positions for number in (place, 0.0))
 
@@ -157,13 +160,14 @@ class RealtimeRobot(Generic[State]):
         Raises:
             SimulatorError: if joint states stop coming or the simulator doesn't answer.
         """
-        self._unpause()
-        with self._arrived:
-            due = self._due()
-        for topic, value in zip(self._topics, command, strict=True):
-            topic.publish(value)
-        with self._arrived:
-            return read_state(self._robot, self._wait_until(due))
+        with self._simulator:
+            self._unpause()
+            with self._arrived:
+                due = self._due()
+            for topic, value in zip(self._topics, command, strict=True):
+                topic.publish(value)
+            with self._arrived:
+                return read_state(self._robot, self._wait_until(due))
 
     def _wait_until(self, due: float | None) -> JointState:
         """A long control period takes its time, as long as joint states come."""

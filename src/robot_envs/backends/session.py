@@ -11,6 +11,7 @@ import rospy
 from robot_envs.backends import bring_up, node
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.bring_up import STEP_SERVICE, Say, Undo
+from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot, State
 from ros_utils import ros_gazebo
@@ -77,8 +78,9 @@ class RosSession(Generic[State]):
         self._check_mode()
         changes = bring_up.bring_up(self._robot, say, self._height)
         if not own_simulator:  # one of ours ends with all that is in it
+            simulator = OwnSimulator()
             for undo in changes:
-                self._undo.callback(_at_living_simulator, undo)
+                self._undo.callback(_at_living_simulator, simulator, undo)
         _started().append(self)
         self._undo.callback(_started().remove, self)
 
@@ -149,10 +151,10 @@ class RosSession(Generic[State]):
         self._undo.close()
 
 
-def _at_living_simulator(undo: Undo) -> None:
-    """Cleans up at a simulator that may have died meanwhile."""
+def _at_living_simulator(simulator: OwnSimulator, undo: Undo) -> None:
+    """Cleans up at a simulator that may have died meanwhile, or made place for another one."""
     with contextlib.suppress(RobotEnvError, rospy.ServiceException, rospy.ROSException, OSError):
-        if bring_up.simulator_answers():
+        if simulator.is_there() and bring_up.simulator_answers():
             undo()
 
 

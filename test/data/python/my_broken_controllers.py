@@ -1,1 +1,10 @@
+"""A module that has a controller, and a fault at import."""
+
+from bullet_gazebo.control.controllers.base import Controller
+
+
+class Any(Controller):
+    type_name = "my_broken_controllers/Any"
+
+
 raise RuntimeError("it has a fault at import")

@@ -3,6 +3,8 @@
 import logging
 import threading
 import time
+import traceback
+from http.client import HTTPException
 
 import rosgraph
 import rospy
@@ -46,15 +48,19 @@ class ControlPlugin:
     def shutdown(self) -> None:
         self._gone.set()
         with self._lock:
-            if self._services is not None:
-                self._services.shutdown()
-            if self._emergency_stop is not None:
-                self._emergency_stop.unregister()
-            for pid in self._pids:
-                pid.shutdown()
-            if self._robot is not None:
-                with self._sim.lock:
-                    self._sim.remove_robot(self._robot)
+            self._close()
+
+    def _close(self) -> None:
+        """Takes away what there is."""
+        if self._services is not None:
+            self._services.shutdown()
+        if self._emergency_stop is not None:
+            self._emergency_stop.unregister()
+        for pid in self._pids:
+            pid.shutdown()
+        if self._robot is not None:
+            with self._sim.lock:
+                self._sim.remove_robot(self._robot)
 
     def _wait_and_start(self) -> None:
         """Gazebo blocks the whole world for this; here only this model waits."""
@@ -72,18 +78,23 @@ class ControlPlugin:
 
     def _try_start(self) -> bool:
         """Returns False while there is no robot description; a broken one is reported, once."""
-        text = find_param(self._namespace, self._parameter())
+        try:
+            text = find_param(self._namespace, self._parameter())
+        except (OSError, HTTPException):  # no master; it may come back
+            return False
         if not text:
             return False
         with self._lock:
             if not self._gone.is_set():
                 try:
                     self._start(str(text))
-                except ControlError as error:
+                except Exception as error:  # noqa: BLE001 - this robot is without control, all others go on
+                    self._close()
+                    known = isinstance(error, ControlError)
                     rospy.logfatal(
                         "gazebo_ros_control of model '%s' can't start: %s",
                         self._context.model.name,
-                        error,
+                        error if known else "".join(traceback.format_exception(error)),
                     )
         return True
 
@@ -107,20 +118,14 @@ class ControlPlugin:
                 _tell,
             )
         self._services = self._offer(manager)
-        self._pids = [
-            PidPorts(
-                self._sim,
-                self._thinner,
-                pid,
-                rospy.names.ns_join(self._namespace, place),
-                manager.loops_changed,
-            )  # fmt: skip
-            for place, pid in hardware.pids.items()
-        ]
+        for place, pid in hardware.pids.items():
+            full = rospy.names.ns_join(self._namespace, place)
+            ports = PidPorts(self._sim, self._thinner, pid, full, manager.loops_changed)
+            self._pids.append(ports)
         with self._sim.lock:
             self._sim.add_robot(robot)
-        self._listen_to_emergency_stop(robot)
         self._robot = robot  # shutdown() waits for us, and takes it away before the model goes
+        self._listen_to_emergency_stop(robot)
         rospy.loginfo("Loaded gazebo_ros_control for model '%s'.", self._context.model.name)
 
     def _control_period(self) -> float:

@@ -13,7 +13,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from bullet_gazebo.control.controllers.base import Controller, Input, Output
 from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryController
-from bullet_gazebo.control.errors import FAULTS, ControlError
+from bullet_gazebo.control.errors import ControlError, faults
 from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.ros.control.pid_ports import PidPorts
 from bullet_gazebo.ros.control.trajectory_conversions import to_controller_state
@@ -107,7 +107,7 @@ class ControllerPorts:
                     port.receive(command)
             except ControlError as error:
                 rospy.logerr_throttle(REPEAT, f"{topic}: {error}")
-            except FAULTS as error:  # a user's code: the message is lost, the topic goes on
+            except faults() as error:  # a user's code: the message is lost, the topic goes on
                 text = "".join(traceback.format_exception(error))
                 rospy.logerr_throttle(
                     REPEAT, f"{topic}: a message is lost, its reader raised:\n{text}"

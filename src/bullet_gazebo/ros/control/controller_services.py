@@ -3,6 +3,7 @@
 import threading
 import traceback
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any
 
 import rosgraph
@@ -26,7 +27,7 @@ from controller_manager_msgs.srv import (
 )
 
 from bullet_gazebo.control.controllers.base import Controller
-from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.errors import ControlError, faults
 from bullet_gazebo.control.manager import ControllerInfo, ControllerManager
 from bullet_gazebo.control.user_types import find_type
 from bullet_gazebo.ros.control.controller_ports import ControllerPorts
@@ -50,14 +51,16 @@ class ControllerServices:
         self._one_at_a_time = threading.Lock()
         self._gone = False
         manager.on_fault = _report_fault
-        self._services = [
-            self._advertise("list_controllers", ListControllers, self._list),
-            self._advertise("list_controller_types", ListControllerTypes, self._list_types),
-            self._advertise("load_controller", LoadController, self._load),
-            self._advertise("unload_controller", UnloadController, self._unload),
-            self._advertise("switch_controller", SwitchController, self._switch),
-            self._advertise("reload_controller_libraries", ReloadControllerLibraries, self._reload),
-        ]
+        self._services: list[rospy.Service] = []
+        with ExitStack() as opened:  # if one can't be offered, those before it are taken away
+            opened.callback(self.shutdown)
+            self._advertise("list_controllers", ListControllers, self._list)
+            self._advertise("list_controller_types", ListControllerTypes, self._list_types)
+            self._advertise("load_controller", LoadController, self._load)
+            self._advertise("unload_controller", UnloadController, self._unload)
+            self._advertise("switch_controller", SwitchController, self._switch)
+            self._advertise("reload_controller_libraries", ReloadControllerLibraries, self._reload)
+            opened.pop_all()
 
     def shutdown(self) -> None:
         """Takes the services and all controllers' topics away."""
@@ -67,7 +70,7 @@ class ControllerServices:
             self._gone = True
             self._close_all()
 
-    def _advertise(self, name: str, kind: type, handler: Callable[[Any], object]) -> rospy.Service:
+    def _advertise(self, name: str, kind: type, handler: Callable[[Any], object]) -> None:
         def handle(request: object) -> object:
             with self._one_at_a_time:
                 if self._gone:  # rospy keeps persistent connections to a service that is shut down
@@ -75,7 +78,7 @@ class ControllerServices:
                 return handler(request)
 
         full = rospy.names.ns_join(self._namespace, f"controller_manager/{name}")
-        return rospy.Service(full, kind, handle)
+        self._services.append(rospy.Service(full, kind, handle))
 
     def _list(self, request: ListControllersRequest) -> ListControllersResponse:
         with self._sim.lock:
@@ -113,7 +116,7 @@ class ControllerServices:
             return ControllerPorts(
                 self._sim, self._thinner, self._manager, controller, self._namespace
             )
-        except (rospy.ROSException, KeyError, TypeError, ValueError) as error:
+        except faults() as error:  # it may have raised where it was asked for its topics
             with self._sim.lock:
                 self._manager.unload(controller.name)
             raise ControlError(f"the topics of '{controller.name}': {error!r}") from error

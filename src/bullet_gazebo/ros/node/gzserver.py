@@ -2,8 +2,6 @@
 
 import argparse
 import sys
-import threading
-import traceback
 from collections.abc import Callable
 from functools import partial
 
@@ -17,25 +15,34 @@ from bullet_gazebo.ros.control.control_plugin import FILENAME as CONTROL_PLUGIN
 from bullet_gazebo.ros.control.control_plugin import ControlPlugin
 from bullet_gazebo.ros.node.joint_state_plugin import FILENAME as JOINT_STATE_PLUGIN
 from bullet_gazebo.ros.node.joint_state_plugin import JointStatePlugin
+from bullet_gazebo.ros.node.one_world import NameLoss, NameTaken, full_name, refuse_twin
 from bullet_gazebo.ros.node.server_args import parse_args
 from bullet_gazebo.ros.node.state_topics import advertise_states
+from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.node.world_control import WorldControl
 from bullet_gazebo.ros.node.world_loader import fill_world, load_plugins, read_world
 from bullet_gazebo.ros.plugins import PluginRegistry
 from bullet_gazebo.ros.services.spawn_services import SpawnServices
 from bullet_gazebo.ros.services.step_service import StepService
 from bullet_gazebo.ros.services.world_services import advertise_world_services
-from bullet_gazebo.ros.wire.rospy_patches import greet_clients_apart, hang_up_on_nonsense
+from bullet_gazebo.ros.wire.rospy_patches import (
+    Reception,
+    bound_calls,
+    bound_messages,
+    hang_up_on_nonsense,
+)
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
-from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
+from bullet_gazebo.ros.wire.signals import SignalHandler, end_within, init_node, wait_for_master
 from bullet_gazebo.ros.wire.thinning import Thinner
 from bullet_gazebo.simulator import Simulator
 
-STOP_TIMEOUT = 5.0  # [s]
+NAME = "gazebo"
+MOST_FREQUENT = 1e9  # [Hz]; time is counted in nanoseconds
+EXIT_TIMEOUT = 10.0  # [s] for what plugins may have left to be done at the end
 
 
 class GazeboNode:
-    """The simulator, its thread, and all that it offers to ROS."""
+    """The simulator, the thread that moves it, and all that it offers to ROS."""
 
     def __init__(
         self, args: argparse.Namespace, engine: Engine, interrupted: Callable[[], bool]
@@ -43,18 +50,18 @@ class GazeboNode:
         if not rospy.has_param("/use_sim_time"):
             rospy.set_param("/use_sim_time", True)
         world = World(engine)
-        relatch = rospy.get_param("~relatch_on_reset", True)
-        self.sim = Simulator(world, lockstep=args.lockstep, relatch=bool(relatch))
+        self.sim = Simulator(world, lockstep=args.lockstep, relatch=_flag("~relatch_on_reset"))
+        self._watchdog = Watchdog(self.sim)
         fill_world(self.sim, read_world(args.world, interrupted), interrupted)
         if args.paused:
             self.sim.pause()
-        self._advertise(bool(rospy.get_param("~enable_ros_network", True)))
-        self._thread = threading.Thread(target=self._simulate, name="simulation")
-        self._fault = False
+        self._advertise(_flag("~enable_ros_network"))
 
     def _advertise(self, network: bool) -> None:
-        WorldControl(self.sim).offer()
-        greet_clients_apart()
+        WorldControl(self.sim, self._watchdog).offer()
+        bound_messages()
+        bound_calls()
+        Reception.open()
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
@@ -69,7 +76,7 @@ class GazeboNode:
         if not network:
             return
         # Clients take the world for ready once it can be paused, so the step service comes first.
-        stepping = [StepService(self.sim)] if self.sim.lockstep else []
+        stepping = [StepService(self.sim, self._watchdog)] if self.sim.lockstep else []
         self._services = [
             *stepping,
             SpawnServices(self.sim, plugins),
@@ -79,41 +86,50 @@ class GazeboNode:
     def run(self, signals: SignalHandler) -> int:
         """Simulates until the node is shut down; returns the exit code."""
         # Called before the topics close, so that no tick publishes to a closed one.
-        rospy.on_shutdown(self._stop)
-        self._thread.start()
-        signals.wait()
-        self._stop()  # a shutdown that came before the hook was there doesn't call it
-        return 1 if self._fault else 0
+        rospy.on_shutdown(self._watchdog.stop)
+        self._watchdog.start()
+        signals.wait(self._watchdog.barks)
+        failed = self._watchdog.barks()
+        self._watchdog.stop()  # a shutdown that came before the hook was there doesn't call it
+        return 1 if failed else 0
 
-    def _simulate(self) -> None:
-        """A world whose time silently stands still is worse than one that ends: a fault ends the node."""
-        try:
-            self.sim.run()
-        except Exception:  # noqa: BLE001 - the end of a thread
-            self._fault = True
-            rospy.logfatal("The simulation failed:\n%s", traceback.format_exc())
-            rospy.signal_shutdown("the simulation failed")
 
-    def _stop(self) -> None:
-        self.sim.stop()
-        if threading.current_thread() is not self._thread:
-            self._thread.join(STOP_TIMEOUT)
+def _flag(name: str) -> bool:
+    """Returns a parameter that is true unless it says false; what is neither is a warning, as in Gazebo."""
+    value = rospy.get_param(name, True)
+    if isinstance(value, bool):
+        return value
+    rospy.logwarn("%s is %r, neither true nor false: true is used", name, value)
+    return True
 
 
 def _clock_frequency() -> float:
-    """Returns ~pub_clock_frequency [Hz of simulated time]; 0 is every tick, and what is no number too."""
+    """Returns ~pub_clock_frequency [Hz of simulated time]; 0 is every tick, and what can't be one too."""
     value = rospy.get_param("~pub_clock_frequency", 0)
-    if isinstance(value, (int, float)):
+    # A period of less than a nanosecond, or of more than a thousand years, is a mistake.
+    if isinstance(value, (int, float)) and (
+        value == 0 or 1.0 / MOST_FREQUENT <= value <= MOST_FREQUENT
+    ):
         return float(value)
-    rospy.logwarn("~pub_clock_frequency is %r, not a number: /clock comes with every tick", value)
+    rospy.logwarn("~pub_clock_frequency is %r, no frequency: /clock comes with every tick", value)
     return 0.0
 
 
 def main(argv: list[str] | None = None) -> int:
     """Runs the node; returns its exit code."""
     use_one_arena()
-    args = parse_args(rospy.myargv(argv)[1:])
-    init_node("gazebo", sys.argv if argv is None else argv, anonymous=False)
+    command_line = sys.argv if argv is None else argv
+    args = parse_args(rospy.myargv(command_line)[1:])
+    name = full_name(command_line, NAME)
+    try:
+        wait_for_master(NAME)
+        if not args.replace:
+            refuse_twin(name)
+    except NameTaken as error:
+        print(f"gzserver: {error}", file=sys.stderr)
+        return 1
+    init_node(NAME, command_line, anonymous=False)
+    loss = NameLoss()
     # Not before: while there is no master, a signal ends the process as such.
     signals = SignalHandler()
     if args.physics not in ENGINES:
@@ -126,4 +142,9 @@ def main(argv: list[str] | None = None) -> int:
     except EngineError as error:
         rospy.logfatal("%s", error)
         return 1
-    return GazeboNode(args, engine, signals.noted).run(signals)
+    code = GazeboNode(args, engine, signals.noted).run(signals)
+    if loss.happened:
+        print(f"gzserver: {loss.text(name)}", file=sys.stderr)
+        code = code or 1
+    end_within(EXIT_TIMEOUT, code)
+    return code

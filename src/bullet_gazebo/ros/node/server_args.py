@@ -25,7 +25,7 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     """Reads the options, in any order; arguments of the form a:=b are ROS's and may stand anywhere.
 
     Returns:
-        world, paused, physics, lockstep, seed, and `ignored`: what isn't known.
+        world, paused, physics, lockstep, replace, seed, and `ignored`: what isn't known.
     """
     parser = argparse.ArgumentParser(
         prog="gzserver",
@@ -40,6 +40,9 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("-o", "--profile", nargs="?", help="accepted, without effect")
     parser.add_argument("--lockstep", action="store_true", help="time moves only by ~step_world")
+    parser.add_argument(
+        "--replace", action="store_true", help="end a simulator that has this one's name already"
+    )
     parser.add_argument("--seed", type=int, help="of Python's and NumPy's random numbers")
     for names, values in INERT.items():
         kind = {"nargs": values} if values else {"action": "store_const", "const": True}

@@ -62,7 +62,7 @@ class ClockTopic(ThinnedTopic):
     """/clock: on every tick, or at a frequency."""
 
     def __init__(self, sim: Simulator, thinner: Thinner, frequency: float) -> None:
-        """`frequency` [Hz of simulated time] is ~pub_clock_frequency; 0 means every tick."""
+        """`frequency` [Hz of simulated time, up to 1e9] is ~pub_clock_frequency; 0 means every tick."""
         super().__init__(thinner, self._publish_time)
         self._publisher = rospy.Publisher("/clock", Clock, queue_size=QUEUE, tcp_nodelay=True)
         self._period = round(1e9 / frequency) if frequency > 0 else 0

@@ -6,22 +6,23 @@ through its node's name, from any machine, and neither a topic nor a service, of
 must be the only ones (docs/contract/gazebo.md 7).
 """
 
-import traceback
-
-import rospy
+from contextlib import AbstractContextManager
 
 from bullet_gazebo.ros.clients.world_client import CHUNK, METHOD
 from bullet_gazebo.ros.wire.rospy_patches import answer_xmlrpc
 from bullet_gazebo.simulator import Simulator
 
 Answer = tuple[int, str, int]
+LONGEST = 80  # of an unknown command that is told back
 
 
 class WorldControl:
     """The side of the simulator; the clients' is world_client.py."""
 
-    def __init__(self, sim: Simulator) -> None:
+    def __init__(self, sim: Simulator, watchdog: AbstractContextManager[object]) -> None:
+        """A fault in a block of `watchdog` ends the node."""
         self._sim = sim
+        self._watchdog = watchdog
         self._commands = {
             "pause": sim.pause,
             "unpause": sim.unpause,
@@ -34,23 +35,34 @@ class WorldControl:
         """Has this process's node answer."""
         answer_xmlrpc(METHOD, self.answer)
 
-    def answer(self, command: str, count: int = 1) -> Answer:
-        """Carries out a command, and answers in ROS's way: code (1 is success), text, ticks done."""
+    def answer(self, *arguments: object) -> Answer:
+        """Carries out a command, and answers in ROS's way: code (1 is success), text, ticks done.
+
+        Args:
+            arguments: the command; for "step" also the number of ticks, 1 by default. XML-RPC has no
+                signatures: any number of arguments may come, of any of its types.
+        """
+        if not 1 <= len(arguments) <= 2:
+            return _refused(
+                f"{len(arguments)} arguments: a command, and for step a number of steps"
+            )
+        command, count = (*arguments, 1)[:2]
+        # A bool is an int in Python, and no number here.
+        if not isinstance(command, str) or type(count) is not int:
+            kinds = " and ".join(type(each).__name__ for each in arguments)
+            return _refused(f"{kinds}: a command is a string, a number of steps an integer")
         if command == "step":
             if not 1 <= count <= CHUNK:
-                return -1, f"{count} steps: 1 to {CHUNK} can be done in one call", 0
-            return self._step(count)
+                return _refused(f"{count} steps: 1 to {CHUNK} can be done in one call")
+            with self._watchdog:
+                self._sim.step(count)
+            return 1, "step", count
         if command not in self._commands:
-            return -1, f"unknown command '{command}'", 0
-        self._commands[command]()
+            return _refused(f"unknown command {command[:LONGEST]!a}")
+        with self._watchdog:
+            self._commands[command]()
         return 1, command, 0
 
-    def _step(self, count: int) -> Answer:
-        """A fault ends the node, as it does in the simulation's own thread."""
-        try:
-            self._sim.step(count)
-        except Exception:  # noqa: BLE001 - whatever it is, the world is not what it should be
-            rospy.logfatal("The simulation failed:\n%s", traceback.format_exc())
-            rospy.signal_shutdown("the simulation failed")
-            return 0, "the simulation failed; its log says why", 0
-        return 1, "step", count
+
+def _refused(reason: str) -> Answer:
+    return -1, reason, 0

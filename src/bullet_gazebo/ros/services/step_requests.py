@@ -7,7 +7,7 @@ import rospy
 from bullet_gazebo_msgs.srv import StepWorldRequest
 
 from bullet_gazebo.control.controllers.base import Controller, Input
-from bullet_gazebo.control.errors import FAULTS, ControlError
+from bullet_gazebo.control.errors import ControlError, faults
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import RUNNING
 from bullet_gazebo.physics.model import Model
@@ -177,7 +177,7 @@ def _sending(port: Input, value: float | Sequence[float]) -> Callable[[], None]:
     def send() -> None:
         try:
             port.receive(value)
-        except FAULTS as error:
+        except faults() as error:
             raise ControlError(f"the reader of '{port.topic}' raised {error!r}") from error
 
     return send

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 
 import rospy
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
@@ -20,8 +21,10 @@ SLICE = 500  # ticks between which other services get their turn
 class StepService:
     """One call: reset, commands, exactly n ticks, state; in lock-step only (bullet_gazebo_msgs/StepWorld)."""
 
-    def __init__(self, sim: Simulator) -> None:
+    def __init__(self, sim: Simulator, watchdog: AbstractContextManager[object]) -> None:
+        """A fault in a block of `watchdog` ends the node."""
         self._sim = sim
+        self._watchdog = watchdog
         self._one_at_a_time = threading.Lock()  # nobody else's ticks within a request's
         self._service = rospy.Service("~step_world", StepWorld, self._step)
 
@@ -33,7 +36,8 @@ class StepService:
                 self._begin(request, plan)  # what is left to fail is a user's controller
             except ControlError as error:
                 return self._answer(request, f"StepWorld: {error}")
-            self._advance(request.ticks, plan.held)
+            with self._watchdog:
+                self._advance(request.ticks, plan.held)
             return self._answer(request)
 
     def _begin(self, request: StepWorldRequest, plan: StepPlan) -> None:

@@ -3,7 +3,10 @@
 Each function below is one patch, for the simulator's own node and for its process only. All were seen to be
 needed with rospy 1.15.15 (Debian 12), and are held by the test that is named.
 
-- `greet_clients_apart`: a client that says nothing keeps all others out (gazebo_clients.test)
+- `Reception`: a client that says nothing keeps all others out; any number of them, or no file descriptor
+  left, ends the thread that answers them (gazebo_clients.test, test_connections.py)
+- `bound_messages`: whatever size a client claims is read into memory (test_connections.py)
+- `bound_calls`: the same for XML-RPC, where clients that say nothing keep a thread each for ever (the same)
 - `hang_up_on_nonsense`: a client whose request can't be read waits for ever (gazebo_clients.test)
 - `answer_xmlrpc`: a node can't answer one XML-RPC call more (gazebo_ros.test, `gz`)
 - `stop_hearing_clock`: who makes /clock hears it over a socket to itself (gazebo_parameters.test)
@@ -14,7 +17,13 @@ Classes that merely override a method stand where they are used: `SteadyActionSe
 `DynamicServer` (dynamic_reconfigure), and `model_services.py`'s response without a header.
 """
 
+import contextlib
+import errno
+import io
+import os
+import resource
 import socket
+import struct
 import threading
 import time
 from collections.abc import Callable
@@ -24,28 +33,175 @@ import genpy
 import rospy
 import rospy.impl.simtime
 import rospy.impl.tcpros_base
-from rospy.exceptions import TransportException
+from rosgraph.network import ROSHandshakeException, decode_ros_handshake_header
+from rosgraph.xmlrpc import SilenceableXMLRPCRequestHandler, ThreadingXMLRPCServer
+from rospy.exceptions import TransportException, TransportTerminated
 from rospy.impl.masterslave import ROSHandler
-from rospy.impl.tcpros_base import TCPROSTransport
+from rospy.impl.tcpros_base import TCPROSTransport, TCPROSTransportProtocol
 from rospy.impl.tcpros_pubsub import QueuedConnection
 from rospy.impl.tcpros_service import ServiceImpl
 
+Address = tuple[str, int]
+LENGTH = struct.Struct("<I")  # in front of all that ROS sends
+LARGEST_HEADER = 2**18  # [bytes]; the text of a message's definition is the longest part
+LARGEST_MESSAGE = 2**26  # [bytes]; of a request, or of what comes on a topic
+LARGEST_CALL = 2**24  # [bytes]; of an XML-RPC call
+SILENCE = 30.0  # [s] that a client may say nothing in the midst of a header
+IDLE = 300.0  # [s] the same in an XML-RPC call, and between two: clients keep connections, and renew them
+MOST_STRANGERS = 64  # connections whose header hasn't come yet
+EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
+RECOVERY = 0.1  # [s] until the next try
+REPEAT = 1.0  # [s]; how often the same complaint is logged
+CROWDED = "three quarters of the file descriptors that this process may have are in use"
 
-def greet_clients_apart() -> None:
-    """Has each new connection's header read in a thread of its own; for an initialised node.
+
+class Reception:
+    """Reads each new connection's header in a thread of its own; for an initialised node.
 
     rospy reads it in the thread that accepts connections. A client that connects and is then stopped, or
     hangs, keeps everybody else out of all the node's services and topics for as long as it lives.
+
+    No more than MOST_STRANGERS connections wait for their header: another one pushes the oldest out. And
+    none is taken where few file descriptors are left, for the node needs some to go on.
     """
-    server = rospy.impl.tcpros_base._tcpros_server.tcp_ros_server
-    handle = server.inbound_handler
 
-    def greet(client: socket.socket, address: tuple[str, int]) -> None:
-        threading.Thread(
-            target=handle, args=(client, address), name="greeting", daemon=True
-        ).start()
+    def __init__(self, handle: Callable[[socket.socket, Address], None]) -> None:
+        """`handle` reads the header, and hands the connection to a topic or service."""
+        self._handle = handle
+        self._strangers: dict[socket.socket, None] = {}  # in the order in which they came
+        self._guard = threading.Lock()
 
-    server.inbound_handler = greet
+    @classmethod
+    def open(cls) -> None:
+        """Receives the clients of this process's node."""
+        server = rospy.impl.tcpros_base._tcpros_server.tcp_ros_server
+        server.inbound_handler = cls(server.inbound_handler).greet
+        server.server_sock = _Listener(server.server_sock)
+
+    def greet(self, client: socket.socket, address: Address) -> None:
+        """Takes a new connection, and returns at once."""
+        if _crowded():
+            client.close()
+            rospy.logwarn_throttle(REPEAT, f"{CROWDED}; a client of {address[0]} is turned away")
+            return
+        with self._guard:
+            self._strangers[client] = None
+            oldest = next(iter(self._strangers)) if len(self._strangers) > MOST_STRANGERS else None
+        if oldest is not None:
+            _hang_up(oldest)
+        try:
+            threading.Thread(
+                target=self._listen, args=(client, address), name="greeting", daemon=True
+            ).start()
+        except RuntimeError as error:  # no thread is left
+            self._forget(client)
+            client.close()
+            rospy.logwarn_throttle(REPEAT, f"a client of {address[0]} is turned away: {error}")
+
+    def _listen(self, client: socket.socket, address: Address) -> None:
+        client.setsockopt(
+            socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1
+        )  # for one whose machine is gone
+        client.settimeout(SILENCE)  # until rospy, which has read the header then, takes it back
+        try:
+            self._handle(client, address)
+        finally:
+            self._forget(client)
+
+    def _forget(self, client: socket.socket) -> None:
+        with self._guard:
+            self._strangers.pop(client, None)
+
+
+class _Listener:
+    """A listening socket for rospy's loop, which ends at any error but a timeout, and lets five wait."""
+
+    def __init__(self, listener: socket.socket) -> None:
+        self._listener = listener
+        listener.listen(MOST_STRANGERS)  # others try again after a second, and after three
+
+    def accept(self) -> tuple[socket.socket, Address]:
+        try:
+            return self._listener.accept()
+        except OSError as error:
+            if error.errno not in EXHAUSTED:
+                raise
+            time.sleep(RECOVERY)
+            raise TimeoutError(str(error)) from error
+
+    def close(self) -> None:
+        self._listener.close()
+
+
+def _crowded() -> bool:
+    """Whether three quarters of the file descriptors that this process may have are in use."""
+    most, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return len(os.listdir("/proc/self/fd")) > most * 3 // 4
+
+
+def _hang_up(client: socket.socket) -> None:
+    with contextlib.suppress(OSError):  # it is gone already
+        client.shutdown(socket.SHUT_RDWR)
+
+
+def bound_messages() -> None:
+    """Reads no more of a client's header, request or message than it may have; for this process.
+
+    rospy reads as many bytes as the first four say, up to 4 GB. It copies a header as a whole with each
+    part that comes, and what it had in memory at the same time the process keeps.
+    """
+    read = TCPROSTransportProtocol.read_messages
+
+    def read_messages(
+        protocol: TCPROSTransportProtocol, buffer: io.BytesIO, queue: list[Any], sock: socket.socket
+    ) -> None:
+        (size,) = LENGTH.unpack(bytes(buffer.getbuffer()[: LENGTH.size]))
+        if size > LARGEST_MESSAGE:
+            what = f"{size} bytes for {protocol.resolved_name} are more than {LARGEST_MESSAGE}"
+            rospy.logwarn_throttle(REPEAT, f"{what}: the connection is closed")
+            raise TransportTerminated(what)
+        read(protocol, buffer, queue, sock)
+
+    TCPROSTransportProtocol.read_messages = read_messages
+    rospy.impl.tcpros_base.read_ros_handshake_header = _read_header
+
+
+def _read_header(sock: socket.socket, _buffer: io.BytesIO, _part: int) -> dict[str, str]:
+    """As rosgraph's, but it reads the header and nothing behind it."""
+    (size,) = LENGTH.unpack(_receive(sock, LENGTH.size))
+    if size > LARGEST_HEADER:
+        raise ROSHandshakeException(f"a header of {size} bytes is too long")
+    header: dict[str, str] = decode_ros_handshake_header(LENGTH.pack(size) + _receive(sock, size))
+    return header
+
+
+def _receive(sock: socket.socket, size: int) -> bytes:
+    whole = bytearray()
+    while len(whole) < size:
+        part = sock.recv(size - len(whole))
+        if not part:
+            raise ROSHandshakeException(
+                f"the connection ended after {len(whole)} bytes of a header"
+            )
+        whole += part
+    return bytes(whole)
+
+
+def bound_calls() -> None:
+    """Bounds size, silence and number of XML-RPC calls; for this process."""
+    post = SilenceableXMLRPCRequestHandler.do_POST
+
+    def do_post(handler: SilenceableXMLRPCRequestHandler) -> None:
+        size = handler.headers.get("content-length", "")
+        if not (size.isascii() and size.isdigit() and len(size) < 12 and int(size) <= LARGEST_CALL):
+            handler.close_connection = True
+            handler.send_error(413, f"a call has a length, of at most {LARGEST_CALL} bytes")
+            return
+        post(handler)
+
+    SilenceableXMLRPCRequestHandler.do_POST = do_post
+    SilenceableXMLRPCRequestHandler.timeout = IDLE
+    ThreadingXMLRPCServer.verify_request = lambda server, request, address: not _crowded()
 
 
 def hang_up_on_nonsense() -> None:
@@ -73,11 +229,12 @@ def answer_xmlrpc(method: str, answer: Callable[..., tuple[int, str, Any]]) -> N
 
     Args:
         method: the call's name.
-        answer: called with what follows the caller's name; returns code (1 is success), text, value.
+        answer: called with what follows the caller's name, whatever it is; returns code (1 is success),
+            text, value.
     """
 
-    def handle(_handler: ROSHandler, _caller: str, *args: Any) -> tuple[int, str, Any]:
-        return answer(*args)
+    def handle(_handler: ROSHandler, *args: Any) -> tuple[int, str, Any]:
+        return answer(*args[1:])  # the first one is the caller's name
 
     setattr(ROSHandler, method, handle)
 

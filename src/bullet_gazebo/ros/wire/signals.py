@@ -5,10 +5,12 @@ it advertises a service it holds a lock that the shutdown needs too, and the pro
 """
 
 import math
+import os
 import queue
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from types import FrameType
@@ -43,14 +45,17 @@ class SignalHandler:
         """Returns whether a signal has come that nobody has waited for yet; for long work before `wait`."""
         return not self._news.empty()
 
-    def wait(self) -> bool:
+    def wait(self, over: Callable[[], bool] = lambda: False) -> bool:
         """Returns once a signal came, or the node was shut down otherwise, and the node is down.
+
+        Args:
+            over: asked again and again; where it says so the node is shut down, too.
 
         Returns:
             False if it was the work of `run` that came to its end.
         """
         reason = "shut down"
-        while not rospy.is_shutdown():
+        while not rospy.is_shutdown() and not over():
             try:
                 reason = self._news.get(timeout=POLL)
                 break
@@ -91,10 +96,29 @@ class SignalHandler:
             return interrupted
 
 
-def init_node(name: str, command_line: Sequence[str], anonymous: bool = True) -> None:
-    """Initialises a node without rospy's handlers, once there is a master.
+def end_within(bound: float, code: int) -> None:
+    """Has the process end with that exit code, whatever may be left in it that waits for ever.
 
-    rospy itself would wait for the master as well, but in a way that can't be interrupted.
+    Python itself waits for threads, and calls what was registered for its end.
+
+    Args:
+        bound: [s]
+    """
+
+    def insist() -> None:
+        time.sleep(bound)
+        sys.stderr.write(f"ended after {bound:g} s: something in this process doesn't end\n")
+        sys.stderr.flush()
+        os._exit(code)
+
+    threading.Thread(target=insist, name="insist on the end", daemon=True).start()
+
+
+def wait_for_master(name: str) -> None:
+    """Waits until there is a master, which rospy itself does in a way that can't be interrupted.
+
+    Args:
+        name: of the node that waits, for its message.
 
     Raises:
         rospy.ROSInterruptException: a signal came while there was none.
@@ -106,4 +130,13 @@ def init_node(name: str, command_line: Sequence[str], anonymous: bool = True) ->
             flush=True,
         )
         wait_until(master.is_up, math.inf, "a master")
+
+
+def init_node(name: str, command_line: Sequence[str], anonymous: bool = True) -> None:
+    """Initialises a node without rospy's handlers, once there is a master.
+
+    Raises:
+        rospy.ROSInterruptException: a signal came while there was none.
+    """
+    wait_for_master(name)
     rospy.init_node(name, anonymous=anonymous, argv=list(command_line), disable_signals=True)

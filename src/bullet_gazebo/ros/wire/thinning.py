@@ -5,6 +5,7 @@ A subscriber follows some thousand messages a second. In real time each message 
 
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +15,7 @@ from bullet_gazebo.simulator import Simulator
 
 PERIOD = 0.001  # [s of wall time] between two messages of a thinned topic
 STOP_TIMEOUT = 1.0  # [s]
+REPEAT = 1.0  # [s]; how often the same complaint is logged
 
 
 class ThinnedTopic:
@@ -102,7 +104,14 @@ class Thinner:
             with self._guard:
                 waiting, self._waiting = self._waiting, set()
             for topic in waiting:
-                topic.flush()
+                self._flush(topic)
+
+    def _flush(self, topic: ThinnedTopic) -> None:
+        try:
+            topic.flush()
+        except Exception:  # noqa: BLE001 - whatever one topic's message has: the others go on
+            if not rospy.is_shutdown():
+                rospy.logerr_throttle(REPEAT, f"a message is lost:\n{traceback.format_exc()}")
 
     def _stop(self) -> None:
         self._ending.set()

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""respawn_gazebo and server_required of empty_world.launch, with a simulator that is killed."""
+"""Arguments of empty_world.launch that show when the simulator ends, fails, or meets another one."""
 
 import os
 import signal
@@ -14,6 +14,11 @@ import rosgraph
 import rostest
 
 BOUND = 40.0  # [s]
+SERVER = ("rosrun", "gazebo_ros", "gzserver")
+SPAWN = ("rosrun", "gazebo_ros", "spawn_model", "-urdf", "-param", "/box", "-model", "box")
+BOX = """<robot name="box"><link name="body"><inertial><mass value="1"/>
+<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+<gazebo><plugin name="breaks" filename="libbreaks.so"/></gazebo></robot>"""
 
 
 def free_port():
@@ -28,7 +33,8 @@ class World:
     def __init__(self, *args):
         self.log = tempfile.TemporaryFile()  # noqa: SIM115 - close() does
         port = free_port()
-        self._master = rosgraph.Master("/launch_arguments", f"http://localhost:{port}")
+        self.uri = f"http://localhost:{port}"
+        self._master = rosgraph.Master("/launch_arguments", self.uri)
         command = [
             "roslaunch",
             "-p",
@@ -38,8 +44,22 @@ class World:
             "gui:=false",
             *args,
         ]
-        env = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}"}
-        self.launch = subprocess.Popen(command, env=env, stdout=self.log, stderr=self.log)
+        self.env = {**os.environ, "ROS_MASTER_URI": self.uri, "PYTHONUNBUFFERED": "1"}
+        self.launch = subprocess.Popen(command, env=self.env, stdout=self.log, stderr=self.log)
+
+    def start(self, *command):
+        """Starts another program under its master."""
+        return subprocess.Popen(
+            command, env=self.env, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        )
+
+    def said(self):
+        """What the launch has printed."""
+        self.log.seek(0)
+        return self.log.read().decode()
+
+    def set_param(self, name, value):
+        self._master.setParam(name, value)
 
     def simulator(self, unlike=None):
         """Process id of the simulator once it is up, and another one than `unlike`."""
@@ -83,6 +103,38 @@ class LaunchArgumentsTest(unittest.TestCase):
         world = self.world("server_required:=true")
         os.kill(world.simulator(), signal.SIGKILL)
         world.launch.wait(BOUND)
+
+    def test_a_world_that_fails_says_so_and_ends_the_launch(self):
+        world = self.world("server_required:=true")
+        world.simulator()
+        world.set_param("/gazebo/plugins", {"libbreaks.so": "my_plugins:BreaksTheWorld"})
+        world.set_param("/box", BOX)
+        spawn = world.start(*SPAWN)
+        world.launch.wait(BOUND)
+        spawn.communicate(timeout=BOUND)
+        self.assertIn("The simulation failed, so the node ends", world.said())
+        self.assertIn("SystemExit: out of a tick", world.said())
+        self.assertIn("exit code 1", world.said())
+
+    def test_a_second_simulator_is_refused_while_the_first_lives_unless_it_shall_replace_it(self):
+        world = self.world()
+        first = world.simulator()
+        second = world.start(*SERVER)
+        said, _ = second.communicate(timeout=BOUND)
+        self.assertEqual(second.returncode, 1)
+        self.assertEqual(len(said.splitlines()), 1, said)
+        self.assertIn(f"/gazebo runs at {world.uri} already", said)
+        self.assertIn("ROS_MASTER_URI=http://localhost:", said)
+        self.assertEqual(world.simulator(), first)
+        third = world.start(*SERVER, "--replace")
+        self.assertNotEqual(world.simulator(unlike=first), first)
+        os.kill(third.pid, signal.SIGTERM)
+        self.assertEqual(third.wait(BOUND), 0)
+        world.launch.send_signal(signal.SIGINT)
+        world.launch.wait(BOUND)
+        self.assertIn("another node has taken the name /gazebo", world.said())
+        self.assertNotIn("Traceback", world.said() + third.stdout.read())
+        third.stdout.close()
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 """The controller manager's table of cases (docs/contract/ros_control.md 1.3 to 1.7)."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import pytest
 from robots import cartpole_urdf
 
@@ -191,7 +193,9 @@ def faults(manager):
     return told
 
 
-@pytest.mark.parametrize("error", [ZeroDivisionError, SystemExit])
+@pytest.mark.parametrize(
+    "error", [ZeroDivisionError, SystemExit, GeneratorExit, KeyboardInterrupt, BaseException]
+)
 @pytest.mark.parametrize("where", ["update", "joints_moved"])
 def test_a_controller_that_raises_is_stopped_once_and_the_others_go_on(
     manager, faults, where, error, monkeypatch
@@ -200,14 +204,30 @@ def test_a_controller_that_raises_is_stopped_once_and_the_others_go_on(
     faulty = manager.load("faulty", {"type": "test/Faulty", "where": where})
     manager.switch(["faulty", "cart"], [], STRICT)
     manager.get("cart").command(0.5)
-    for now in (1, 2):
-        manager.update(now, 0.001)
-        manager.joints_moved(now, relatch=False)
+
+    def run():
+        for now in (1, 2):
+            manager.update(now, 0.001)
+            manager.joints_moved(now, relatch=False)
+
+    with ThreadPoolExecutor(1) as simulation:  # Ctrl-C raises nothing there
+        simulation.submit(run).result()
     assert faults == [("faulty", where)]
     assert faulty.calls[-1] == "stopping"
     assert states(manager)["faulty"] == "stopped"
     assert states(manager)["cart"] == "running"
     assert manager.hardware.joints["stand_cart"].command != 0.0
+
+
+def test_a_ctrl_c_that_comes_while_a_controller_is_updated_is_no_fault_of_its(
+    manager, faults, monkeypatch
+):
+    monkeypatch.setattr(Faulty, "error", KeyboardInterrupt)
+    manager.load("faulty", {"type": "test/Faulty", "where": "update"})
+    manager.switch(["faulty"], [], STRICT)
+    with pytest.raises(KeyboardInterrupt):
+        manager.update(1, 0.001)
+    assert states(manager)["faulty"] == "running" and not faults
 
 
 def test_a_controller_that_raises_at_its_start_is_refused_and_the_others_start(manager, faults):
@@ -229,6 +249,24 @@ def test_a_controller_that_raises_at_its_stop_is_stopped_all_the_same(manager, f
 def test_a_controller_that_raises_while_it_is_made_is_refused_with_the_reason(manager, faults):
     with pytest.raises(ControlError, match="Initializing controller 'faulty' failed: KeyError"):
         manager.load("faulty", {"type": "test/Faulty", "where": "create"})
+    assert "faulty" not in states(manager)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [({"name": "cart"}, "calls itself 'cart'"), ({"interface": 3}, "lacks `interface`")],
+)
+def test_a_controller_that_could_not_be_listed_is_refused(
+    manager, faults, change, text, monkeypatch
+):
+    def create(name, params, hardware):
+        made = Faulty(name, "")
+        vars(made).update(change)
+        return made
+
+    monkeypatch.setattr(Faulty, "create", create)
+    with pytest.raises(ControlError, match=text):
+        manager.load("faulty", {"type": "test/Faulty"})
     assert "faulty" not in states(manager)
 
 

@@ -1,5 +1,6 @@
 """step_world as a function: random numbers, groups, joints of every interface, several robots, refusals."""
 
+import contextlib
 import random
 from functools import lru_cache
 
@@ -37,7 +38,7 @@ class Slides:
         self.sim = Simulator(World(make_engine()), lockstep=True)
         self._urdf = slides(root)
         self._params = yaml.safe_load((root / "test/data/robots/slides.yaml").read_text())
-        self.service = StepService(self.sim)
+        self.service = StepService(self.sim, contextlib.nullcontext())
 
     def add(self, name, *controllers):
         model = self.sim.world.spawn(name, parse_urdf(self._urdf), Pose())

@@ -88,6 +88,24 @@ def test_a_closed_topic_publishes_nothing(thinner):
     assert reader.got in ([1], [1, 2])
 
 
+def test_a_topic_whose_message_can_not_be_sent_silences_no_other(thinner, monkeypatch):
+    told = threading.Event()
+    monkeypatch.setattr(thinning.rospy, "logerr_throttle", lambda period, text: told.set())
+
+    def fail(sample):
+        raise OverflowError("no number for a message")
+
+    bad = ThinnedTopic(thinner, fail)
+    bad._kept = 1
+    thinner.remember(bad)
+    assert told.wait(BOUND)
+    reader = Reader()
+    good = ThinnedTopic(thinner, reader)
+    for sample in range(1000):
+        good.send(sample)
+    assert reader.wait_for(999)
+
+
 class LateThinner:
     """Never comes round, as on a machine that has no time for its thread."""
 

@@ -1,0 +1,145 @@
+"""A user's plugin that misbehaves anywhere: the world goes on, and no model is left half there."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+import rospy
+
+from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import World
+from bullet_gazebo.ros.plugins import PluginRegistry
+from bullet_gazebo.simulator import Simulator
+
+BOX = """<robot name="box"><link name="body"><inertial><mass value="1"/>
+<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>{plugins}</robot>"""
+PLUGIN = '<gazebo><plugin name="{0}" filename="lib{0}.so"/></gazebo>'
+# Kinds of misbehaviour, in the places where a plugin's code is called.
+RAISED = ("SystemExit", "KeyboardInterrupt", "GeneratorExit", "ValueError", "BaseException")
+MODULE = """
+seen = []
+
+class Rude:
+    def __init__(self, context):
+        context.on_update(self.update)
+        self.misbehave("constructor")
+    def update(self, now):
+        seen.append("update")
+        self.misbehave("update")
+    def shutdown(self):
+        seen.append("shutdown")
+        self.misbehave("shutdown")
+    def misbehave(self, here):
+        if here == "{place}":
+            raise {error}("on purpose")
+
+if "{place}" == "import":
+    raise {error}("on purpose")
+"""
+GOOD = """
+seen = []
+class Good:
+    def __init__(self, context): context.on_update(seen.append)
+    def shutdown(self): seen.append("shutdown")
+"""
+
+
+class Setting:
+    """A simulator in lock-step with plugins of a user's."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self._folder = folder
+        monkeypatch.syspath_prepend(folder)
+        self.places: object = {}
+        self.errors: list[str] = []
+        monkeypatch.setattr(rospy, "get_param", lambda name, default: self.places)
+        for level in ("logerr", "logwarn"):
+            monkeypatch.setattr(rospy, level, lambda text, *args: self.errors.append(text % args))
+        self.sim = Simulator(World(make_engine()), lockstep=True)
+        self.plugins = PluginRegistry(self.sim, {})
+        self.modules: list[str] = []
+
+    def write(self, name: str, text: str) -> None:
+        (self._folder / f"{name}.py").write_text(text)
+        self.modules.append(name)
+
+    def spawn(self, *plugins: str):
+        text = BOX.format(plugins="".join(map(PLUGIN.format, plugins)))
+        model = self.sim.world.spawn("box", parse_urdf(text), Pose())
+        self.plugins.load(model, "")
+        return model
+
+    def step(self) -> None:
+        with self.sim.lock:
+            self.sim.advance(3)
+
+    def delete(self, model) -> None:
+        self.plugins.unload(model)
+        with self.sim.lock:
+            self.sim.delete_model(model)
+
+
+@pytest.fixture
+def setting(tmp_path, monkeypatch):
+    made = Setting(tmp_path, monkeypatch)
+    yield made
+    made.sim.world.close()
+    for name in made.modules:
+        sys.modules.pop(name, None)
+
+
+@pytest.mark.parametrize("error", RAISED)
+@pytest.mark.parametrize("place", ["import", "constructor", "update", "shutdown"])
+def test_whatever_a_plugin_raises_the_others_and_the_world_go_on(setting, place, error) -> None:
+    rude, good = f"rude_{place}_{error.lower()}", f"good_{place}_{error.lower()}"
+    setting.write(rude, MODULE.format(place=place, error=error))
+    setting.write(good, GOOD)
+    setting.places = {"librude.so": f"{rude}:Rude", "libgood.so": f"{good}:Good"}
+    model = setting.spawn("rude", "good")
+    setting.step()
+    setting.step()
+    setting.delete(model)
+    assert setting.sim.now == 6_000_000
+    assert sys.modules[good].seen == [*range(1_000_000, 7_000_000, 1_000_000), "shutdown"]
+    assert len(setting.errors) == 1
+    assert error in setting.errors[0] and "librude.so" in setting.errors[0]
+    assert setting.sim.listeners == [] and not setting.sim.world.models
+    if place == "update":
+        assert sys.modules[rude].seen == ["update", "shutdown"]
+
+
+@pytest.mark.parametrize("place", ["this:X", "this:s", "builtins:eval", "antigravity:fly",
+                                   "os:system", "this", "", ":", "a b:c", None, 3, ["this", "X"], {"this": "X"}])  # fmt: skip
+def test_what_has_no_function_or_class_of_that_name_is_not_imported(setting, place) -> None:
+    for name in ("this", "antigravity"):
+        sys.modules.pop(name, None)
+    setting.places = {"librude.so": place}
+    setting.delete(setting.spawn("rude"))
+    assert not {"this", "antigravity"} & set(sys.modules)
+
+
+@pytest.mark.parametrize("places", [[], "libgood.so", 3, True])
+def test_a_parameter_that_is_no_table_is_a_warning(setting, places) -> None:
+    setting.places = places
+    setting.delete(setting.spawn("good"))
+    assert any("no table" in each for each in setting.errors)
+
+
+def test_a_function_that_is_made_by_a_call_is_a_plugin_too(setting) -> None:
+    setting.write("partly", "import functools\nmade = []\nMake = functools.partial(made.append)")
+    setting.places = {"libgood.so": "partly:Make"}
+    setting.delete(setting.spawn("good"))
+    assert len(sys.modules["partly"].made) == 1 and not setting.errors
+
+
+def test_a_master_that_is_away_leaves_no_model_half_there(setting, monkeypatch) -> None:
+    def away(name: str, default: object) -> object:
+        raise ConnectionRefusedError("no master")
+
+    monkeypatch.setattr(rospy, "get_param", away)
+    setting.delete(setting.spawn("good"))
+    assert "no master" in setting.errors[0]

@@ -1,0 +1,83 @@
+"""An environment that loses its simulator says what became of it."""
+
+import socket
+
+import pytest
+import rospy
+from ros_fakes import FakeMaster
+
+from robot_envs.backends.own_simulator import OwnSimulator
+from robot_envs.errors import SimulatorError, SimulatorHangs
+
+
+@pytest.fixture
+def master(monkeypatch):
+    fake = FakeMaster()
+    monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
+    monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
+    fake.nodes["/gazebo"] = fake.uri
+    yield fake
+    fake.close()
+
+
+@pytest.fixture
+def another():
+    fake = FakeMaster()
+    yield fake.uri
+    fake.close()
+
+
+def fail(simulator, error):
+    with simulator:
+        raise error
+
+
+def test_one_that_is_there_changes_no_error(master) -> None:
+    own = OwnSimulator()
+    assert own.is_there()
+    for error in (
+        SimulatorHangs("no answer"),
+        SimulatorError("refused"),
+        rospy.ROSException("x"),
+        KeyError(),
+    ):
+        with pytest.raises(type(error)) as raised:
+            fail(own, error)
+        assert raised.value is error
+
+
+def test_one_that_ended_changes_no_error(master) -> None:
+    own = OwnSimulator()
+    with socket.socket() as reserved:  # bound only: connections are refused
+        reserved.bind(("127.0.0.1", 0))
+        for address in (
+            master.nodes.pop("/gazebo"),
+            f"http://127.0.0.1:{reserved.getsockname()[1]}",
+        ):
+            if address != master.uri:
+                master.nodes["/gazebo"] = address
+            assert not own.is_there()
+            with pytest.raises(SimulatorError, match="^it broke$"):
+                fail(own, SimulatorError("it broke"))
+
+
+def test_another_one_in_its_place_is_told(master, another) -> None:
+    own = OwnSimulator()
+    master.nodes["/gazebo"] = another
+    assert not own.is_there()
+    with pytest.raises(
+        SimulatorError, match="another one runs as /gazebo .* ROS_MASTER_URI .*model does not"
+    ):
+        fail(own, SimulatorError("model does not exist"))
+
+
+@pytest.mark.parametrize(
+    "error", [rospy.ROSException("publish() to a closed topic"), SimulatorError("x")]
+)
+def test_so_is_the_end_of_ones_own_node(master, monkeypatch, error) -> None:
+    own = OwnSimulator()
+    monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
+    with pytest.raises(
+        SimulatorError, match="this process's ROS node .* was shut down from outside"
+    ):
+        fail(own, error)
