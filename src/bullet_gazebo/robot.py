@@ -56,7 +56,9 @@ class ControlledRobot:
         self._drives = [(drive, indices[drive.joint.name]) for drive in hardware.drives]
         self._efforts = [0.0] * len(indices)
         moved = {drive.joint.name for drive, _ in self._drives if drive.pid is None}
+        # What a motor drives is as fast as its command.
         self._watched = [index for name, index in indices.items() if name not in moved]
+        self._others = [index for name, index in indices.items() if name not in hardware.joints]
         self._watch = StabilityWatch(model, hardware, manager, tell)
         self.review_gains()
         manager.on_change = self.review_gains
@@ -70,16 +72,20 @@ class ControlledRobot:
         self._watch.review(self._control_period / NANOSECONDS)
 
     def read(self) -> None:
-        """Copies positions and velocities from the engine, once it is sure that nothing has blown up."""
+        """Copies positions and velocities from the engine, and sees to it that nothing has blown up."""
         states, slow, fast = self.model.body.joint_states(), self._slow, self._fast
-        for index in self._watched:
-            if not slow < states[index][1] < fast:
-                states = self._contain(states)
-                break
+        calm = True
         for joint, index in self._joints:
             state = states[index]
             joint.position = state[0]
-            joint.velocity = state[1]
+            joint.velocity = speed = state[1]
+            if not slow < speed < fast:
+                calm = False
+        for index in self._others:
+            if not slow < states[index][1] < fast:
+                calm = False
+        if not calm:
+            self._contain(states)
 
     def update(self, now: int, dt: float) -> None:
         """Reads, and updates the controllers if it is their turn; `now` [ns], `dt` [s] is the step."""
@@ -89,15 +95,17 @@ class ControlledRobot:
         else:
             self.manager.update(now, dt)
 
-    def _contain(self, states: JointStates) -> JointStates:
-        """Energy from nowhere is taken out, where ODE's solver loses it by itself; returns the new state."""
+    def _contain(self, states: JointStates) -> None:
+        """Takes energy from nowhere out, as ODE's solver loses it, and takes the new state over."""
         names = self.model.joint_names
         blown = [names[index] for index in self._watched if not abs(states[index][1]) < self._fast]
         self._watch.blown_up(blown, self._fast)
         # What shakes brakes itself in the next step, if there is something to brake: at rest it would be
         # pushed the same way for ever.
         self.model.calm({name: 0.5 if name in self._watch.shaking else 0.0 for name in blown})
-        return self.model.body.joint_states()
+        states = self.model.body.joint_states()
+        for joint, index in self._joints:
+            joint.position, joint.velocity = states[index][:2]
 
     def _update_in_time(self, now: int, step: int) -> None:
         """The control period is a whole number of steps, and always the nominal one."""
