@@ -212,7 +212,9 @@ def _check_made(controller: object, name: str, hardware: RobotHardware) -> None:
     if not isinstance(controller, Controller):
         raise ControlError(f"create() returned {controller!r}, which is no controller")
     if controller.name != name:
-        raise ControlError(f"it calls itself {controller.name!r}: __init__ must get create()'s name")
+        raise ControlError(
+            f"it calls itself {controller.name!r}: __init__ must get create()'s name"
+        )
     if not isinstance(getattr(controller, "interface", None), str):
         raise ControlError("its class lacks `interface`, the name of a hardware interface")
     claimed = controller.claimed

@@ -105,7 +105,8 @@ def test_catkins_devel_space_stands_for_the_source_folder(source, tmp_path) -> N
 
 
 @pytest.mark.parametrize(
-    "module", ["builtins", "sys", "math", "__main__", "__hello__", "no_such_module", "a.b.c", "", ".", "os."]
+    "module",
+    ["builtins", "sys", "math", "__main__", "__hello__", "no_such_module", "a.b.c", "", ".", "os."],
 )
 def test_what_has_no_source_defines_nothing(module) -> None:
     assert not defines(module, "exit", is_anything)

@@ -35,7 +35,12 @@ def fail(simulator, error):
 def test_one_that_is_there_changes_no_error(master) -> None:
     own = OwnSimulator()
     assert own.is_there()
-    for error in (SimulatorHangs("no answer"), SimulatorError("refused"), rospy.ROSException("x"), KeyError()):
+    for error in (
+        SimulatorHangs("no answer"),
+        SimulatorError("refused"),
+        rospy.ROSException("x"),
+        KeyError(),
+    ):
         with pytest.raises(type(error)) as raised:
             fail(own, error)
         assert raised.value is error
@@ -45,7 +50,10 @@ def test_one_that_ended_changes_no_error(master) -> None:
     own = OwnSimulator()
     with socket.socket() as reserved:  # bound only: connections are refused
         reserved.bind(("127.0.0.1", 0))
-        for address in (master.nodes.pop("/gazebo"), f"http://127.0.0.1:{reserved.getsockname()[1]}"):
+        for address in (
+            master.nodes.pop("/gazebo"),
+            f"http://127.0.0.1:{reserved.getsockname()[1]}",
+        ):
             if address != master.uri:
                 master.nodes["/gazebo"] = address
             assert not own.is_there()
@@ -57,13 +65,19 @@ def test_another_one_in_its_place_is_told(master, another) -> None:
     own = OwnSimulator()
     master.nodes["/gazebo"] = another
     assert not own.is_there()
-    with pytest.raises(SimulatorError, match="another one runs as /gazebo .* ROS_MASTER_URI .*model does not"):
+    with pytest.raises(
+        SimulatorError, match="another one runs as /gazebo .* ROS_MASTER_URI .*model does not"
+    ):
         fail(own, SimulatorError("model does not exist"))
 
 
-@pytest.mark.parametrize("error", [rospy.ROSException("publish() to a closed topic"), SimulatorError("x")])
+@pytest.mark.parametrize(
+    "error", [rospy.ROSException("publish() to a closed topic"), SimulatorError("x")]
+)
 def test_so_is_the_end_of_ones_own_node(master, monkeypatch, error) -> None:
     own = OwnSimulator()
     monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
-    with pytest.raises(SimulatorError, match="this process's ROS node .* was shut down from outside"):
+    with pytest.raises(
+        SimulatorError, match="this process's ROS node .* was shut down from outside"
+    ):
         fail(own, error)

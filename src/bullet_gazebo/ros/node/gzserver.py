@@ -106,7 +106,9 @@ def _clock_frequency() -> float:
     """Returns ~pub_clock_frequency [Hz of simulated time]; 0 is every tick, and what can't be one too."""
     value = rospy.get_param("~pub_clock_frequency", 0)
     # A period of less than a nanosecond, or of more than a thousand years, is a mistake.
-    if isinstance(value, (int, float)) and (value == 0 or 1.0 / MOST_FREQUENT <= value <= MOST_FREQUENT):
+    if isinstance(value, (int, float)) and (
+        value == 0 or 1.0 / MOST_FREQUENT <= value <= MOST_FREQUENT
+    ):
         return float(value)
     rospy.logwarn("~pub_clock_frequency is %r, no frequency: /clock comes with every tick", value)
     return 0.0

@@ -6,7 +6,7 @@ needed with rospy 1.15.15 (Debian 12), and are held by the test that is named.
 - `Reception`: a client that says nothing keeps all others out; any number of them, or no file descriptor
   left, ends the thread that answers them (gazebo_clients.test, test_connections.py)
 - `bound_messages`: whatever size a client claims is read into memory (test_connections.py)
-- `bound_calls`: the same for XML-RPC, and clients that say nothing there keep a thread each for ever (the same)
+- `bound_calls`: the same for XML-RPC; clients that say nothing there keep a thread each for ever (the same)
 - `hang_up_on_nonsense`: a client whose request can't be read waits for ever (gazebo_clients.test)
 - `answer_xmlrpc`: a node can't answer one XML-RPC call more (gazebo_ros.test, `gz`)
 - `stop_hearing_clock`: who makes /clock hears it over a socket to itself (gazebo_parameters.test)
@@ -99,7 +99,9 @@ class Reception:
             rospy.logwarn_throttle(REPEAT, f"a client of {address[0]} is turned away: {error}")
 
     def _listen(self, client: socket.socket, address: Address) -> None:
-        client.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)  # for one whose machine is gone
+        client.setsockopt(
+            socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1
+        )  # for one whose machine is gone
         client.settimeout(SILENCE)  # until rospy, which has read the header then, takes it back
         try:
             self._handle(client, address)
@@ -112,11 +114,11 @@ class Reception:
 
 
 class _Listener:
-    """A listening socket for rospy's loop, which ends at any error but a timeout, and lets five clients wait."""
+    """A listening socket for rospy's loop, which ends at any error but a timeout."""
 
     def __init__(self, listener: socket.socket) -> None:
         self._listener = listener
-        listener.listen(MOST_STRANGERS)  # others try again after a second, and after three
+        listener.listen(MOST_STRANGERS)  # rospy lets five wait; others try again after seconds
 
     def accept(self) -> tuple[socket.socket, Address]:
         try:
@@ -178,7 +180,9 @@ def _receive(sock: socket.socket, size: int) -> bytes:
     while len(whole) < size:
         part = sock.recv(size - len(whole))
         if not part:
-            raise ROSHandshakeException(f"the connection ended after {len(whole)} bytes of a header")
+            raise ROSHandshakeException(
+                f"the connection ended after {len(whole)} bytes of a header"
+            )
         whole += part
     return bytes(whole)
 

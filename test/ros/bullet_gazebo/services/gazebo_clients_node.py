@@ -65,7 +65,9 @@ def send_nonsense(seed, opened):
 
 def memory():
     """Resident memory of the simulator [MiB]."""
-    with xmlrpc.client.ServerProxy(rosgraph.Master("/gazebo_clients").lookupNode("/gazebo")) as node:
+    with xmlrpc.client.ServerProxy(
+        rosgraph.Master("/gazebo_clients").lookupNode("/gazebo")
+    ) as node:
         pid = node.getPid("/gazebo_clients")[2]
     with open(f"/proc/{pid}/statm", encoding="ascii") as statm:
         return int(statm.read().split()[1]) * resource.getpagesize() / 2**20

@@ -219,7 +219,9 @@ def test_a_controller_that_raises_is_stopped_once_and_the_others_go_on(
     assert manager.hardware.joints["stand_cart"].command != 0.0
 
 
-def test_a_ctrl_c_that_comes_while_a_controller_is_updated_is_no_fault_of_its(manager, faults, monkeypatch):
+def test_a_ctrl_c_that_comes_while_a_controller_is_updated_is_no_fault_of_its(
+    manager, faults, monkeypatch
+):
     monkeypatch.setattr(Faulty, "error", KeyboardInterrupt)
     manager.load("faulty", {"type": "test/Faulty", "where": "update"})
     manager.switch(["faulty"], [], STRICT)
@@ -251,9 +253,12 @@ def test_a_controller_that_raises_while_it_is_made_is_refused_with_the_reason(ma
 
 
 @pytest.mark.parametrize(
-    ("change", "text"), [({"name": "cart"}, "calls itself 'cart'"), ({"interface": 3}, "lacks `interface`")]
+    ("change", "text"),
+    [({"name": "cart"}, "calls itself 'cart'"), ({"interface": 3}, "lacks `interface`")],
 )
-def test_a_controller_that_could_not_be_listed_is_refused(manager, faults, change, text, monkeypatch):
+def test_a_controller_that_could_not_be_listed_is_refused(
+    manager, faults, change, text, monkeypatch
+):
     def create(name, params, hardware):
         made = Faulty(name, "")
         vars(made).update(change)

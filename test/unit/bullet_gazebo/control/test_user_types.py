@@ -59,7 +59,9 @@ def test_a_module_without_such_a_class_is_not_imported(kind) -> None:
 
 def test_nor_is_one_whose_class_of_that_name_is_no_controller_of_that_type(module) -> None:
     name = module("import sys\nsys.exit('run')\nclass Spring:\n    type_name = 'other/Spring'")
-    with pytest.raises(ControlError, match=f"no class Spring with the line type_name = '{name}/Spring'"):
+    with pytest.raises(
+        ControlError, match=f"no class Spring with the line type_name = '{name}/Spring'"
+    ):
         find_type(f"{name}/Spring")
     with pytest.raises(ControlError, match="does not exist"):
         find_type("unittest/TestCase")
@@ -67,14 +69,25 @@ def test_nor_is_one_whose_class_of_that_name_is_no_controller_of_that_type(modul
 
 @pytest.mark.parametrize(
     "kind",
-    ["builtins/eval", "sys/exit", "posix/system", "no_such_package/Controller", "a.b/C", "/", "x", "", "x/"],
+    [
+        "builtins/eval",
+        "sys/exit",
+        "posix/system",
+        "no_such_package/Controller",
+        "a.b/C",
+        "/",
+        "x",
+        "",
+        "x/",
+    ],
 )
 def test_what_is_no_module_with_a_source_is_an_unknown_type(kind) -> None:
     assert find_type(kind) is None
 
 
 @pytest.mark.parametrize(
-    "text", ["raise ValueError('x')", "raise SystemExit", "raise GeneratorExit", "import no_such_module"]
+    "text",
+    ["raise ValueError('x')", "raise SystemExit", "raise GeneratorExit", "import no_such_module"],
 )
 def test_whatever_an_import_raises_refuses_the_type(module, text) -> None:
     name = module(CONTROLLER + text)

@@ -45,7 +45,9 @@ def told(monkeypatch) -> list[str]:
     monkeypatch.setattr(TCPROSTransportProtocol, "read_messages", read)
     monkeypatch.setattr(handler, "do_POST", handler.do_POST)
     monkeypatch.setattr(handler, "timeout", None)
-    monkeypatch.setattr(ThreadingXMLRPCServer, "verify_request", lambda server, request, address: True)
+    monkeypatch.setattr(
+        ThreadingXMLRPCServer, "verify_request", lambda server, request, address: True
+    )
     return texts
 
 
@@ -113,7 +115,9 @@ def test_a_header_that_claims_to_be_long_is_not_waited_for(server, size) -> None
     assert server.greet() == b"/any"
 
 
-@pytest.mark.parametrize("garbage", [b"", b"\x01", b"\0\0\0\0", b"\x05\0\0\0abc", b"\x08\0\0\0\xff\xff\xff\xff1234"])
+@pytest.mark.parametrize(
+    "garbage", [b"", b"\x01", b"\0\0\0\0", b"\x05\0\0\0abc", b"\x08\0\0\0\xff\xff\xff\xff1234"]
+)
 def test_garbage_ends_its_own_connection_only(server, garbage) -> None:
     client = server.connect()
     client.sendall(garbage)
@@ -223,7 +227,9 @@ def call(address: tuple[str, int]) -> object:
         return proxy.len("four")
 
 
-@pytest.mark.parametrize("length", [str(LARGEST_CALL + 1), "-1", "1e3", "", "9" * 5000, "²", "+5", None])
+@pytest.mark.parametrize(
+    "length", [str(LARGEST_CALL + 1), "-1", "1e3", "", "9" * 5000, "²", "+5", None]
+)
 def test_a_call_of_a_length_that_can_not_be_is_refused(calls, length) -> None:
     with socket.create_connection(calls, BOUND) as client:
         header = f"Content-Length: {length}\r\n" if length is not None else ""

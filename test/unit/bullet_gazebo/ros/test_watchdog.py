@@ -48,7 +48,13 @@ def raises(error: BaseException):
 
 @pytest.mark.parametrize(
     "error",
-    [ZeroDivisionError("zero"), SystemExit("x"), SystemExit(), KeyboardInterrupt(), GeneratorExit()],
+    [
+        ZeroDivisionError("zero"),
+        SystemExit("x"),
+        SystemExit(),
+        KeyboardInterrupt(),
+        GeneratorExit(),
+    ],
     ids=repr,
 )
 def test_whatever_is_raised_in_the_thread_is_a_fault_and_told(error, told) -> None:
@@ -121,7 +127,9 @@ def test_it_may_be_stopped_before_it_was_started_and_from_its_own_thread() -> No
     watchdog.start()
     watchdog._thread.join(BOUND)
     assert not watchdog.barks()
-    own = Watchdog(FakeSimulator(lambda: own.stop()))
+    sim = FakeSimulator()
+    own = Watchdog(sim)
+    sim._run = own.stop
     own.start()
     own._thread.join(BOUND)
     assert not own.barks()
