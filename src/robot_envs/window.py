@@ -1,11 +1,10 @@
 """A window that shows a robot: PyBullet's own, at about the pace of real time."""
 
-import tempfile
 import time
-from pathlib import Path
 from typing import Generic
 
 from bullet_gazebo.physics.engines.bullet.library import pybullet
+from bullet_gazebo.scratch import scratch_folder
 from robot_envs.display import hindrance
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot, State
@@ -47,8 +46,8 @@ class Window(Generic[State]):
         pybullet.resetDebugVisualizerCamera(*camera, physicsClientId=self._client)
 
     def _load(self, urdf: str) -> int:
-        with tempfile.TemporaryDirectory(prefix="robot_envs_") as folder:
-            path = Path(folder, "robot.urdf")
+        with scratch_folder() as folder:
+            path = folder / "robot.urdf"
             path.write_text(urdf, encoding="utf-8")
             return int(pybullet.loadURDF(str(path), physicsClientId=self._client))
 

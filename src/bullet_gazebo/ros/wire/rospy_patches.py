@@ -6,7 +6,7 @@ needed with rospy 1.15.15 (Debian 12), and are held by the test that is named.
 - `Reception`: a client that says nothing keeps all others out; any number of them, or no file descriptor
   left, ends the thread that answers them (gazebo_clients.test, test_connections.py)
 - `bound_messages`: whatever size a client claims is read into memory (test_connections.py)
-- `bound_calls`: the same for XML-RPC, where clients that say nothing keep a thread each for ever (the same)
+- `bound_calls`: the same for XML-RPC; clients that say nothing there keep a thread each for ever (the same)
 - `hang_up_on_nonsense`: a client whose request can't be read waits for ever (gazebo_clients.test)
 - `answer_xmlrpc`: a node can't answer one XML-RPC call more (gazebo_ros.test, `gz`)
 - `stop_hearing_clock`: who makes /clock hears it over a socket to itself (gazebo_parameters.test)
@@ -114,11 +114,11 @@ class Reception:
 
 
 class _Listener:
-    """A listening socket for rospy's loop, which ends at any error but a timeout, and lets five wait."""
+    """A listening socket for rospy's loop, which ends at any error but a timeout."""
 
     def __init__(self, listener: socket.socket) -> None:
         self._listener = listener
-        listener.listen(MOST_STRANGERS)  # others try again after a second, and after three
+        listener.listen(MOST_STRANGERS)  # rospy lets five wait; others try again after seconds
 
     def accept(self) -> tuple[socket.socket, Address]:
         try:

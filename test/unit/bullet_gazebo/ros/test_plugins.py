@@ -112,9 +112,11 @@ def test_whatever_a_plugin_raises_the_others_and_the_world_go_on(setting, place,
         assert sys.modules[rude].seen == ["update", "shutdown"]
 
 
-@pytest.mark.parametrize("place", ["this:X", "this:s", "builtins:eval", "antigravity:fly",
-                                   "os:system", "this", "", ":", "a b:c", None, 3, ["this", "X"],
-                                   {"this": "X"}])  # fmt: skip
+@pytest.mark.parametrize(
+    "place",
+    ["this:X", "this:s", "builtins:eval", "antigravity:fly", "os:system", "this", "", ":", "a b:c", None, 3,
+     ["this", "X"], {"this": "X"}],
+)  # fmt: skip
 def test_what_has_no_function_or_class_of_that_name_is_not_imported(setting, place) -> None:
     for name in ("this", "antigravity"):
         sys.modules.pop(name, None)

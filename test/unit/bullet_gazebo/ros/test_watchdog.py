@@ -127,7 +127,9 @@ def test_it_may_be_stopped_before_it_was_started_and_from_its_own_thread() -> No
     watchdog.start()
     watchdog._thread.join(BOUND)
     assert not watchdog.barks()
-    own = Watchdog(FakeSimulator(lambda: own.stop()))  # noqa: PLW0108 - it isn't there yet
+    sim = FakeSimulator()
+    own = Watchdog(sim)
+    sim._run = own.stop
     own.start()
     own._thread.join(BOUND)
     assert not own.barks()

@@ -4,7 +4,6 @@ PyBullet frees most of what a body has taken only together with its world: about
 the files that the body was loaded from. So the world counts what removed bodies have left.
 """
 
-import tempfile
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,6 +15,7 @@ from bullet_gazebo.physics.engines.bullet.library import pybullet
 from bullet_gazebo.physics.engines.bullet.urdf_writer import write_urdf
 from bullet_gazebo.physics.mechanics.engine_form import at_joints, parents_first
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, scale
+from bullet_gazebo.scratch import scratch_folder
 
 MOST_ITERATIONS = 1000  # of the solver in a step; more would only hold the world
 PLANE = 1200  # [bytes] of a file, had it been loaded from one
@@ -78,10 +78,10 @@ class BulletClient:
             flags |= (
                 pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
             )
-        with tempfile.TemporaryDirectory(prefix="bullet_gazebo_") as folder:
-            path = Path(folder, "model.urdf")
-            path.write_text(write_urdf(parents_first(engine_form), Path(folder)), encoding="utf-8")
-            size = _size(Path(folder))
+        with scratch_folder() as folder:
+            path = folder / "model.urdf"
+            path.write_text(write_urdf(parents_first(engine_form), folder), encoding="utf-8")
+            size = _size(folder)
             try:
                 body = pybullet.loadURDF(
                     str(path), pose.position, pose.orientation, useFixedBase=description.fixed_base,
