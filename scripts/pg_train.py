@@ -5,6 +5,9 @@ import sys
 
 if __name__ == "__main__":
     try:
+        from ros_calls.requirements import ALL, require
+
+        require(ALL)
         from cartpole.pg_train import main
     except KeyboardInterrupt:  # Ctrl-C while it is still being read; main() sees to the rest
         sys.exit(130)

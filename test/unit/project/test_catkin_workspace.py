@@ -1,17 +1,25 @@
-"""The package builds in somebody's own catkin workspace, without ws, with Debian's Python."""
+"""The package in somebody's own catkin workspace: the commands of docs/catkin.md, as they stand."""
 
 from __future__ import annotations
 
 import os
+import re
+import shlex
 import shutil
-import site
+import signal
+import socket
 import subprocess
+import sysconfig
+from pathlib import Path
 
 import pytest
 
-CATKIN_MAKE = ["/usr/bin/catkin_make", "-DPYTHON_EXECUTABLE=/usr/bin/python3"]
 # Built once: the tests of a group run in one process.
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("catkin")]
+ROOT = Path(__file__).resolve().parents[3]
+PAGE = ROOT / "docs/catkin.md"
+NOT_FOR_CATKIN = {"ca-certificates", "catkin-lint", "procps", "shellcheck"}  # ws's own tools
+PACKAGES = sysconfig.get_path("purelib")
 MODULES = (
     "import bullet_gazebo_msgs.srv, cartpole.tasks, robot_envs.robot, rl_workbench.cli,"
     " gazebo_msgs.srv, ros_utils, bullet_gazebo.control,"
@@ -19,60 +27,188 @@ MODULES = (
 )
 
 
-def run(command, workspace, **environment):
-    """Run a command of a user who has installed PyPI's packages and sourced nothing."""
-    result = subprocess.run(
-        command,
-        check=False,
-        cwd=workspace,
-        env={"PATH": "/usr/bin:/bin", "HOME": str(workspace)} | environment,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert result.returncode == 0, f"{result.stdout[-3000:]}\n{result.stderr[-3000:]}"
-    return result
+def blocks() -> list[str]:
+    return re.findall(r"^```sh\n(.*?)^```$", PAGE.read_text(), re.MULTILINE | re.DOTALL)
+
+
+class Workspace:
+    """A user's home with a catkin workspace, and a master's port of its own."""
+
+    def __init__(self, home: Path) -> None:
+        self.home, self.path = home, home / "catkin_ws"
+        self.python = self.path / "venv/bin/python3"
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        self.environment = {
+            "PATH": "/usr/bin:/bin",
+            "HOME": str(home),
+            "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
+            "ROS_IP": "127.0.0.1",
+            "OMP_NUM_THREADS": "1",
+        } | {name: value for name, value in os.environ.items() if name.startswith("PIP_")}
+
+    def bash(self, script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            ["bash", "-ec", script, "bash", *arguments], check=False, cwd=self.home,
+            env=self.environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600,
+        )  # fmt: skip
+
+    def inside(self, *command: str, space: str = "devel") -> subprocess.CompletedProcess[str]:
+        # In a function of its own, because catkin's setup file looks at the caller's arguments.
+        enter = f"enter() {{ source {self.path}/{space}/setup.bash; }}; enter"
+        return self.bash(f'{enter}; exec "$@"', *command)
 
 
 @pytest.fixture(scope="module")
-def workspace(root, tmp_path_factory):
-    workspace = tmp_path_factory.mktemp("catkin_ws")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """Made by the commands of the page, but for Debian's packages, which are there.
+
+    The Python packages aren't fetched again: a .pth file shows those of this workspace's environment,
+    where pip finds them installed.
+    """
+    workspace = Workspace(tmp_path_factory.mktemp("home"))
+    sources = workspace.home / "repository"
     shutil.copytree(
-        root,
-        workspace / "src/cartpole",
-        ignore=shutil.ignore_patterns(".*", "__pycache__", "companions", "runs"),
+        ROOT, sources, ignore=shutil.ignore_patterns(".git", ".ws", "__pycache__", "runs")
     )
-    shutil.copytree(root / "companions", workspace / "src/companions")
-    result = run([*CATKIN_MAKE, "install"], workspace)
-    assert "CMake Warning" not in result.stderr, result.stderr
+    made = workspace.bash(
+        f"cd {sources}; git init -q; git add -A; git -c user.name=a -c user.email=a@example.com commit -qm a"
+    )
+    assert made.returncode == 0, made.stderr
+    script = "".join(blocks()[1:3]).replace("<this repository>", str(sources))
+    pip = "venv/bin/pip install"
+    assert pip in script
+    shown = f"echo {PACKAGES} > $(echo venv/lib/python3*/site-packages)/shown.pth\n"
+    built = workspace.bash(script.replace(pip, f"{shown}{pip}"))
+    assert built.returncode == 0, f"{built.stdout[-3000:]}\n{built.stderr[-3000:]}"
+    assert "CMake Warning" not in built.stderr, built.stderr
+    fetched = re.findall(
+        r"(\S+)-[0-9.]+", "".join(re.findall(r"(?m)^Successfully installed .*$", built.stdout))
+    )
+    assert set(fetched) <= {"setuptools"}, "it is every environment's own"
+    return workspace
+
+
+def test_the_page_names_all_of_debians_packages() -> None:
+    lines = (ROOT / "requirements/debian.txt").read_text().splitlines()
+    wanted = {line.split("#")[0].strip() for line in lines} - {""} - NOT_FOR_CATKIN
+    _, *named = re.sub(r"\\\n", " ", blocks()[0]).split("--no-install-recommends")[1].split()
+    assert {"build-essential", *named} == wanted
+
+
+def test_all_commands_of_the_page_are_run_here() -> None:
+    """The fixture has the second and third block, the test below the fourth."""
+    assert len(blocks()) == 4
+    assert [line.split()[0] for line in blocks()[3].splitlines()] == [
+        "source",
+        "rosrun",
+        "roslaunch",
+    ]
+
+
+def test_what_the_page_starts_then(workspace: Workspace) -> None:
+    source, rosrun, roslaunch = blocks()[3].splitlines()
+    trained = workspace.bash(f"{source}\n{rosrun}")
+    assert trained.returncode == 0, trained.stdout + trained.stderr
+    assert (workspace.home / "first/summary.json").is_file()
+
+    with subprocess.Popen(
+        ["bash", "-ec", f"{source}\nexec {roslaunch}"], cwd=workspace.home, env=workspace.environment,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    ) as launched:  # fmt: skip
+        try:
+            for _ in range(1000):  # each asks for some tenths of a second
+                asked = workspace.inside("rosservice", "call", "/gazebo/get_world_properties")
+                if "success: True" in asked.stdout or launched.poll() is not None:
+                    break
+        finally:
+            launched.send_signal(signal.SIGINT)
+            printed, _ = launched.communicate(timeout=120)
+    assert "success: True" in asked.stdout, printed
+
+
+@pytest.fixture(scope="module")
+def installed(workspace: Workspace) -> Workspace:
+    made = workspace.bash('cd "$1" && catkin_make install', str(workspace.path))
+    assert made.returncode == 0, made.stderr
     return workspace
 
 
 @pytest.mark.parametrize("space", ["devel", "install"])
-def test_built_workspace(workspace, space):
-    def inside(*command):
-        # In a function of its own, because catkin's setup file looks at the caller's arguments.
-        script = 'enter() { source "$1"; }; enter "$0/setup.bash"; PYTHONPATH+=:$PYPI; exec "$@"'
-        packages = os.pathsep.join(site.getsitepackages()[:1])
-        return run(["bash", "-c", script, space, *command], workspace, PYPI=packages)
-
-    assert "--episodes" in inside("rosrun", "cartpole", "pg_train.py", "--help").stdout
-    inside("/usr/bin/python3", "-c", MODULES)
+def test_built_workspace(installed: Workspace, space: str) -> None:
+    helped = installed.inside("rosrun", "cartpole", "pg_train.py", "--help", space=space)
+    assert "--episodes" in helped.stdout, helped.stderr
+    imported = installed.inside(str(installed.python), "-c", MODULES, space=space)
+    assert imported.returncode == 0, imported.stderr
     for package in ("cartpole", "cartpole_gazebo", "cartpole_controller", "gazebo_ros"):
-        found = inside("rospack", "find", package).stdout.strip()
-        expected = workspace / ("install/share" if space == "install" else "src")
+        found = installed.inside("rospack", "find", package, space=space).stdout.strip()
+        expected = installed.path / ("install/share" if space == "install" else "src")
         assert found.startswith(str(expected))
-    inside("roslaunch", "--files", "gazebo_ros", "empty_world.launch")
+    listed = installed.inside(
+        "roslaunch", "--files", "gazebo_ros", "empty_world.launch", space=space
+    )
+    assert listed.returncode == 0, listed.stderr
 
 
 @pytest.mark.parametrize("space", ["devel", "install"])
-def test_scripts_have_the_builds_interpreter(workspace, space):
-    folders = [*(workspace / space / "lib").glob("*"), workspace / space / "bin"]
+def test_scripts_have_the_builds_interpreter(installed: Workspace, space: str) -> None:
+    folders = [*(installed.path / space / "lib").glob("*"), installed.path / space / "bin"]
     found = [path for folder in folders for path in folder.glob("*")]
     scripts = [path for path in found if path.is_file() and os.access(path, os.X_OK)]
     ours = {"gz", "gzserver", "gzclient", "spawner", "unspawner"}
     ours |= {"controller_manager", "controller_group"}
     assert ours <= {each.name for each in scripts}
     for script in scripts:
-        assert script.read_text().startswith("#!/usr/bin/python3\n"), script
+        assert script.read_text().startswith(f"#!{installed.python}\n"), script
+
+
+@pytest.fixture
+def bare(installed: Workspace):
+    """The same workspace, for somebody who has left out pip's step."""
+    (shown,) = (installed.path / "venv").glob("lib/python3*/site-packages/shown.pth")
+    hidden = shown.rename(shown.with_suffix(".hidden"))
+    yield installed
+    hidden.rename(shown)
+
+
+@pytest.mark.parametrize("space", ["devel", "install"])
+@pytest.mark.parametrize(
+    ("package", "program", "missing"),
+    [
+        ("gazebo_ros", "gzserver", "collada, pybullet, scipy, trimesh, xacro"),
+        ("gazebo_ros", "gazebo", "pybullet"),
+        ("cartpole", "pg_train.py", "gymnasium, matplotlib, pygame, tensorboard, torch"),
+        ("cartpole", "dqn_train.py", "torch"),
+        ("cartpole", "workbench.py", "torch"),
+        ("cartpole", "spawn_robot.py", "gymnasium"),
+        ("cartpole", "run_tensorboard.py", "tensorboard"),
+        ("xacro", "xacro", "xacro"),
+    ],
+)
+def test_missing_packages_are_one_line(
+    bare: Workspace, space: str, package: str, program: str, missing: str
+) -> None:
+    ended = bare.inside("rosrun", package, program, space=space)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    (line,) = ended.stderr.splitlines()
+    told = re.fullmatch(
+        rf"{program}: Python packages are missing \((.*)\); what installs them: (.*) \(or .*\)",
+        line,
+    )
+    assert missing in told[1]
+    python, *arguments, file = shlex.split(told[2])
+    assert python == str(bare.python)
+    assert arguments == ["-m", "pip", "install", "--requirement"]
+    expected = "install/share/cartpole" if space == "install" else "src/cartpole"
+    assert Path(file).resolve() == (bare.path / expected / "requirements/base.txt").resolve()
+
+
+def test_programs_that_need_no_more_than_debian_start_without(bare: Workspace) -> None:
+    for command in (
+        ("gz", "--help"),
+        ("rosrun", "gazebo_ros", "spawn_model", "-h"),
+        ("rosrun", "controller_manager", "controller_manager", "--help"),
+        ("rosrun", "controller_manager", "spawner", "--help"),
+    ):
+        ended = bare.inside(*command)
+        assert ended.returncode == 0, f"{command}: {ended.stderr}"

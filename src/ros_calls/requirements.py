@@ -1,0 +1,59 @@
+"""The packages of requirements/base.txt that a program needs, and the command that installs them.
+
+For programs alone, before they import anything else: in somebody's own catkin workspace nobody has installed
+what rosdep and `catkin_make` don't.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import shlex
+import sys
+import sysconfig
+from pathlib import Path
+
+FILE = "requirements/base.txt"
+PAGE = "docs/catkin.md"
+
+# What the simulator runs on, PyBullet's engine with meshes of all kinds, and what all programs run on.
+SIMULATOR = ("collada", "numpy", "pybullet", "scipy", "trimesh", "xacro", "yaml")
+ALL = (*SIMULATOR, "PIL", "gymnasium", "matplotlib", "pygame", "tensorboard", "torch", "tqdm")
+
+
+def require(modules: tuple[str, ...]) -> None:
+    """Ends the program, with one line that says how to install what is missing.
+
+    Raises:
+        SystemExit: if one of the modules isn't there.
+    """
+    missing = [name for name in modules if importlib.util.find_spec(name) is None]
+    if missing:
+        sys.exit(f"{Path(sys.argv[0]).name}: {_advice(missing)}")
+
+
+def _advice(missing: list[str]) -> str:
+    command = [sys.executable, "-m", "pip", "install", "--requirement", str(_file())]
+    if _is_managed():
+        command.insert(4, "--break-system-packages")
+    return (
+        f"Python packages are missing ({', '.join(missing)}); what installs them: {shlex.join(command)}"
+        f" (or use a virtual environment: {PAGE})"
+    )
+
+
+def _is_managed() -> bool:
+    """Whether pip needs to be told to write beside the system's packages (PEP 668)."""
+    return (
+        sys.prefix == sys.base_prefix
+        and Path(sysconfig.get_path("stdlib"), "EXTERNALLY-MANAGED").exists()
+    )
+
+
+def _file() -> Path:
+    """The list of packages: in the sources, or where catkin has installed it."""
+    here = Path(__file__).resolve()
+    for above in here.parents:
+        for place in (above / FILE, above / "share/cartpole" / FILE):
+            if place.is_file():
+                return place
+    return Path(FILE)

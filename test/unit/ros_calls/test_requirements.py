@@ -1,0 +1,100 @@
+"""What programs need of requirements/base.txt, and what they say where it is missing."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import shlex
+import subprocess
+import sys
+import sysconfig
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+from ros_calls.requirements import ALL, SIMULATOR
+
+ROOT = Path(__file__).resolve().parents[3]
+SRC = ROOT / "src"
+STARTED = "\n".join(
+    [
+        "import sys, bullet_gazebo.ros.node.gzserver",
+        "from bullet_gazebo.physics.engines.registry import make_engine",
+        "import bullet_gazebo.physics.meshes.collada, bullet_gazebo.physics.meshes.hull",
+        "make_engine()",
+        "print(*sys.modules)",
+    ]
+)
+
+
+def distributions() -> dict[str, set[str]]:
+    """The modules of each package that requirements/base.txt names."""
+    lines = (ROOT / "requirements/base.txt").read_text().splitlines()
+    names = [found[0].lower() for line in lines if (found := re.match(r"[\w-]+", line))]
+    modules: dict[str, set[str]] = {name: set() for name in names}
+    for module, owners in metadata.packages_distributions().items():
+        for owner in owners:
+            if owner.lower() in modules:
+                modules[owner.lower()].add(module)
+    return modules
+
+
+def test_every_package_is_asked_for() -> None:
+    modules = distributions()
+    assert len(modules) > 10
+    assert [name for name, each in modules.items() if not each & set(ALL)] == []
+    assert [name for name in ALL if importlib.util.find_spec(name) is None] == []
+
+
+def test_the_simulator_is_asked_for_what_it_loads() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", STARTED], capture_output=True, text=True, check=True
+    )
+    loaded = {name.partition(".")[0] for name in done.stdout.split()}
+    assert loaded & set(ALL) <= set(SIMULATOR)
+
+
+def test_debians_python_is_told_how_to_install(tmp_path: Path) -> None:
+    code = (
+        f"import sys; sys.path.insert(0, {str(SRC)!r}); sys.argv = ['/x/program'];"
+        "from ros_calls.requirements import require; require(('yaml', 'no_such_module', 'json'))"
+    )
+    ended = subprocess.run(
+        ["/usr/bin/python3", "-c", code], env={"PATH": "/usr/bin"}, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert ended.returncode == 1
+    told = re.fullmatch(
+        r"program: Python packages are missing \(no_such_module\); what installs them: (.*)"
+        r" \(or use a virtual environment: docs/catkin.md\)\n",
+        ended.stderr,
+    )
+    python, *arguments, file = shlex.split(told[1])
+    assert (python, file) == ("/usr/bin/python3", str(ROOT / "requirements/base.txt"))
+    managed = Path(sysconfig.get_path("stdlib"), "EXTERNALLY-MANAGED").exists()
+    flags = ["--break-system-packages"] if managed else []
+    assert arguments == ["-m", "pip", "install", *flags, "--requirement"]
+
+
+def test_the_command_is_one_that_pip_takes() -> None:
+    """In an environment that has them all, where there is nothing to fetch."""
+    code = "import sys; from ros_calls.requirements import require; require(('no_such_module',))"
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    command = shlex.split(re.search(r"installs them: (.*) \(or", ended.stderr)[1])
+    done = subprocess.run(
+        [*command, "--dry-run", "--no-index"], capture_output=True, text=True, check=False,
+        env={**os.environ, "PIP_DISABLE_PIP_VERSION_CHECK": "1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "Would install" not in done.stdout
+
+
+@pytest.mark.parametrize("modules", [ALL, SIMULATOR])
+def test_nothing_is_said_where_all_is_there(modules: tuple[str, ...]) -> None:
+    code = f"from ros_calls.requirements import require; require({modules!r}); print('through')"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("through\n", "")
