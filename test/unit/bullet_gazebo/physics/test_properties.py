@@ -234,6 +234,11 @@ def test_crossed_stops_are_none(world, cartpole):
     cartpole.set_joint_positions({"stand_cart": 2.0})
     run(world, 100)
     assert cartpole.joint_state("stand_cart")[0] == pytest.approx(2.0, abs=0.1)
+    # Nor are the stops that it had before.
+    cartpole.set_joint_positions({"stand_cart": 0.0})
+    cartpole.set_joint_velocities({"stand_cart": 2.0})
+    run(world, 400)
+    assert cartpole.joint_state("stand_cart")[0] == pytest.approx(0.8, abs=0.1)
 
 
 def test_a_motor_drives_the_joint(world, wheel):

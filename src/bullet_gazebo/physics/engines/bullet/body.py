@@ -14,6 +14,7 @@ from bullet_gazebo.physics.engines.bullet.library import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
 
 BASE = -1
+NO_STOP = 1e16  # [rad, m]
 
 
 class BulletBody(Body):
@@ -167,6 +168,8 @@ class BulletBody(Body):
         )
 
     def set_limits(self, index: int, lower: float, upper: float) -> None:
+        if lower > upper:  # the engine would keep those that it has
+            lower, upper = -NO_STOP, NO_STOP
         pybullet.changeDynamics(
             self.id, self._indices[index], jointLowerLimit=lower, jointUpperLimit=upper,
             physicsClientId=self._client,
