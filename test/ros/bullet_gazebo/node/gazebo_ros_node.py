@@ -7,8 +7,10 @@ import subprocess
 import tempfile
 import time
 import unittest
+import xmlrpc.client
 from pathlib import Path
 
+import rosgraph
 import rosnode
 import rospy
 import rostest
@@ -82,6 +84,7 @@ CRATE = """<sdf version="1.6"><model name="any"><static>true</static><link name=
 <geometry><box><size>1 1 1</size></box></geometry></collision></link></model></sdf>"""
 CONFIG = "<model><name>crate</name><sdf version='1.6'>model.sdf</sdf></model>"
 PLUGINS = """
+import sys
 import rospy
 from std_msgs.msg import Int32
 
@@ -97,13 +100,13 @@ class Counter:
         self._count += 1
         self._topic.publish(self._count)
         if self._count == 50:
-            raise RuntimeError("enough")
+            sys.exit("enough")
 
     def shutdown(self):
         self._topic.unregister()
 
 def Broken(context):
-    raise ValueError("broken on purpose")
+    sys.exit("broken on purpose")
 """
 
 
@@ -295,6 +298,11 @@ class GazeboRos(unittest.TestCase):
         self.assertEqual(sim_time(), 0.0)
         self.run_command("gz", "world", "-s")
         self.run_command("gz", "world", "-r")
+        self.assertEqual(sim_time(), 0.0)
+        with xmlrpc.client.ServerProxy(rosnode.get_api_uri(rosgraph.Master("/test"), "/gazebo")) as node:
+            for arguments in (("step", 1.5), ("step", True), ("step",) * 3, (["step"],), ({"a": 1}, 2), ()):
+                self.assertEqual(node.gazeboWorld("/test", *arguments)[::2], [-1, 0], arguments)
+            self.assertEqual(node.gazeboWorld()[0], -1)
         self.assertEqual(sim_time(), 0.0)
         self.run_command("gz", "world", "-p", "0")
         wait_until(lambda: sim_time() > 0.0)
