@@ -299,8 +299,17 @@ class GazeboRos(unittest.TestCase):
         self.run_command("gz", "world", "-s")
         self.run_command("gz", "world", "-r")
         self.assertEqual(sim_time(), 0.0)
-        with xmlrpc.client.ServerProxy(rosnode.get_api_uri(rosgraph.Master("/test"), "/gazebo")) as node:
-            for arguments in (("step", 1.5), ("step", True), ("step",) * 3, (["step"],), ({"a": 1}, 2), ()):
+        with xmlrpc.client.ServerProxy(
+            rosnode.get_api_uri(rosgraph.Master("/test"), "/gazebo")
+        ) as node:
+            for arguments in (
+                ("step", 1.5),
+                ("step", True),
+                ("step",) * 3,
+                (["step"],),
+                ({"a": 1}, 2),
+                (),
+            ):
                 self.assertEqual(node.gazeboWorld("/test", *arguments)[::2], [-1, 0], arguments)
             self.assertEqual(node.gazeboWorld()[0], -1)
         self.assertEqual(sim_time(), 0.0)
