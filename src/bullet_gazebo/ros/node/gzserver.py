@@ -15,7 +15,13 @@ from bullet_gazebo.ros.control.control_plugin import FILENAME as CONTROL_PLUGIN
 from bullet_gazebo.ros.control.control_plugin import ControlPlugin
 from bullet_gazebo.ros.node.joint_state_plugin import FILENAME as JOINT_STATE_PLUGIN
 from bullet_gazebo.ros.node.joint_state_plugin import JointStatePlugin
-from bullet_gazebo.ros.node.one_world import NameLoss, NameTaken, full_name, refuse_twin
+from bullet_gazebo.ros.node.one_world import (
+    NameLoss,
+    NameTaken,
+    full_name,
+    one_at_a_time,
+    refuse_twin,
+)
 from bullet_gazebo.ros.node.server_args import parse_args
 from bullet_gazebo.ros.node.state_topics import advertise_states
 from bullet_gazebo.ros.node.watchdog import Watchdog
@@ -123,12 +129,13 @@ def main(argv: list[str] | None = None) -> int:
     name = full_name(command_line, NAME)
     try:
         wait_for_master(NAME)
-        if not args.replace:
-            refuse_twin(name)
+        with one_at_a_time(name):
+            if not args.replace:
+                refuse_twin(name)
+            init_node(NAME, command_line, anonymous=False)
     except NameTaken as error:
         print(f"gzserver: {error}", file=sys.stderr)
         return 1
-    init_node(NAME, command_line, anonymous=False)
     loss = NameLoss()
     # Not before: while there is no master, a signal ends the process as such.
     signals = SignalHandler()
@@ -142,7 +149,12 @@ def main(argv: list[str] | None = None) -> int:
     except EngineError as error:
         rospy.logfatal("%s", error)
         return 1
-    code = GazeboNode(args, engine, signals.noted).run(signals)
+    try:
+        code = GazeboNode(args, engine, signals.noted).run(signals)
+    except Exception:
+        if not rospy.is_shutdown():
+            raise
+        code = 0  # ended before it was ready: topics and services can't be opened any more
     if loss.happened:
         print(f"gzserver: {loss.text(name)}", file=sys.stderr)
         code = code or 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -133,3 +135,15 @@ def test_it_may_be_stopped_before_it_was_started_and_from_its_own_thread() -> No
     own.start()
     own._thread.join(BOUND)
     assert not own.barks()
+
+
+def test_a_process_whose_threads_do_not_end_ends_all_the_same_with_its_exit_code() -> None:
+    code = (
+        "import threading; from bullet_gazebo.ros.wire.signals import end_within;"
+        "threading.Thread(target=threading.Event().wait).start(); end_within(0.1, 7)"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], check=False, timeout=BOUND, capture_output=True
+    )
+    assert result.returncode == 7
+    assert b"doesn't end" in result.stderr
