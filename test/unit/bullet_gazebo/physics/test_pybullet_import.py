@@ -19,7 +19,7 @@ def write():
     while not done.is_set():
         os.write(2, b"%d\\n" % count)
         count += 1
-thread = threading.Thread(target=write)
+thread = threading.Thread(target=write, daemon=True)
 thread.start()
 from bullet_gazebo.physics.engines.registry import make_engine
 make_engine()
@@ -51,6 +51,12 @@ def test_what_another_thread_writes_meanwhile_comes_whole() -> None:
     done = outcome(f"exec({BESIDE!r})")
     lines = done.stderr.splitlines()
     assert sorted(map(int, lines)) == list(range(int(done.stdout)))
+
+
+def test_what_c_writes_meanwhile_comes_afterwards(tmp_path: Path) -> None:
+    (tmp_path / "pybullet.py").write_text("import ctypes; ctypes.CDLL(None).perror(b'of C')")
+    code = f"sys.path.insert(0, {str(tmp_path)!r}); import bullet_gazebo.physics.engines.bullet.library"
+    assert outcome(code).stderr.startswith("of C: ")
 
 
 def test_a_library_that_cannot_be_loaded_says_why(tmp_path: Path) -> None:
