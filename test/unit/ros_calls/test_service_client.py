@@ -21,8 +21,8 @@ from ros_calls.service import (
 from ros_calls.waiting import wait_and_call
 
 NAME = "/fake/set"
-LIMIT = 0.3  # [s]
-BOUND = 3.0  # [s]; on a busy machine
+LIMIT = 0.3  # [s] of a call in vain
+BOUND = 60.0  # [s] of one that has an answer
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def client():
     clients = []
 
     def make(kind=SetBool, **kwargs):
-        made = ServiceClient(NAME, kind, **{"timeout": LIMIT} | kwargs)
+        made = ServiceClient(NAME, kind, **{"timeout": BOUND} | kwargs)
         clients.append(made)
         return made
 
@@ -143,8 +143,8 @@ def test_a_service_that_hangs(offer, client, header):
     service = offer(lambda request: service.over.wait() and None, header)
     begin = time.monotonic()
     with pytest.raises(ServiceHangs, match=r"/fake/set: no answer within 0.3 s"):
-        client()(True)
-    assert LIMIT <= time.monotonic() - begin < BOUND
+        client(timeout=LIMIT)(True)
+    assert time.monotonic() - begin >= LIMIT
 
 
 def test_an_answer_in_pieces(offer, client):
@@ -157,28 +157,26 @@ def test_an_answer_in_pieces(offer, client):
             yield answer[begin:end]
 
     offer(pieces)
-    assert client(timeout=5.0)(True).message == text
+    assert client()(True).message == text
 
 
 def test_an_answer_that_trickles_in_has_the_same_limit(offer, client):
     def trickle(request):
         for byte in ok(True, "x" * 1000):
-            time.sleep(LIMIT / 5)
+            time.sleep(LIMIT / 5)  # each in time, all of them not
             yield bytes([byte])
 
     offer(trickle)
-    begin = time.monotonic()
     with pytest.raises(ServiceHangs):
-        client()(True)
-    assert time.monotonic() - begin < BOUND
+        client(timeout=LIMIT)(True)
 
 
 def test_without_a_limit_it_waits_until_the_shutdown(offer, client, monkeypatch):
     service = offer(lambda request: service.over.wait() and None)
     down = threading.Event()
     monkeypatch.setattr(rospy, "is_shutdown", down.is_set)
-    threading.Timer(3 * LIMIT, down.set).start()
     begin = time.monotonic()
+    threading.Timer(3 * LIMIT, down.set).start()
     with pytest.raises(ServiceHangs, match="no answer before the shutdown"):
         client(timeout=math.inf)(True)
     assert time.monotonic() - begin > 2 * LIMIT
@@ -194,9 +192,12 @@ def test_without_a_limit_an_answer_may_come_late(offer, client):
 
 
 def test_ctrl_c_ends_a_call_and_the_connection(offer, client):
-    service = offer(lambda request: service.over.wait() and None)
-    call = client(persistent=True, timeout=BOUND)
-    threading.Timer(LIMIT, os.kill, (os.getpid(), signal.SIGINT)).start()
+    def interrupt(request):
+        os.kill(os.getpid(), signal.SIGINT)
+        service.over.wait()
+
+    service = offer(interrupt)
+    call = client(persistent=True)
     with pytest.raises(KeyboardInterrupt):
         call(True)
     service.close()
@@ -215,4 +216,4 @@ def test_a_failure_because_of_a_shutdown_is_an_interrupt(offer, monkeypatch):
     offer(lambda request: down.set() or [failed("too late")])
     monkeypatch.setattr(rospy, "is_shutdown", down.is_set)
     with pytest.raises(rospy.ROSInterruptException, match="shut down while calling /fake/set"):
-        wait_and_call(NAME, SetBool, True, timeout=LIMIT)
+        wait_and_call(NAME, SetBool, True, timeout=BOUND)

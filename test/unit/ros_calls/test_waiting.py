@@ -1,5 +1,6 @@
 """Waits end: with what is waited for, in time, or with the node; Ctrl-C goes through."""
 
+import math
 import os
 import signal
 import socket
@@ -22,7 +23,8 @@ from ros_calls.waiting import (
 )
 
 NAME = "/fake/set"
-LIMIT = 0.3  # [s]
+LIMIT = 0.3  # [s] of a wait in vain
+BOUND = 60.0  # [s] of one that has an end
 
 
 @pytest.fixture
@@ -35,7 +37,7 @@ def master():
 
 def test_the_first_thing_that_is_true_is_returned():
     found = iter((0, None, "", "here", "later"))
-    assert wait_until(lambda: next(found), LIMIT, "it") == "here"
+    assert wait_until(lambda: next(found), BOUND, "it") == "here"
 
 
 def test_the_time_is_the_walls_however_long_a_look_takes():
@@ -56,15 +58,14 @@ def test_a_shutdown_ends_a_wait(monkeypatch):
 
 
 def test_ctrl_c_ends_a_wait():
-    threading.Timer(LIMIT, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
-        wait_until(lambda: False, 20 * LIMIT, "it")
+        wait_until(lambda: os.kill(os.getpid(), signal.SIGINT), BOUND, "it")
 
 
 def test_a_service_that_comes_up_is_called(master):
     service = FakeService()
     threading.Timer(LIMIT, master.services.update, ({NAME: service.address},)).start()
-    assert wait_and_call(NAME, SetBool, True, timeout=20 * LIMIT).success
+    assert wait_and_call(NAME, SetBool, True, timeout=BOUND).success
     service.close()
 
 
@@ -80,7 +81,7 @@ def test_names_are_resolved(master):
     service = FakeService()
     master.services[NAME] = service.address
     assert wait_for_service("fake//set") == NAME
-    assert service_comes_up("fake/set", LIMIT)
+    assert service_comes_up("fake/set", BOUND)
     service.close()
 
 
@@ -94,10 +95,8 @@ def test_a_master_is_waited_for_only_by_who_says_so():
     with socket.socket() as reserved:  # bound, and nobody listens
         reserved.bind(("127.0.0.1", 0))
         with ros_master.using(f"http://127.0.0.1:{reserved.getsockname()[1]}"):
-            begin = time.monotonic()
             with pytest.raises(ServiceMissing, match=r"no ROS master at .* \(Connection refused\)"):
-                wait_for_service(NAME, 20 * LIMIT)
-            assert time.monotonic() - begin < 10 * LIMIT
+                wait_for_service(NAME, math.inf)
             begin = time.monotonic()
             assert not service_comes_up(NAME, LIMIT)
             assert time.monotonic() - begin >= LIMIT

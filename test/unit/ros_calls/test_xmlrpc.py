@@ -75,7 +75,7 @@ def test_a_server_that_says_nothing():
         begin = time.monotonic()
         with pytest.raises(xmlrpc.NoAnswer, match=r"no answer within 0.3 s"):
             xmlrpc.call(uri, "getPid", timeout=LIMIT)
-        assert LIMIT <= time.monotonic() - begin < 10 * LIMIT
+        assert time.monotonic() - begin >= LIMIT
         with pytest.raises(
             ros_master.MasterDown, match="the port is in use, and not by a ROS master"
         ):

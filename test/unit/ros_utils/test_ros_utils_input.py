@@ -65,11 +65,19 @@ CALLS = [
 ]
 
 
+@pytest.fixture
+def slept(monkeypatch):
+    """How long each sleep was asked to take [s]: unlike the time that has passed it is the same on a
+    busy machine."""
+    asked, sleep = [], time.sleep
+    monkeypatch.setattr(time, "sleep", lambda seconds: asked.append(seconds) or sleep(seconds))
+    return asked
+
+
 @pytest.mark.parametrize("call", CALLS)
-def test_no_master(no_master, parameters, capsys, call):
-    begin = time.monotonic()
+def test_no_master(no_master, parameters, slept, capsys, call):
     assert call(parameters) is False
-    assert time.monotonic() - begin < 2.0
+    assert sum(slept) < 1.0, "none is waited for"
     assert re.search(
         r"no ROS master at http://127.0.0.1:\d+ \(Connection refused\)", capsys.readouterr().err
     )
@@ -78,9 +86,7 @@ def test_no_master(no_master, parameters, capsys, call):
 @pytest.mark.slow
 @pytest.mark.parametrize("call", [*CALLS[:2], lambda path: ros_gazebo.launch_Gazebo(gui=False)])
 def test_a_master_that_does_not_answer(mute_master, parameters, capsys, call):
-    begin = time.monotonic()
     assert call(parameters) is False
-    assert time.monotonic() - begin < 8.0
     assert capsys.readouterr().err.startswith("[ERROR]")
 
 

@@ -20,7 +20,7 @@ from ros_utils._internal.processes import termination as _termination
 from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
 
 SLEEP = ["sleep", "1000"]
-BOUND = 10.0  # [s] for anything that a test waits for
+BOUND = 60.0  # [s] for anything that a test waits for
 
 
 @pytest.fixture(autouse=True)
@@ -58,7 +58,8 @@ def read_number(path: Path) -> int:
 
 def python(code, *arguments):
     """A Python process with the test's environment."""
-    return subprocess.Popen([sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE)
+    command = [sys.executable, "-c", code, *arguments]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
 
 STARTER = """
@@ -68,6 +69,7 @@ print(processes.start(["sleep", "1000"], "node", "sleeper").process.pid, flush=T
 signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
 if "stay" in sys.argv:
     signal.pause()
+sys.stdin.read()
 """
 
 
@@ -178,9 +180,8 @@ def test_nothing_is_left_when_the_starter_ends(number):
     wait_until(lambda: Path(f"/proc/{pid}/comm").read_text() == "sleep\n")
     if number:
         starter.send_signal(number)
-    starter.wait(BOUND)
+    starter.communicate(timeout=BOUND)
     wait_until(lambda: not runs(pid))
-    starter.stdout.close()
 
 
 def test_a_program_of_ours_does_not_end_itself(place):
