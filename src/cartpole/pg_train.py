@@ -11,6 +11,7 @@ from cartpole.registration import NAMESPACE
 from cartpole.ros_options import ros_options
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import check_options, option
+from rl_workbench.output import reader_may_go
 from rl_workbench.training.cli import choose_training, train
 from rl_workbench.training.options.command_line import USAGE, flag
 from rl_workbench.training.options.options import Options
@@ -71,6 +72,7 @@ ROBOT_OPTIONS = Options(RobotOptions)
 _ANYWHERE = (False, 0.0, "bullet")  # what goes for other environments, too
 
 
+@reader_may_go()
 def main(argv: list[str] | None = None) -> int:
     """Trains as the arguments say; returns the process's exit code."""
     argv = sys.argv[1:] if argv is None else argv

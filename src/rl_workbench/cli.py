@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.output import reader_may_go
 from rl_workbench.training import cli as training
 from rl_workbench.training.options.options import unknown
 from rl_workbench.training.run.interrupt import Interrupt
@@ -43,6 +44,7 @@ COMMANDS = {
 PACKAGE = "rl_workbench.tools.commands"
 
 
+@reader_may_go()
 def main(
     argv: list[str] | None = None, prog: str = PROG, program: tuple[str, ...] = PROGRAM
 ) -> int:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.output import reader_may_go
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm, recorded_kind
 from rl_workbench.training.options.command_line import USAGE, check_flag
 from rl_workbench.training.options.kind import AlgorithmKind
@@ -114,6 +115,7 @@ def train(options: TrainingOptions, interrupt: Interrupt) -> Path:
     return folder
 
 
+@reader_may_go()
 def main(
     argv: list[str] | None = None,
     parameters: dict[str, Any] | None = None,
@@ -123,8 +125,7 @@ def main(
     """Trains as the arguments say; returns the process's exit code."""
     interrupt = Interrupt().install()
     try:
-        train(choose_training(sys.argv[1:] if argv is None else argv, parameters, prog, default),
-              interrupt)  # fmt: skip
+        train(_chosen(sys.argv[1:] if argv is None else argv, parameters, prog, default), interrupt)
         return interrupt.exit_code
     except WorkbenchError as error:
         print(f"{prog}: {error}", file=sys.stderr, flush=True)
@@ -132,3 +133,13 @@ def main(
     except KeyboardInterrupt:
         print(f"{prog}: interrupted before the training began", file=sys.stderr)
         return interrupt.exit_code or 130
+
+
+def _chosen(
+    argv: list[str], parameters: dict[str, Any] | None, prog: str, default: str | None
+) -> TrainingOptions:
+    """What the arguments say; whatever is wrong with them is exit code 2."""
+    try:
+        return choose_training(argv, parameters, prog, default)
+    except WorkbenchError as error:
+        _parser(prog).error(str(error))

@@ -16,6 +16,7 @@ from rl_workbench.agents.dqn.returns import NStepReturns
 from rl_workbench.agents.dqn.schedules import Epsilon, learning_rate
 from rl_workbench.agents.dqn.settings import DQNSettings
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import load_optimizer, number, sequence, set_generator, whole
 
 
 class Learned(NamedTuple):
@@ -48,7 +49,7 @@ class DQNAgent:
         device: str = "cpu",
     ) -> None:
         self.settings = settings
-        self.actions = actions
+        self.observation_size, self.actions = observation_size, actions
         self._device = torch.device(device)
         self.q_net = self._network(observation_size, seed)
         self.target_net = self._network(observation_size, seed).requires_grad_(False).eval()
@@ -207,7 +208,7 @@ class DQNAgent:
         """Takes over what `policy_state` gave; a file of the DQN tutorial's has no normaliser."""
         self.q_net.load_state_dict(state["q_net"])
         self.target_net.load_state_dict(state["target_net"])
-        self._epsilon.value = float(state["epsilon"])
+        self._epsilon.value = number(state["epsilon"])
         if self.normaliser is not None:
             self.normaliser.load_state_dict(state["normaliser"])
 
@@ -229,12 +230,14 @@ class DQNAgent:
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Takes over what `state_dict` gave."""
         self.load_policy_state(state)
-        self._optimizer.load_state_dict(state["optimizer"])
-        self.buffer.load_state_dict(state["replay"])
-        self._returns.load_state_dict(state["window"])
-        for generator, text in zip((self._explore, self._draw), state["generators"], strict=True):
-            generator.bit_generator.state = json.loads(text)
-        self.steps, self.gradient_steps = int(state["steps"]), int(state["gradient_steps"])
+        load_optimizer(self._optimizer, state["optimizer"])
+        self.buffer.load_state_dict(state["replay"], self.actions)
+        self._returns.load_state_dict(state["window"], self.observation_size, self.actions)
+        for generator, text in zip(
+            (self._explore, self._draw), sequence(state["generators"], 2), strict=True
+        ):
+            set_generator(generator, text)
+        self.steps, self.gradient_steps = whole(state["steps"]), whole(state["gradient_steps"])
 
 
 def _copied(network: nn.Module) -> dict[str, torch.Tensor]:

@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 import torch
 
+from rl_workbench.states import array, whole
+
 CLIP = 10.0  # [deviations]
 SMALLEST = 1e-8  # of the variance; a constant quantity stays 0
 
@@ -50,7 +52,10 @@ class Normaliser:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Takes over what `state_dict` gave."""
-        self._count = state["count"]
-        self._mean = state["mean"].numpy().copy()
-        self._squares = state["squares"].numpy().copy()
+        size = self._mean.shape
+        self._count = whole(state["count"])
+        self._mean = array(state["mean"], torch.float64, size)
+        self._squares = array(state["squares"], torch.float64, size)
+        if (self._squares < 0).any():
+            raise ValueError("squared deviations are negative")
         self._update_scale()

@@ -6,6 +6,7 @@ import numpy as np
 import torch
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import array, whole
 
 
 class Transition(NamedTuple):
@@ -95,20 +96,26 @@ class ReplayBuffer:
         arrays = {name: torch.from_numpy(array[: self._size]) for name, array in self._columns()}
         return {**arrays, "next": self._next}
 
-    def load_state_dict(self, state: dict[str, Any]) -> None:
+    def load_state_dict(self, state: dict[str, Any], actions: int) -> None:
         """Takes over what `state_dict` gave.
+
+        Args:
+            actions: A, of which the transitions have some.
 
         Raises:
             WorkbenchError: if it doesn't fit into this buffer.
+            TypeError, ValueError, LookupError: if it is something else.
         """
-        size = len(state["actions"])
-        if size > self.capacity or not 0 <= state["next"] < max(self.capacity, 1):
+        size, following = len(state["actions"]), whole(state["next"])
+        is_full = size == self.capacity
+        if size > self.capacity or not (following < size if is_full else following == size):
             raise WorkbenchError(f"a buffer of {self.capacity} can't hold {size} transitions")
-        for name, array in self._columns():
-            if state[name].shape[1:] != array.shape[1:]:
-                raise WorkbenchError(f"the transitions' {name} have another shape")
-            array[:size] = state[name].numpy()
-        self._size, self._next = size, state["next"]
+        for name, column in self._columns():
+            dtype, shape = torch.from_numpy(column[:0]).dtype, (size, *column.shape[1:])
+            column[:size] = array(state[name], dtype, shape)
+        if size and not 0 <= self._actions[:size].min() <= self._actions[:size].max() < actions:
+            raise WorkbenchError(f"the transitions have other actions than 0 to {actions - 1}")
+        self._size, self._next = size, following
 
     def _columns(self) -> list[tuple[str, np.ndarray]]:
         return [

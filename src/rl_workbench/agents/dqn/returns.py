@@ -7,6 +7,7 @@ import numpy as np
 import torch
 
 from rl_workbench.agents.dqn.replay import Transition
+from rl_workbench.states import array, number, sequence, whole
 
 
 class NStepReturns:
@@ -61,7 +62,20 @@ class NStepReturns:
             "rewards": [step[2] for step in self._window],
         }
 
-    def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Takes over what `state_dict` gave."""
-        observations = [tensor.numpy() for tensor in state["observations"]]
-        self._window = deque(zip(observations, state["actions"], state["rewards"], strict=True))
+    def load_state_dict(self, state: dict[str, Any], size: int, actions: int) -> None:
+        """Takes over what `state_dict` gave.
+
+        Args:
+            size: D, of observations.
+            actions: A.
+        """
+        observations = [
+            array(each, torch.float32, (size,)) for each in sequence(state["observations"])
+        ]
+        chosen = [whole(each) for each in sequence(state["actions"], len(observations))]
+        if max(chosen, default=0) >= actions:
+            raise ValueError(f"action {max(chosen)} of {actions}")
+        rewards = [number(each) for each in sequence(state["rewards"], len(observations))]
+        if len(observations) >= max(self._steps, 1):
+            raise ValueError(f"{len(observations)} steps wait for {self._steps}-step returns")
+        self._window = deque(zip(observations, chosen, rewards, strict=True))

@@ -16,6 +16,7 @@ from torch import nn
 from rl_workbench.agents.pg.settings import DocumentSettings
 from rl_workbench.agents.pg.two_networks import TwoNetworks
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import array, switch
 
 
 class PolicyNetwork(nn.Module):
@@ -90,11 +91,24 @@ class Episode:
         }
 
     @classmethod
-    def from_state(cls, state: dict[str, Any]) -> "Episode":
-        """The episode that `state_dict` told of."""
-        *observations, final = state["observations"].numpy()
-        actions, rewards = state["actions"].tolist(), state["rewards"].tolist()
-        return cls(list(observations), actions, rewards, final, state["terminated"])
+    def from_state(cls, state: dict[str, Any], size: int, count: int) -> "Episode":
+        """The episode that `state_dict` told of.
+
+        Args:
+            state: of the episode.
+            size: D, of observations.
+            count: A, of actions.
+
+        Raises:
+            TypeError, ValueError, LookupError: if it is something else.
+        """
+        *observations, final = array(state["observations"], torch.float32, (None, size))
+        length = len(observations)
+        actions = array(state["actions"], torch.int64, (length,)).tolist()
+        if not length or not 0 <= min(actions) <= max(actions) < count:
+            raise ValueError(f"an episode with other actions than 0 to {count - 1}")
+        rewards = array(state["rewards"], torch.float64, (length,)).tolist()
+        return cls(observations, actions, rewards, final, switch(state["terminated"]))
 
 
 class Losses(NamedTuple):

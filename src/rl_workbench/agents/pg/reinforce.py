@@ -19,6 +19,7 @@ from rl_workbench.agents.pg.document import Episode, Losses, check_finite, desce
 from rl_workbench.agents.pg.settings import ReinforceSettings
 from rl_workbench.agents.pg.softmax_policy import Actor, PairActor, SoftmaxActor, SoftmaxNetwork
 from rl_workbench.agents.pg.two_networks import TwoNetworks
+from rl_workbench.states import sequence
 
 SMALLEST_SPREAD = 1e-8  # of advantages, below which they are not blown up
 SMALLEST_CHANCE = float(np.finfo(np.float32).tiny)  # of an action, that counts for the entropy
@@ -67,6 +68,7 @@ class ReinforceAgent(TwoNetworks):
         super().__init__(self._network, value, rates, seed)
         self._factors = 1.0 / np.asarray(scale, np.float32)  # (D,)
         self._normaliser = Normaliser(len(scale)) if settings.normalize_observations else None
+        self._actions = actions
         self._is_pair = actions == 2 and not settings.policy_hidden and self._normaliser is None
         self._batch: list[Episode] = []
         self._actor: Actor
@@ -188,7 +190,9 @@ class ReinforceAgent(TwoNetworks):
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Takes over what `state_dict` gave."""
-        self._batch = [Episode.from_state(each) for each in state["batch"]]
+        size = len(self._factors)
+        batch = sequence(state["batch"])
+        self._batch = [Episode.from_state(each, size, self._actions) for each in batch]
         if self._normaliser is not None:
             self._normaliser.load_state_dict(state["normaliser"])
         super().load_state_dict(state)

@@ -8,6 +8,8 @@ import numpy as np
 import torch
 from torch import nn
 
+from rl_workbench.states import load_optimizer, set_generator
+
 
 class TwoNetworks(ABC):
     """A policy and a value network, each with an Adam, and a generator that draws actions.
@@ -49,7 +51,9 @@ class TwoNetworks(ABC):
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Takes over what `state_dict` gave."""
-        for name, part in self._parts().items():
-            part.load_state_dict(state[name])
-        self.generator.bit_generator.state = json.loads(state["generator"])
+        self.policy.load_state_dict(state["policy"])
+        self.value.load_state_dict(state["value"])
+        load_optimizer(self.policy_optimizer, state["policy_optimizer"])
+        load_optimizer(self.value_optimizer, state["value_optimizer"])
+        set_generator(self.generator, state["generator"])
         self.sync()

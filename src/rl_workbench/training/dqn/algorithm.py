@@ -7,23 +7,20 @@ import numpy as np
 
 from rl_workbench.agents.dqn.agent import DQNAgent, Learned
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import number, sequence
 from rl_workbench.training.dqn.repeatable import RepeatableEnvironment
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
+from rl_workbench.training.run.algorithm import Algorithm, Frame, Say, in_its_environment
 from rl_workbench.training.run.checkpoints import fitting
-from rl_workbench.training.run.environments import discrete_actions, make_environment
+from rl_workbench.training.run.environments import discrete_actions
 from rl_workbench.training.run.policy import Policy
 
 
 def make(options: TrainingOptions) -> "DQNTraining":
     """A new training; see `make_algorithm`."""
-    run = options.run
-    env = make_environment(run.env_id, run.training_environment)
-    try:
-        return DQNTraining(options, env, make_agent(options, env))
-    except WorkbenchError:
-        env.close()
-        raise
+    return in_its_environment(
+        options, lambda env: DQNTraining(options, env, make_agent(options, env))
+    )
 
 
 def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> DQNAgent:
@@ -139,12 +136,13 @@ class DQNTraining(Algorithm):
 
     def restore_environment(self, state: dict[str, Any], say: Say) -> None:
         """Repeats the episode under way; says so if it goes another way."""
-        self._last = None if state["last"] is None else Learned(*state["last"])
+        last = state["last"]
+        self._last = None if last is None else Learned(*map(number, sequence(last, 2)))
         self._place.generator = state["generator"]
         if state["episode"] is None:
             return
         self._observation = self._place.load_state_dict(state["episode"])
-        self._reward = float(state["reward"])
+        self._reward = number(state["reward"])
         if self._observation is None:
             say("the environment doesn't repeat itself: the episode under way is given up")
             self._reward = 0.0

@@ -11,6 +11,8 @@ import gymnasium
 import numpy as np
 import torch
 
+from rl_workbench.states import array
+
 
 class RepeatableEnvironment:
     """An environment that can be brought back into the middle of an episode.
@@ -69,12 +71,15 @@ class RepeatableEnvironment:
             return None
         self.generator = state["start"]
         self.reset()
-        for action in state["actions"].tolist():
+        wanted = array(state["observation"], torch.float32, self._observation.shape)
+        actions = array(state["actions"], torch.int64, (None,)).tolist()
+        if not all(map(self._env.action_space.contains, actions)):
+            raise ValueError(f"an episode with other actions than {self._env.action_space}")
+        for action in actions:
             *_, terminated, truncated = self.step(action)
             if terminated or truncated:
                 break
-        wanted = state["observation"].numpy()
-        if self.length == len(state["actions"]) and np.array_equal(self._observation, wanted):
+        if self.length == len(actions) and np.array_equal(self._observation, wanted):
             return self._observation
         self.generator = after
         return None

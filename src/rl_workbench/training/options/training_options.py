@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,11 +29,10 @@ class TrainingOptions(NamedTuple):
 
     def record(self) -> dict[str, Any]:
         """All of it as plain values, for config.json and checkpoints."""
-        return {
-            "algorithm": self.kind.name,
-            "run": asdict(self.run),
-            "hyperparameters": asdict(self.hyperparameters),
-        }
+        run, own = asdict(self.run), asdict(self.hyperparameters)
+        # What both have, as a length that a schedule depends on, is the run's.
+        hyperparameters = {name: value for name, value in own.items() if name not in run}
+        return {"algorithm": self.kind.name, "run": run, "hyperparameters": hyperparameters}
 
     def check_same(self, content: Any, origin: str) -> None:
         """Holds these options against those in a checkpoint.
@@ -57,7 +56,7 @@ def _flat(record: Any, origin: str) -> dict[str, Any]:
     if "algorithm" not in found or not all(isinstance(each, dict) for each in parts):
         raise WorkbenchError(f"{origin} isn't a training of this version")
     plain = json.loads(json.dumps(record))
-    # What both have is the run's, so somebody who edits config.json has to do so once.
+    # Earlier records have some in both; the run's counts.
     return {"algorithm": plain["algorithm"], **plain["hyperparameters"], **plain["run"]}
 
 
@@ -80,7 +79,7 @@ def make_options(
         WorkbenchError: if a value is beyond its limits.
     """
     options = known_options(kind)
-    merged = {"exp_name": kind.name, **kind.defaults, **values}
+    merged = until_the_steps({"exp_name": kind.name, **kind.defaults}, values)
     hyperparameters = options.make(kind.hyperparameters(), merged)
     return TrainingOptions(kind, options.make(RunOptions, merged), hyperparameters, resume)
 
@@ -117,8 +116,8 @@ def choose(
     preset = special.get("preset")
     wanted = given.get("env_id", None if preset else default)
     section = read_section(path, wanted and kind.section.format(env_id=wanted), preset)
-    merged = ({"env_id": wanted} if wanted else {}) | options.read(section, origin) | given
-    return make_options(kind, merged)
+    merged = ({"env_id": wanted} if wanted else {}) | options.read(section, origin)
+    return make_options(kind, until_the_steps(merged, given))
 
 
 def resumed(
@@ -138,8 +137,14 @@ def resumed(
         )
     record = read_record(folder)
     old = options_of(kind, record, str(folder / CONFIG_RECORD))
-    values = asdict(old.run) | asdict(old.hyperparameters) | given
-    return make_options(kind, values, folder)
+    values = asdict(old.run) | asdict(old.hyperparameters)
+    return make_options(kind, until_the_steps(values, given), folder)
+
+
+def until_the_steps(values: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """The values with those that were given: steps without episodes mean until the steps."""
+    counted = {"episodes": 0} if given.get("total_timesteps") else {}
+    return {**values, **counted, **given}
 
 
 def options_of(kind: AlgorithmKind, content: Any, origin: str) -> TrainingOptions:

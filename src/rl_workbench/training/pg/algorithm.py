@@ -10,11 +10,12 @@ from rl_workbench.agents.pg.document import PolicyGradientAgent
 from rl_workbench.agents.pg.reinforce import ReinforceAgent
 from rl_workbench.agents.pg.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import whole
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.pg.episodes import EpisodeGenerators, run_episode
-from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
+from rl_workbench.training.run.algorithm import Algorithm, Frame, Say, in_its_environment
 from rl_workbench.training.run.checkpoints import fitting
-from rl_workbench.training.run.environments import discrete_actions, make_environment
+from rl_workbench.training.run.environments import discrete_actions
 from rl_workbench.training.run.files import save_tensors
 from rl_workbench.training.run.policy import Policy
 
@@ -23,13 +24,9 @@ Agent = PolicyGradientAgent | ReinforceAgent
 
 def make(options: TrainingOptions) -> "PolicyGradientTraining":
     """A new training; see `make_algorithm`."""
-    run = options.run
-    env = make_environment(run.env_id, run.training_environment)
-    try:
-        return PolicyGradientTraining(options, env, make_agent(options, env))
-    except WorkbenchError:
-        env.close()
-        raise
+    return in_its_environment(
+        options, lambda env: PolicyGradientTraining(options, env, make_agent(options, env))
+    )
 
 
 def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
@@ -154,8 +151,8 @@ class PolicyGradientTraining(Algorithm):
         """See `Algorithm.load_state_dict`."""
         with fitting("agent"):
             self._agent.load_state_dict(state["agent"])
-            self._episodes, self._stride = int(state["episodes"]), int(state["stride"])
-            self._steps = int(state["steps"])
+            self._episodes, self._stride = whole(state["episodes"]), whole(state["stride"])
+            self._steps = whole(state["steps"])
 
     def environment_state(self) -> str:
         """The state of the environment's generator; there is no episode under way."""

@@ -8,12 +8,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import gymnasium
 import numpy as np
 
+from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.training_options import TrainingOptions
+from rl_workbench.training.run.environments import make_environment
 from rl_workbench.training.run.scalar_log import ScalarLog
 
 Say = Callable[[str], None]
@@ -147,6 +149,26 @@ class Algorithm(ABC):
     def close(self) -> None:
         """Closes the environment."""
         self.env.close()
+
+
+Made = TypeVar("Made", bound=Algorithm)
+
+
+def in_its_environment(
+    options: TrainingOptions, make: Callable[[gymnasium.Env[Any, Any]], Made]
+) -> Made:
+    """An algorithm in a new environment, which is closed if it doesn't suit.
+
+    Raises:
+        WorkbenchError: if the environment can't be made, or doesn't suit.
+    """
+    run = options.run
+    env = make_environment(run.env_id, run.training_environment)
+    try:
+        return make(env)
+    except WorkbenchError:
+        env.close()
+        raise
 
 
 def make_algorithm(options: TrainingOptions) -> Algorithm:

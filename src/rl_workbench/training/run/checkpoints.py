@@ -27,7 +27,7 @@ LEFTOVERS = (".*.pt.*", ".*.pt.new", ".*.pth.*", ".*.json.*", ".*.png.*")  # of 
 FORMAT = "rl_workbench 2"  # changes when older files can't be read any more
 _DAMAGED = (RuntimeError, pickle.UnpicklingError, EOFError, ValueError, KeyError, TypeError,
             AttributeError, IndexError, zipfile.BadZipFile, zlib.error)  # fmt: skip
-_MISFITS = (LookupError, TypeError, ValueError, RuntimeError, AttributeError)
+_MISFITS = (LookupError, TypeError, ValueError, RuntimeError, AttributeError, ArithmeticError)
 
 
 class Checkpoints:

@@ -1,6 +1,10 @@
 """Gymnasium's environments by id, in the form that an agent wants, with errors that help."""
 
-from collections.abc import Mapping
+import sysconfig
+import traceback
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -16,9 +20,19 @@ SEVERAL = "PPO or A2C"
 LARGEST = float(np.finfo(np.float32).max)  # networks and replay know no larger number
 # What constructors raise about options that they don't like.
 _REFUSED = (gymnasium.error.Error, ImportError, TypeError, ValueError, LookupError, AssertionError)
-# What running ones raise that can't go on: Gymnasium's own, and those of devices and connections, which
-# the frame would take for its disk's.
-_FAILED = (gymnasium.error.Error, OSError)
+
+
+# Where code isn't the user's.
+_LIBRARIES = (
+    *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
+    str(Path(__file__).resolve().parents[2]),
+    str(Path(gymnasium.__file__).parent),
+    "<frozen",
+)
+
+
+class EnvironmentFailure(WorkbenchError):
+    """An environment's own code has failed; the text names the place, the cause has the traceback."""
 
 
 def make_environment(
@@ -42,6 +56,8 @@ def make_environment(
     except _REFUSED as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise WorkbenchError(f"can't make {env_id}: {reason}") from error
+    except (Exception, SystemExit) as error:
+        raise EnvironmentFailure(f"can't make {env_id}: {_told(error)}") from error
     return CheckedEnvironment(_flat(env, env_id), env_id)
 
 
@@ -64,12 +80,10 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
 
         Raises:
             WorkbenchError: if the observation isn't finite in single precision, or the environment
-                fails as Gymnasium's do.
+                fails.
         """
-        try:
+        with self._running("reset"):
             observation, info = self.env.reset(seed=seed, options=options)
-        except _FAILED as error:
-            raise self._failed(error) from error
         self._check(observation)
         return observation, info
 
@@ -78,12 +92,10 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
 
         Raises:
             WorkbenchError: if the observation or the reward isn't finite in single precision, or the
-                environment fails as Gymnasium's do.
+                environment fails.
         """
-        try:
+        with self._running("step"):
             observation, reward, terminated, truncated, info = self.env.step(action)
-        except _FAILED as error:
-            raise self._failed(error) from error
         self._check(observation)
         try:
             size = abs(float(reward))
@@ -93,17 +105,53 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             raise self._error("reward", reward)
         return observation, reward, terminated, truncated, info
 
-    def _failed(self, error: Exception) -> WorkbenchError:
-        text = str(error) or type(error).__name__
-        return WorkbenchError(f"{self._id} failed: {text}" if isinstance(error, OSError) else text)
+    def close(self) -> None:
+        """As the environment's.
+
+        Raises:
+            WorkbenchError: if the environment fails.
+        """
+        with self._running("close"):
+            self.env.close()
+
+    @contextmanager
+    def _running(self, method: str) -> Iterator[None]:
+        """Whatever it raises ends the training with one line, once what was learned is saved."""
+        try:
+            yield
+        except gymnasium.error.Error as error:  # its text is made for the user
+            raise WorkbenchError(str(error) or type(error).__name__) from error
+        except (Exception, SystemExit) as error:
+            text = f"{self._id} failed in {method}(): {_told(error)}"
+            raise EnvironmentFailure(text) from error
 
     def _check(self, observation: np.ndarray) -> None:
-        if not np.abs(observation).max(initial=0) <= LARGEST:
+        shape = self.observation_space.shape
+        try:
+            is_finite = np.abs(observation).max(initial=0) <= LARGEST
+        except (TypeError, ValueError) as error:
+            what = f"the observation of {self._id} isn't a vector of numbers"
+            raise WorkbenchError(f"{what}: {' '.join(repr(observation).split())}") from error
+        if np.shape(observation) != shape:
+            raise WorkbenchError(
+                f"the observation of {self._id} has the shape {np.shape(observation)}, its "
+                f"observation_space {shape}"
+            )
+        if not is_finite:
             raise self._error("observation", observation)
 
     def _error(self, what: str, value: Any) -> WorkbenchError:
         text = " ".join(str(value).split())
         return WorkbenchError(f"the {what} of {self._id} isn't finite in float32: {text}")
+
+
+def _told(error: BaseException) -> str:
+    """An error in one line, with the place in the user's own code, if it went through that."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
+    place = (own or frames)[-1]
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}{': ' if text else ''}{text} ({place.filename}:{place.lineno})"
 
 
 def shares_robot(env: gymnasium.Env[Any, Any]) -> bool:

@@ -5,6 +5,8 @@ from typing import Any
 
 import torch
 
+from rl_workbench.states import array, number, sequence, whole
+
 
 @dataclass
 class History:
@@ -35,15 +37,23 @@ class History:
         """Takes over what `state_dict` gave.
 
         Raises:
-            TypeError, ValueError, LookupError, AttributeError: if it gave something else.
+            TypeError, ValueError, LookupError: if it gave something else.
         """
-        self.returns = [float(each) for each in state["returns"].tolist()]
-        self.lengths = [int(each) for each in state["lengths"].tolist()]
-        if len(self.returns) != len(self.lengths):
-            raise ValueError(f"{len(self.returns)} returns, {len(self.lengths)} lengths")
-        self.evaluations = [(int(step), float(mean)) for step, mean in state["evaluations"]]
-        self.best = None
-        if state["best"] is not None:
-            step, mean = state["best"]
-            self.best = (int(step), float(mean))
-        self.seconds = float(state["seconds"])
+        self.returns = array(state["returns"], torch.float64, (None,)).tolist()
+        lengths = array(state["lengths"], torch.int64, (len(self.returns),))
+        self.lengths = [whole(each) for each in lengths.tolist()]
+        self.evaluations = [evaluation_of(each) for each in sequence(state["evaluations"])]
+        self.best = None if state["best"] is None else evaluation_of(state["best"])
+        self.seconds = number(state["seconds"])
+        if self.seconds < 0:
+            raise ValueError(f"{self.seconds} s of wall time")
+
+
+def evaluation_of(state: Any) -> tuple[int, float]:
+    """Step and mean return, from a checkpoint.
+
+    Raises:
+        ValueError: if it holds something else.
+    """
+    step, mean = sequence(state, 2)
+    return whole(step), number(mean)

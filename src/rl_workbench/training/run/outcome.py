@@ -1,15 +1,19 @@
 """What a training came to: its picture, its summary, and what the user is told of it."""
 
+import contextlib
 import os
 import shlex
+import traceback
 from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
 from rl_workbench.curves import learning_curve
+from rl_workbench.errors import WorkbenchError
 from rl_workbench.figure import as_png
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.checkpoints import candidates
+from rl_workbench.training.run.environments import EnvironmentFailure
 from rl_workbench.training.run.evaluator import Evaluation
 from rl_workbench.training.run.files import as_json, write_atomically
 from rl_workbench.training.run.folder import versions
@@ -17,6 +21,7 @@ from rl_workbench.training.run.history import History
 from rl_workbench.training.run.progress import tell
 
 WINDOW = 20  # [episodes] over which a mean length counts
+TRACEBACK = "failure.txt"  # of an environment that failed
 LAST = 100  # [episodes] over which the summary reports a mean return
 
 
@@ -94,6 +99,17 @@ class TrainingOutcome(NamedTuple):
         if not candidates(self.folder):
             return ""
         return f"; --resume {shlex.quote(str(self.folder))} goes on from the last checkpoint"
+
+
+def write_traceback(folder: Path, failure: WorkbenchError) -> str:
+    """Writes that of an environment's own code into the folder; returns the words for it."""
+    if not isinstance(failure, EnvironmentFailure):
+        return ""
+    path, text = folder / TRACEBACK, "".join(traceback.format_exception(failure.__cause__))
+    with contextlib.suppress(OSError):  # what can't be written isn't what the user has to hear of
+        write_atomically(path, lambda stream: stream.write(text.encode(errors="replace")))
+        return f"; the traceback is in {path}"
+    return ""
 
 
 def _mean(values: list[float] | list[int]) -> float | None:

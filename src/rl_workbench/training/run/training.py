@@ -9,18 +9,21 @@ from typing import Any
 import torch
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import whole
 from rl_workbench.training.options.record import read_record
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.algorithm import make_algorithm
 from rl_workbench.training.run.checkpoints import Checkpoints, candidates, fitting, read_newest
 from rl_workbench.training.run.evaluator import Evaluation, Evaluator
-from rl_workbench.training.run.history import History
+from rl_workbench.training.run.history import History, evaluation_of
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.outcome import WINDOW, TrainingOutcome
+from rl_workbench.training.run.outcome import WINDOW, TrainingOutcome, write_traceback
 from rl_workbench.training.run.progress import Progress, tell
 from rl_workbench.training.run.random_states import random_states, restore_random_states, seed_all
 from rl_workbench.training.run.scalar_log import ScalarLog
+
+AT_THE_END = "best_at_the_end"  # of a checkpoint: the score of its evaluation after it, if the best
 
 
 class Training:
@@ -46,14 +49,14 @@ class Training:
         self._history, self._log_bytes = History(), 0
         self._resumed = self._read_checkpoint() if options.resume else None
         seed_all(self._run.seed)
-        self._algorithm = make_algorithm(options)
-        try:
+        with contextlib.ExitStack() as making:
+            self._algorithm = make_algorithm(options)
+            making.callback(self._algorithm.close)
             self._evaluator = Evaluator(self._run, self._algorithm, interrupt.requested)
+            making.callback(self._evaluator.close)
             if self._resumed:
                 self._take_over(self._resumed)
-        except WorkbenchError:
-            self._algorithm.close()
-            raise
+            making.pop_all()
         self._saved_at = -1  # [steps]
         self._is_written = True  # whatever was to be
         self._evaluation: Evaluation | None = None  # the one at the end
@@ -75,7 +78,7 @@ class Training:
         self._algorithm.load_state_dict(content)
         with fitting("history"):
             self._history.load_state_dict(content["history"])
-            self._log_bytes = int(content["log_bytes"])
+            self._log_bytes = whole(content["log_bytes"])
         with fitting("state of the random generators"):
             restore_random_states(content["random"])
 
@@ -95,9 +98,17 @@ class Training:
         except (OSError, MemoryError) as error:
             failure = self._not_written(error)
         finally:
-            self._evaluator.close()
-            self._algorithm.close()
+            failure = self._close(failure)
         self._finish(failure)
+
+    def _close(self, failure: WorkbenchError | None) -> WorkbenchError | None:
+        """Closes the environments; returns the first failure."""
+        for part in (self._evaluator, self._algorithm):
+            try:
+                part.close()
+            except WorkbenchError as error:
+                failure = failure or error
+        return failure
 
     def _train(self) -> None:
         self._checkpoints.remove_leftovers()
@@ -144,6 +155,9 @@ class Training:
         with fitting("state of the environment"):
             algorithm.start_environment(self._resumed["environment"], self._shown.say)
         restore_random_states(self._resumed["random"])
+        if AT_THE_END in self._resumed and not self._is_complete():
+            with fitting("score"):
+                self._history.best = evaluation_of(self._resumed[AT_THE_END])
         tell(f"going on at step {algorithm.steps}{self._of_total()}: {self.folder}")
         self._resumed = None  # a replay buffer's worth of memory
         if algorithm.steps:
@@ -232,13 +246,14 @@ class Training:
     def _evaluate_at_the_end(self) -> None:
         """Evaluates the complete training, unless that was done at this step already.
 
-        The last checkpoint doesn't know of it: a training that is prolonged goes on as if it had
-        been longer from the beginning.
+        The last checkpoint's history doesn't know of it: a training that is prolonged goes on as if
+        it had been longer from the beginning, but keeps this `best.pt` until there is a better one.
         """
         if not self._is_complete() or self._interrupt.requested() or self._was_evaluated():
             return
         content = self._content()
         if self._evaluate(is_last=True):
+            content[AT_THE_END] = self._history.state_dict()["best"]
             self._checkpoints.save(self._algorithm.steps, content, best=True)
 
     def _evaluate(self, is_last: bool) -> bool:
@@ -305,7 +320,9 @@ class Training:
         outcome.tell()
         # A simulator dies of the same Ctrl-C; what couldn't be written has to be told all the same.
         if failure and not (self._interrupt.requested() and self._is_written):
-            raise WorkbenchError(f"{failure}; {outcome.what_is_left(self._is_written)}")
+            left = outcome.what_is_left(self._is_written)
+            place = write_traceback(self.folder, failure)
+            raise WorkbenchError(f"{failure}{place}; {left}") from failure
 
     def _not_written(self, error: OSError | MemoryError) -> WorkbenchError:
         self._is_written = False

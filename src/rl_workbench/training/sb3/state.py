@@ -4,12 +4,14 @@ Not in it: the state of the environment and of the random generators, and a roll
 whole yet. So a resumed training begins a new episode, and isn't the same to the bit.
 """
 
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 import torch
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import array, check_optimizer, switch, whole
 from rl_workbench.training.run.checkpoints import fitting
 
 COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_n_calls")
@@ -58,15 +60,22 @@ def restore(model: Any, state: dict[str, Any], seed: int) -> None:
         WorkbenchError: if the state is another model's.
     """
     with fitting("model"):
+        new = state_of(model)
+        for part in ("optimizers", "counters"):
+            if not isinstance(state[part], dict) or set(state[part]) != set(new[part]):
+                raise ValueError(f"{part} are {state[part]!r}")
+        for name, optimizer in state["optimizers"].items():
+            check_optimizer(attrgetter(name)(model), optimizer)
         model.set_parameters({"policy": state["policy"], **state["optimizers"]})
-        if state["entropy"] is not None:
-            getattr(model, ENTROPY).data.copy_(state["entropy"])
+        if new["entropy"] is not None:
+            entropy = array(state["entropy"], new["entropy"].dtype, tuple(new["entropy"].shape))
+            getattr(model, ENTROPY).data.copy_(torch.from_numpy(entropy))
         for name, value in state["counters"].items():
-            setattr(model, name, int(value))
-        if state["buffer"] is not None:
+            setattr(model, name, whole(value))
+        if new["buffer"] is not None:
             _restore_buffer(model.replay_buffer, state["buffer"])
         # Another seed than at the start, or the same episodes would be explored again.
-        model.set_random_seed((seed + int(state["steps"])) % 2**31)
+        model.set_random_seed((seed + whole(state["steps"])) % 2**31)
 
 
 def _buffer_state(buffer: Any) -> dict[str, Any] | None:
@@ -86,6 +95,13 @@ def _buffer_state(buffer: Any) -> dict[str, Any] | None:
 
 
 def _restore_buffer(buffer: Any, state: dict[str, Any]) -> None:
-    buffer.pos, buffer.full = int(state["position"]), bool(state["full"])
-    for name, values in state["arrays"].items():
-        getattr(buffer, name)[: len(values)] = values.numpy()
+    position, is_full = whole(state["position"]), switch(state["full"])
+    count = buffer.buffer_size if is_full else position
+    if position >= buffer.buffer_size:
+        raise ValueError(f"place {position} in a buffer of {buffer.buffer_size}")
+    for name in ARRAYS:
+        own = getattr(buffer, name, None)
+        if isinstance(own, np.ndarray):
+            dtype = torch.from_numpy(own[:0]).dtype
+            own[:count] = array(state["arrays"][name], dtype, (count, *own.shape[1:]))
+    buffer.pos, buffer.full = position, is_full

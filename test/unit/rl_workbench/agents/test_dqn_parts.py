@@ -113,7 +113,7 @@ def test_replay_from_its_state(count: int) -> None:
     buffer, copy = filled(5, count), ReplayBuffer(5, 2)
     state = buffer.state_dict()
     assert len(state["actions"]) == min(5, count), "only what is filled"
-    copy.load_state_dict(state)
+    copy.load_state_dict(state, 99)
     for each in (buffer, copy):
         each.push(transition(50))
     draws = [each.sample(2, np.random.default_rng(1)) for each in (buffer, copy)]
@@ -122,9 +122,11 @@ def test_replay_from_its_state(count: int) -> None:
 
 def test_replay_refuses_what_does_not_fit() -> None:
     with pytest.raises(WorkbenchError, match="can't hold"):
-        ReplayBuffer(2, 2).load_state_dict(filled(5, 5).state_dict())
-    with pytest.raises(WorkbenchError, match="another shape"):
-        ReplayBuffer(5, 3).load_state_dict(filled(5, 5).state_dict())
+        ReplayBuffer(2, 2).load_state_dict(filled(5, 5).state_dict(), 5)
+    with pytest.raises(WorkbenchError, match="other actions than 0 to 3"):
+        ReplayBuffer(5, 2).load_state_dict(filled(5, 5).state_dict(), 4)
+    with pytest.raises(ValueError, match=r"of shape \(5, 3\) is expected, not \(5, 2\)"):
+        ReplayBuffer(5, 3).load_state_dict(filled(5, 5).state_dict(), 5)
 
 
 def oracle(rewards: list[float], steps: int, gamma: float, terminated: bool) -> list[tuple]:
@@ -154,8 +156,11 @@ def test_n_step_returns(steps: int, terminated: bool) -> None:
 def test_n_step_returns_from_their_state() -> None:
     one, other = NStepReturns(3, 0.9), NStepReturns(3, 0.9)
     for index in range(2):
-        assert one.add((np.array([index]), index, 1.0), np.array([index + 1]), False, True) == []
-    other.load_state_dict(one.state_dict())
+        assert (
+            one.add((np.array([index], np.float32), index, 1.0), np.array([index + 1]), False, True)
+            == []
+        )
+    other.load_state_dict(one.state_dict(), 1, 2)
     added = [each.add((np.array([2]), 2, 1.0), np.array([3]), False, True) for each in (one, other)]
     assert added[0] == added[1] and len(added[0]) == 1
     one.clear()

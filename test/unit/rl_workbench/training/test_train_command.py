@@ -2,7 +2,10 @@
 
 import argparse
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -34,6 +37,14 @@ def failed(capsys, *arguments: str, code: int = 1) -> str:
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1 and lines[0].startswith("rl-workbench train: ")
     return lines[0]
+
+
+def refused(capsys, *arguments: str) -> str:
+    """What is wrong with the arguments, the last line after the usage."""
+    code, _, told = told_and_left(capsys, *arguments)
+    usage, line = told.splitlines()
+    assert code == 2 and usage.startswith("usage: ") and ": error: " in line
+    return line
 
 
 def told_and_left(capsys, *arguments: str) -> tuple[int, str, str]:
@@ -127,6 +138,38 @@ def test_wrong_words(capsys, arguments: list[str], words: str) -> None:
     assert code == 2 and words in told and "Traceback" not in told
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--gamma=5"], "gamma lies between 0 and 1, not 5.0"),
+        (["--params", "gamma=5"], "gamma lies between 0 and 1, not 5.0"),
+        (["--params", "gama=1"], "unknown option 'gama'; did you mean gamma?"),
+        (["--config=none.yaml"], "can't read none.yaml: No such file"),
+        (["--env-id="], "env_id names an environment"),
+    ],
+)
+def test_wrong_values(capsys, arguments: list[str], words: str) -> None:
+    assert words in refused(capsys, "--algo=reinforce", *arguments)
+
+
+def test_a_reader_that_goes_away_before_the_help(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    for command, code in (
+        (["train", "--algo=dqn", "--help"], 0),
+        (["--help"], 0),
+        (["eval", "--help"], 0),
+        (["train", "--algo=dqn", "--gamma=5"], 2),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-m", "rl_workbench", *command],
+            stdout=writing, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == code
+        assert ("usage: " in done.stderr) is bool(code) and "Error" not in done.stderr
+    os.close(writing)
+
+
 def test_help_names_all_algorithms_and_theirs_what_they_know(capsys) -> None:
     code, told, _ = told_and_left(capsys, "--help")
     names = "dqn, reinforce, reinforce-document, ppo, a2c, sac, td3, ddpg, dqn-sb3"
@@ -195,16 +238,16 @@ def test_a_run_folder_in_use(capsys, tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_resumed(capsys, tmp_path: Path) -> None:
-    assert "is no run folder" in failed(capsys, f"--resume={tmp_path}")
+    assert "is no run folder" in refused(capsys, f"--resume={tmp_path}")
     assert main([*REINFORCE, "--run-dir=run"]) == 0
     with held(tmp_path / "run"):
         assert "a training is running in" in failed(capsys, "--resume=run")
-    assert "--resume allows no --seed" in failed(capsys, "--resume=run", "--seed=1")
-    line = failed(capsys, "--resume=run", "--algo=dqn")
+    assert "--resume allows no --seed" in refused(capsys, "--resume=run", "--seed=1")
+    line = refused(capsys, "--resume=run", "--algo=dqn")
     assert "run/config.json is of a training by reinforce, not by dqn" in line
     content = json.loads(Path("run/config.json").read_text())
     Path("run/config.json").write_text(json.dumps(content | {"algorithm": "pg"}))
-    assert "the algorithm pg is called reinforce now" in failed(capsys, "--resume=run")
+    assert "the algorithm pg is called reinforce now" in refused(capsys, "--resume=run")
 
 
 def test_ctrl_c_before_the_training(capsys, monkeypatch) -> None:

@@ -54,6 +54,30 @@ def test_defaults(empty: str) -> None:
     )
 
 
+@pytest.mark.parametrize("kind", [REINFORCE, DOCUMENT])
+def test_steps_without_episodes_mean_until_the_steps(kind: AlgorithmKind, tmp_path: Path) -> None:
+    """Wherever the steps were given, the episodes of what is weaker don't count."""
+
+    def length(text: str, *flags: str, **parameters: Any) -> tuple[int, int]:
+        run = choose(kind, [written(tmp_path, text), *flags], parameters).run
+        return run.total_timesteps, run.episodes
+
+    assert length("{}\n") == (0, 600)
+    assert length("{}\n", "--total-timesteps=5e3") == (5000, 0)
+    assert length("{}\n", "--params", "total_timesteps=5e3") == (5000, 0)
+    assert length("{}\n", total_timesteps=5000) == (5000, 0)
+    assert length("total_timesteps: 5000\n") == (5000, 0)
+    assert length("episodes: 70\n", "--total-timesteps=5e3") == (5000, 0)
+    assert length("episodes: 70\ntotal_timesteps: 5000\n") == (5000, 70)
+    assert length("{}\n", "--total-timesteps=5e3", "--episodes=9") == (5000, 9)
+    assert length("{}\n", "--total-timesteps=0") == (0, 600)
+
+
+def test_episodes_do_not_prolong_what_schedules_depend_on(empty: str) -> None:
+    run = choose(DQN, [empty, "--episodes=9"]).run
+    assert (run.total_timesteps, run.episodes) == (50_000, 9)
+
+
 def test_every_option_of_dqn_is_a_flag(empty: str) -> None:
     text = """--env-id Acrobot-v1 --seed 3 --total-timesteps 2e4 --learning-rate 0.01
         --buffer-size 9 --gamma 0.9 --batch-size 8 --target-network-frequency 7 --tau 0.5

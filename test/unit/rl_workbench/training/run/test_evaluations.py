@@ -76,8 +76,26 @@ def test_the_best_is_that_of_the_best_evaluation(tmp_path: Path, name: str) -> N
     assert result["best"] == max(result["evaluations"], key=lambda each: each[1])
     best = checkpoint(tmp_path, "best.pt")
     assert best["steps"] == result["best"][0]
-    if name in EXACT or result["best"][0] < result["steps"]:
-        assert best["history"]["best"] in (result["best"], None), "None: found at the end"
+    own = best.get("best_at_the_end", best["history"]["best"])
+    assert own == result["best"], "it knows its own score"
+
+
+@pytest.mark.parametrize("name", ["dqn", "reinforce", *OTHERS[:1]])
+def test_prolonged_a_worse_one_does_not_take_the_place_of_the_best(
+    tmp_path: Path, monkeypatch, name: str
+) -> None:
+    """Also if that was found at the end, of which the last checkpoint doesn't know otherwise."""
+    verdicts = [5.0, 9.0, *[7.0] * 9]
+    monkeypatch.setattr(evaluator, "run_greedily", lambda *_: Evaluation([1], [verdicts.pop(0)]))
+    numbers = {"confirm_episodes": 0, "episodes": 0, "eval_frequency": 128, "total_timesteps": 192}
+    first = summary(train(tmp_path, name, **numbers))
+    assert [mean for _, mean in first["evaluations"]] == [5.0, 9.0]
+    assert first["best"] == [first["steps"], 9.0]
+    longer = summary(resume(tmp_path, total_timesteps=384))
+    assert len(longer["evaluations"]) >= 2
+    assert longer["best"] == first["best"]
+    best = checkpoint(tmp_path, "best.pt")
+    assert (best["steps"], best["best_at_the_end"]) == (first["steps"], first["best"])
 
 
 def test_a_worse_or_equal_one_later_does_not_take_its_place(tmp_path: Path, monkeypatch) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.run.environments import CheckedEnvironment
+from rl_workbench.training.run.environments import CheckedEnvironment, make_environment
 
 
 class Device(gymnasium.Env[np.ndarray, int]):
@@ -40,11 +40,57 @@ class Device(gymnasium.Env[np.ndarray, int]):
 def test_a_lost_connection_is_the_environments_and_not_the_disks(error: OSError) -> None:
     """The frame says of an OSError that the run folder can't be written to."""
     env = CheckedEnvironment(Device(error), "Device-v0")
-    words = "^Device-v0 failed: .*(reset by peer|TimeoutError)"
+    words = r"^Device-v0 failed in (reset|step)\(\): .*(reset by peer|TimeoutError)"
     with pytest.raises(WorkbenchError, match=words):
         env.reset()
     with pytest.raises(WorkbenchError, match=words):
         env.step(0)
+
+
+def test_a_constructor_with_a_mistake(monkeypatch) -> None:
+    class Broken(Device):
+        def __init__(self) -> None:
+            raise ZeroDivisionError("of mine")
+
+    monkeypatch.setitem(
+        gymnasium.registry, "Broken-v0", gymnasium.envs.registration.EnvSpec("Broken-v0", Broken)
+    )
+    words = (
+        r"^can't make Broken-v0: ZeroDivisionError: of mine \(.*test_failing_environments.py:\d+\)$"
+    )
+    with pytest.raises(WorkbenchError, match=words):
+        make_environment("Broken-v0")
+
+
+@pytest.mark.parametrize(
+    ("observation", "words"),
+    [
+        (None, "isn't a vector of numbers: None"),
+        ("text", "isn't a vector of numbers: 'text'"),
+        ([[1.0], [2.0, 3.0]], "isn't a vector of numbers"),
+        (np.zeros(3), r"has the shape \(3,\), its observation_space \(2,\)"),
+        (np.zeros((1, 2)), r"has the shape \(1, 2\), its observation_space \(2,\)"),
+        (1.0, r"has the shape \(\), its observation_space \(2,\)"),
+    ],
+    ids=str,
+)
+def test_an_observation_of_another_form(observation: Any, words: str) -> None:
+    class Odd(Device):
+        def reset(self, **_: Any) -> tuple[Any, dict[str, Any]]:
+            return observation, {}
+
+    with pytest.raises(WorkbenchError, match=f"^the observation of Odd-v0 {words}"):
+        CheckedEnvironment(Odd(1.0), "Odd-v0").reset()
+
+
+@pytest.mark.parametrize("answer", [None, (1, 2), (np.zeros(2), 1.0, False, {})])
+def test_a_step_that_answers_something_else(answer: Any) -> None:
+    class Odd(Device):
+        def step(self, action: int) -> Any:
+            return answer
+
+    with pytest.raises(WorkbenchError, match=r"^Odd-v0 failed in step\(\): (Type|Value)Error: "):
+        CheckedEnvironment(Odd(1.0), "Odd-v0").step(0)
 
 
 @pytest.mark.parametrize("reward", [None, "much", [1.0, 2.0]])
