@@ -36,8 +36,8 @@ class Holds:
             self._update()
         timer = threading.Timer(patience, self._give_up, (holder, late))
         timer.daemon = True
-        timer.start()
         try:
+            timer.start()  # may fail: where memory is short there is no thread to be had
             yield
         finally:
             timer.cancel()

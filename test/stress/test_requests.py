@@ -4,14 +4,12 @@ import json
 import random
 import sys
 from collections import Counter
-from pathlib import Path
 
 import pytest
 from stress.places import BOUND
 from stress.scenario import Scenario
 from stress.worlds import world
 
-SUPPORT = Path(__file__).resolve().parents[1] / "support"
 BATCHES, BATCH = 10, 1000
 full = pytest.mark.stress(full=True)
 
@@ -26,7 +24,6 @@ full = pytest.mark.stress(full=True)
 def test_odd_requests(scenario: Scenario, engine: str, mode: str) -> None:
     size, sent = max(30, scenario.share(BATCHES * BATCH) // scenario.share(BATCHES)), Counter()
     with world(engine, mode) as here:
-        here.place.environment["PYTHONPATH"] += f":{SUPPORT}"
 
         def case(number: int, dice: random.Random) -> None:
             odd = here.place.start(

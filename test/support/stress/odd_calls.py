@@ -18,9 +18,13 @@ import rosgraph
 import rospy
 import rosservice
 import rostopic
-from gazebo_msgs.srv import GetWorldProperties, SpawnModel
+from gazebo_msgs.srv import (
+    GetPhysicsProperties,
+    GetWorldProperties,
+    SetPhysicsProperties,
+    SpawnModel,
+)
 from geometry_msgs.msg import Point, Pose
-from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from odd_requests import BOX, SIMPLE, messages, requests
 from std_srvs.srv import Empty
@@ -30,6 +34,7 @@ from cartpole.robot import ROBOT
 from robot_envs.backends import bring_up
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceGone
 from ros_calls.xmlrpc import BadAnswer, Refused, call
+from stress.drawing import drawn
 
 NODE = "/gazebo"
 OFTEN = 50  # calls, after which the world is completed again
@@ -61,26 +66,6 @@ ARGUMENTS = st.recursive(
     max_leaves=6,
 )
 Call = Callable[[], object]
-
-
-def drawn(strategy: st.SearchStrategy[Any], count: int, number: int) -> list[Any]:
-    """So many values of a strategy, the same for the same number."""
-    found: list[Any] = []
-
-    @seed(number)
-    @settings(
-        max_examples=count,
-        deadline=None,
-        database=None,
-        phases=[Phase.generate],
-        suppress_health_check=list(HealthCheck),
-    )
-    @given(strategy)
-    def take(value: Any) -> None:
-        found.append(value)
-
-    take()
-    return found
 
 
 class OddCalls:
@@ -174,6 +159,16 @@ def complete() -> None:
         assert spawn("box", BOX, "", pose, "world").success
 
 
+def let_run() -> None:
+    """Gives the world its usual time again: an odd request may make a step last for years, by right."""
+    physics = ServiceClient("/gazebo/get_physics_properties", GetPhysicsProperties, timeout=BOUND)()
+    answer = ServiceClient("/gazebo/set_physics_properties", SetPhysicsProperties, timeout=BOUND)(
+        0.001, 1000.0, physics.gravity, physics.ode_config
+    )
+    assert answer.success, answer.status_message
+    ServiceClient("/gazebo/unpause_physics", Empty, timeout=BOUND)()
+
+
 def main(number: int, count: int) -> None:
     """Calls so often, and leaves a world that runs."""
     rospy.init_node("odd_calls", anonymous=True, disable_rostime=True, disable_signals=True)
@@ -185,7 +180,7 @@ def main(number: int, count: int) -> None:
         if done % OFTEN == 0:
             complete()
         call_it()
-    ServiceClient("/gazebo/unpause_physics", Empty, timeout=BOUND)()
+    let_run()
     print(json.dumps({"sent": odd.sent, "answered": odd.answered}), flush=True)
 
 

@@ -18,13 +18,19 @@ OURS = re.compile(r'File "[^"]*/(?:src|scripts|companions)/(?!\.)[^"]*"')  # of 
 
 
 @contextlib.contextmanager
-def place() -> Iterator[Place]:
-    """A master's address and a folder, with a folder for temporary files and logs of its own."""
+def place(folder: Path | None = None) -> Iterator[Place]:
+    """A master's address and a folder.
+
+    Args:
+        folder: for temporary files and logs; None for one of its own.
+    """
     made = Place()
-    temporary, logs = made.folder / "tmp", made.folder / "log"
+    temporary, logs = (folder or made.folder) / "tmp", (folder or made.folder) / "log"
     temporary.mkdir()
     made.environment |= {"TMPDIR": str(temporary), "ROS_LOG_DIR": str(logs)}
-    made.environment |= {"ROS_HOME": str(made.folder / "home")}
+    # For nodes that are modules of this folder.
+    modules = [os.environ.get("PYTHONPATH", ""), str(Path(__file__).resolve().parents[1])]
+    made.environment |= {"ROS_HOME": str(made.folder / "home"), "PYTHONPATH": ":".join(modules)}
     try:
         yield made
     finally:

@@ -136,7 +136,10 @@ class _Listener:
 def _crowded() -> bool:
     """Whether three quarters of the file descriptors that this process may have are in use."""
     most, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    return len(os.listdir("/proc/self/fd")) > most * 3 // 4
+    try:
+        return len(os.listdir("/proc/self/fd")) > most * 3 // 4
+    except OSError:  # there is none left to look with
+        return True
 
 
 def _hang_up(client: socket.socket) -> None:

@@ -138,6 +138,22 @@ def test_without_room_for_its_files_a_model_keeps_the_old_world(often, monkeypat
     assert not stays_among_others(tmp_path, lambda: monkeypatch.setattr(writer, full))
 
 
+@pytest.mark.parametrize("function", ["write_urdf", "_size", "scratch_folder"])
+def test_a_full_disk_is_a_reason_and_leaves_the_world_as_it_was(monkeypatch, function):
+    def full(*args: object, **kwargs: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    world, model = World(bullet.BulletEngine()), parse_urdf(chain(2))
+    with monkeypatch.context() as disk:
+        disk.setattr(f"bullet_gazebo.physics.engines.bullet.client.{function}", full)
+        with pytest.raises(DescriptionError, match="files can't be written: No space left"):
+            world.spawn("chain", model, Pose())
+    assert list(world.models) == []
+    world.spawn("chain", model, Pose())
+    world.step()
+    world.close()
+
+
 def history(monkeypatch: pytest.MonkeyPatch, most_waste: int) -> list:
     """What a cart-pole with changed properties and a tumbling body do while other models come and go."""
     monkeypatch.setattr(bullet, "MOST_WASTE", most_waste)

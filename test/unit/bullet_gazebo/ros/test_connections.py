@@ -251,3 +251,14 @@ def test_where_few_descriptors_are_left_no_call_is_answered(calls, monkeypatch) 
     assert ends(socket.create_connection(calls, BOUND))
     monkeypatch.setattr(rospy_patches, "_crowded", lambda: False)
     assert call(calls) == 4
+
+
+def test_where_no_descriptor_is_left_to_count_with_there_are_too_few() -> None:
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    assert not rospy_patches._crowded()
+    resource.setrlimit(resource.RLIMIT_NOFILE, (0, limits[1]))
+    try:
+        crowded = rospy_patches._crowded()
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+    assert crowded

@@ -78,20 +78,23 @@ class BulletClient:
             flags |= (
                 pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
             )
-        with scratch_folder() as folder:
-            path = folder / "model.urdf"
-            path.write_text(write_urdf(parents_first(engine_form), folder), encoding="utf-8")
-            size = _size(folder)
-            try:
+        try:
+            with scratch_folder() as folder:
+                path = folder / "model.urdf"
+                text = write_urdf(parents_first(engine_form), folder)
+                path.write_text(text, encoding="utf-8")
+                size = _size(folder)
                 body = pybullet.loadURDF(
                     str(path), pose.position, pose.orientation, useFixedBase=description.fixed_base,
                     flags=flags, physicsClientId=self._client,
                 )  # fmt: skip
-            except pybullet.error as error:
-                self.waste += size
-                raise DescriptionError(
-                    f"the physics engine can't load the model: {error}"
-                ) from error
+        except pybullet.error as error:
+            self.waste += size
+            raise DescriptionError(f"the physics engine can't load the model: {error}") from error
+        except OSError as error:  # a full disk
+            raise DescriptionError(
+                f"the physics engine's files can't be written: {error.strerror or error}"
+            ) from error
         self._sizes[body] = size
         try:
             made = BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
