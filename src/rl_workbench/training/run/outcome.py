@@ -1,12 +1,12 @@
 """What a training came to: its picture, its summary, and what the user is told of it."""
 
-import os
 import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
 from rl_workbench.curves import learning_curve
+from rl_workbench.extras import watching
 from rl_workbench.figure import as_png
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.checkpoints import candidates
@@ -75,9 +75,7 @@ class TrainingOutcome(NamedTuple):
         tell(f"everything lies in {self.folder}")
         if self.is_interrupted:
             tell(f"interrupted{self._how_to_go_on()}")
-        workspace = os.environ.get("CARTPOLE_WS")  # outside of it there is no tensorboard on PATH
-        command = f"{shlex.quote(workspace)} tensorboard" if workspace else "tensorboard"
-        tell(f"watch: {command} --logdir {shlex.quote(str(self.folder))}")
+        tell(f"watch: {watching(self.folder)}")
 
     def what_is_left(self, is_written: bool) -> str:
         """Of a training that failed.
