@@ -1,10 +1,17 @@
-"""Packages of requirements/extras.txt: there, or a line that says how to get them."""
+"""Commands for the reader of a message, which run as they stand from where the reader is.
+
+What is installed depends on whether `ws` started this process (it then says so in CARTPOLE_WS), or it is a
+plain Python's, or a catkin workspace's.
+"""
 
 import importlib.util
+import os
+import shlex
+import shutil
+import sys
+from pathlib import Path
 
 from rl_workbench.errors import WorkbenchError
-
-HOW = "./ws extras installs it, or, without a workspace, pip install '.[extras]'"
 
 
 def need(module: str, package: str, what: str) -> None:
@@ -14,4 +21,26 @@ def need(module: str, package: str, what: str) -> None:
         WorkbenchError: if it isn't.
     """
     if not importlib.util.find_spec(module):
-        raise WorkbenchError(f"{what} needs {package}, an extra: {HOW}")
+        raise WorkbenchError(f"{what} needs {package}, an extra: {installing(package)} installs it")
+
+
+def installing(package: str) -> str:
+    """The command that installs an extra package."""
+    workspace = os.environ.get("CARTPOLE_WS")
+    command = (
+        [workspace, "extras"] if workspace else [sys.executable, "-m", "pip", "install", package]
+    )
+    return shlex.join(command)
+
+
+def watching(folder: Path) -> str:
+    """The command that shows a run in TensorBoard."""
+    workspace = os.environ.get("CARTPOLE_WS")
+    beside = Path(sys.executable).with_name("tensorboard")
+    if workspace:
+        command = [workspace, "tensorboard"]
+    elif shutil.which("tensorboard") == str(beside):
+        command = ["tensorboard"]
+    else:
+        command = [sys.executable, "-m", "tensorboard.main"]
+    return shlex.join([*command, "--logdir", str(folder)])

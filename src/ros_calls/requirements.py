@@ -35,9 +35,12 @@ def _advice(missing: list[str]) -> str:
     command = [sys.executable, "-m", "pip", "install", "--requirement", str(_file())]
     if _is_managed():
         command.insert(4, "--break-system-packages")
+        more = f"or in a virtual environment: {PAGE}"
+    else:
+        more = f"see {PAGE}"
     return (
         f"Python packages are missing ({', '.join(missing)}); what installs them: {shlex.join(command)}"
-        f" (or use a virtual environment: {PAGE})"
+        f" ({more})"
     )
 
 

@@ -192,7 +192,7 @@ def test_missing_packages_are_one_line(
     assert (ended.returncode, ended.stdout) == (1, "")
     (line,) = ended.stderr.splitlines()
     told = re.fullmatch(
-        rf"{program}: Python packages are missing \((.*)\); what installs them: (.*) \(or .*\)",
+        rf"{program}: Python packages are missing \((.*)\); what installs them: (.*) \(see .*\)",
         line,
     )
     assert missing in told[1]

@@ -68,7 +68,7 @@ def test_debians_python_is_told_how_to_install(tmp_path: Path) -> None:
     assert ended.returncode == 1
     told = re.fullmatch(
         r"program: Python packages are missing \(no_such_module\); what installs them: (.*)"
-        r" \(or use a virtual environment: docs/catkin.md\)\n",
+        r" \((?:or in a virtual environment:|see) docs/catkin.md\)\n",
         ended.stderr,
     )
     python, *arguments, file = shlex.split(told[1])
@@ -84,7 +84,7 @@ def test_the_command_is_one_that_pip_takes() -> None:
     ended = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False
     )
-    command = shlex.split(re.search(r"installs them: (.*) \(or", ended.stderr)[1])
+    command = shlex.split(re.search(r"installs them: (.*) \(see", ended.stderr)[1])
     done = subprocess.run(
         [*command, "--dry-run", "--no-index"], capture_output=True, text=True, check=False,
         env={**os.environ, "PIP_DISABLE_PIP_VERSION_CHECK": "1"},

@@ -1,6 +1,9 @@
 """Physics engines by the names that `physics:=` knows. Each is imported when it is asked for."""
 
 import importlib.util
+import os
+import shlex
+import sys
 
 from bullet_gazebo.physics.engine import Engine
 
@@ -28,11 +31,19 @@ def make_engine(name: str = BULLET[0]) -> Engine:
     return BulletEngine()
 
 
+def _installing() -> str:
+    """The command that installs MuJoCo, for whoever reads it: `ws` says in CARTPOLE_WS where it is."""
+    workspace = os.environ.get("CARTPOLE_WS")
+    command = (
+        [workspace, "extras"] if workspace else [sys.executable, "-m", "pip", "install", "mujoco"]
+    )
+    return shlex.join(command)
+
+
 def _mujoco() -> Engine:
     if importlib.util.find_spec("mujoco") is None:
         raise EngineError(
-            "physics engine 'mujoco' is not installed; './ws extras' in the checkout of cartpole "
-            "installs it, or 'pip install mujoco' elsewhere"
+            f"physics engine 'mujoco' is not installed; '{_installing()}' installs it"
         )
     from bullet_gazebo.physics.engines.mujoco.engine import MujocoEngine
 

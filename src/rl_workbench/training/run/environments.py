@@ -1,5 +1,6 @@
 """Gymnasium's environments by id, in the form that an agent wants, with errors that help."""
 
+import os
 import sysconfig
 import traceback
 from collections.abc import Iterator, Mapping
@@ -12,6 +13,7 @@ import numpy as np
 from gymnasium import spaces
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.extras import installing
 from rl_workbench.training.options.options import unknown
 
 FLAT = (spaces.Box, spaces.Discrete, spaces.MultiBinary, spaces.MultiDiscrete)
@@ -49,7 +51,11 @@ def make_environment(
     try:
         env: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **(options or {}))
     except gymnasium.error.DependencyNotInstalled as error:
-        raise WorkbenchError(f"{env_id} needs more packages, see ./ws extras: {error}") from error
+        workspace = os.environ.get(
+            "CARTPOLE_WS"
+        )  # elsewhere Gymnasium's own text names the command
+        hint = f" ({installing(env_id)} may install them)" if workspace else ""
+        raise WorkbenchError(f"{env_id} needs more packages{hint}: {error}") from error
     except (gymnasium.error.UnregisteredEnv, gymnasium.error.DeprecatedEnv) as error:
         known = sorted(gymnasium.registry)
         raise WorkbenchError(_nearest(env_id, known)) from error

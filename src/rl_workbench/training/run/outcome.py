@@ -1,7 +1,6 @@
 """What a training came to: its picture, its summary, and what the user is told of it."""
 
 import contextlib
-import os
 import shlex
 import traceback
 from dataclasses import asdict
@@ -10,6 +9,7 @@ from typing import NamedTuple
 
 from rl_workbench.curves import learning_curve
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.extras import watching
 from rl_workbench.figure import as_png
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.checkpoints import candidates
@@ -80,9 +80,7 @@ class TrainingOutcome(NamedTuple):
         tell(f"everything lies in {self.folder}")
         if self.is_interrupted:
             tell(f"interrupted{self._how_to_go_on()}")
-        workspace = os.environ.get("CARTPOLE_WS")  # outside of it there is no tensorboard on PATH
-        command = f"{shlex.quote(workspace)} tensorboard" if workspace else "tensorboard"
-        tell(f"watch: {command} --logdir {shlex.quote(str(self.folder))}")
+        tell(f"watch: {watching(self.folder)}")
 
     def what_is_left(self, is_written: bool) -> str:
         """Of a training that failed.

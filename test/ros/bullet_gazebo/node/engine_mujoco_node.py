@@ -121,7 +121,7 @@ class MujocoTest(unittest.TestCase):
         self.assertEqual(ended.returncode, 1)
         lines = [line for line in ended.stderr.splitlines() if "mujoco" in line]
         self.assertEqual(len(lines), 1, ended.stderr)
-        self.assertIn("./ws extras", lines[0])
+        self.assertIn("/ws extras", lines[0])
         self.assertNotIn("Traceback", ended.stderr)
 
 

@@ -356,4 +356,4 @@ def test_an_extra_that_is_missing(runs: Path, tmp_path: Path, monkeypatch, capsy
         ["sweep", "--out", tmp_path / "sweep"],
         ["train", "--algo", "ppo"],
     ):
-        assert "./ws extras" in refused(capsys, *arguments)
+        assert "/ws extras installs it" in refused(capsys, *arguments)
