@@ -38,7 +38,9 @@ def _without_greeting() -> Iterator[None]:
         yield
     finally:
         stream.value = before
-        library.fflush(ctypes.c_void_p(held))  # and never closed: another thread may have begun to use it
+        library.fflush(
+            ctypes.c_void_p(held)
+        )  # and never closed: another thread may have begun to use it
         lines = ctypes.string_at(text, size.value).splitlines(keepends=True)
         kept = b"".join(line for line in lines if not line.startswith(GREETING))
         if kept:
