@@ -130,11 +130,16 @@ def test_draws_fill_their_ranges():
     assert drawn.max(axis=0) == pytest.approx([1.2, 1.2, 1.1, 2.0, 0.01], abs=0.01)
 
 
-def test_a_world_that_blew_up_is_an_error_and_can_be_reset(backend):
-    backend.reset(UPRIGHT._replace(pole_velocity=1e308))
+def test_a_state_that_is_not_a_number_is_an_error_and_can_be_reset(backend):
     with pytest.raises(SimulatorError, match="isn't finite"):
-        for _ in range(100):
-            backend.act((0.0,))
+        backend.reset(UPRIGHT._replace(pole_angle=math.nan))
+    assert run(backend) == run(cartpole())
+
+
+def test_a_blow_up_is_contained_and_leaves_nothing_behind(backend, caplog):
+    backend.reset(UPRIGHT._replace(pole_velocity=1e308))
+    assert all(np.isfinite(backend.act((0.0,))).all() for _ in range(100))
+    assert "joint 'cart_pole' of model 'cartpole' blew up" in caplog.text
     assert run(backend) == run(cartpole())
 
 

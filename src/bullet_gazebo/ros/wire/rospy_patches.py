@@ -44,7 +44,9 @@ from rospy.impl.tcpros_service import ServiceImpl
 Address = tuple[str, int]
 LENGTH = struct.Struct("<I")  # in front of all that ROS sends
 LARGEST_HEADER = 2**18  # [bytes]; the text of a message's definition is the longest part
-LARGEST_MESSAGE = 2**26  # [bytes]; of a request, or of what comes on a topic
+# Of a request, or of what comes on a topic [bytes]. A text that is too long to be read (MAX_BYTES of
+# file_reading) fits in, so that its sender gets an answer, not a connection that ends.
+LARGEST_MESSAGE = 2**27
 LARGEST_CALL = 2**24  # [bytes]; of an XML-RPC call
 SILENCE = 30.0  # [s] that a client may say nothing in the midst of a header
 IDLE = 300.0  # [s] the same in an XML-RPC call, and between two: clients keep connections, and renew them
