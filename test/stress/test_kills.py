@@ -9,7 +9,7 @@ from stress.scenario import Scenario
 from stress.trainings import forked, new, random_moment
 from training_runs import assert_no_doubles, assert_same_run, summary
 
-KILLS = 5  # of one training
+KILLS = 3  # of one training
 full = pytest.mark.stress(full=True)
 
 
@@ -58,6 +58,6 @@ def test_killed_and_resumed(scenario: Scenario, whole, tmp_path: Path, name: str
         else:
             assert_same_run(unharmed, run)
 
-    row = scenario.run(f"kill -9 of a training, resumed: {name}", 12, case, lanes=2, unit=KILLS)
+    row = scenario.run(f"kill -9 of a training, resumed: {name}", 20, case, lanes=2, unit=KILLS)
     row.notes.append(f"{sum(killed)} before its end")
     assert any(killed)

@@ -32,7 +32,7 @@ CROWD = 40  # connections
 ROOM = 30 << 20  # [bytes]
 full = pytest.mark.stress(full=True)
 ENGINES = [
-    pytest.param("ode", marks=pytest.mark.stress),
+    pytest.param("ode", marks=full),
     pytest.param("mujoco", marks=[full, pytest.mark.extras("mujoco")]),
 ]
 
