@@ -32,5 +32,5 @@ def read_record(folder: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise WorkbenchError(f"{folder} is no run folder: {path}: {error.strerror}") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:  # the latter of brackets within brackets
         raise WorkbenchError(f"{path} isn't JSON: {error}") from error

@@ -35,6 +35,7 @@ class TrainingOutcome(NamedTuple):
     is_complete: bool
     is_interrupted: bool
     evaluation: Evaluation | None  # the last one
+    is_in_place: bool = True  # else another folder is where its own was
 
     def write(self, failure: str | None) -> None:
         """Writes learning_curve.png and summary.json.
@@ -77,6 +78,8 @@ class TrainingOutcome(NamedTuple):
             line += f"; the last one over {len(evaluation.lengths)} greedy episodes: length "
             line += f"{evaluation.mean_length:.1f}, return {evaluation.mean_return:.1f}"
         tell(line)
+        if not self.is_in_place:
+            return
         tell(f"everything lies in {self.folder}")
         if self.is_interrupted:
             tell(f"interrupted{self._how_to_go_on()}")
@@ -94,7 +97,7 @@ class TrainingOutcome(NamedTuple):
         return text + self._how_to_go_on()
 
     def _how_to_go_on(self) -> str:
-        if not candidates(self.folder):
+        if not self.is_in_place or not candidates(self.folder):
             return ""
         return f"; --resume {shlex.quote(str(self.folder))} goes on from the last checkpoint"
 

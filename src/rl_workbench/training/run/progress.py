@@ -16,9 +16,18 @@ WIDTH = 100  # [columns] of the bar on a terminal that doesn't tell its size
 
 
 def tell(text: str, stream: TextIO | None = None) -> None:
-    """Tells the user, at once also when the output is a pipe; one that is gone costs no training."""
+    """Tells the user, at once also when the output is a pipe; one that is gone costs no training.
+
+    Nor does a sign that the output's encoding doesn't have: it comes as its number.
+    """
     with contextlib.suppress(OSError):
-        print(text, file=stream, flush=True)
+        print(writable(text, stream or sys.stdout), file=stream, flush=True)
+
+
+def writable(text: str, stream: TextIO | None) -> str:
+    """`text` with backslashes for what the stream can't write, as the path of a folder may hold."""
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def warn(text: str) -> None:
@@ -105,7 +114,7 @@ class Progress:
     def say(self, text: str) -> None:
         """A line of its own, above the bar."""
         if self._bar is not None:
-            self._bar.write(text, file=self._stream)
+            self._bar.write(writable(text, self._stream), file=self._stream)
         else:
             tell(text, self._stream)
 

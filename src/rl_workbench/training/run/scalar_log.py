@@ -161,10 +161,15 @@ def _point(row: bytes) -> Point | None:
 def _add_settings(events: EventFile, settings: dict[str, object]) -> None:
     """Shows settings as a table under TEXT, and as columns under HPARAMS."""
     rows = "\n".join(f"|{name}|{value}|" for name, value in settings.items())
-    events.add(text("hyperparameters", f"|parameter|value|\n|-|-|\n{rows}"))
+    events.add(text("hyperparameters", _utf8(f"|parameter|value|\n|-|-|\n{rows}")))
     plain = {
-        name: value if type(value) in (int, float) else str(value)  # True would become 1
+        name: value if type(value) in (int, float) else _utf8(str(value))  # True would become 1
         for name, value in settings.items()
     }
     for summary in hparams(plain, dict.fromkeys(METRICS, 0.0)):
         events.add(summary)
+
+
+def _utf8(text: str) -> str:
+    """`text` with backslashes for what UTF-8 can't say: the bytes of a path that isn't in it."""
+    return text.encode("utf-8", "backslashreplace").decode()

@@ -1,6 +1,8 @@
 """The frame of every training: open or resume a folder, learn, evaluate, keep the best, save, tell."""
 
 import contextlib
+import errno
+import os
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -57,6 +59,7 @@ class Training:
             if self._resumed:
                 self._take_over(self._resumed)
             making.pop_all()
+        self._place = folder.stat()
         self._saved_at = -1  # [steps]
         self._is_written = True  # whatever was to be
         self._evaluation: Evaluation | None = None  # the one at the end
@@ -254,6 +257,7 @@ class Training:
         content = self._content()
         if self._evaluate(is_last=True):
             content[AT_THE_END] = self._history.state_dict()["best"]
+            self._check_place()
             self._checkpoints.save(self._algorithm.steps, content, best=True)
 
     def _evaluate(self, is_last: bool) -> bool:
@@ -281,8 +285,25 @@ class Training:
         """
         steps = self._algorithm.steps
         if steps != self._saved_at or best:
+            self._check_place()
             self._checkpoints.save(steps, self._content(), best)
             self._saved_at = steps
+
+    def _check_place(self) -> None:
+        """Another run may lie there by now, which is not to be written over.
+
+        Raises:
+            OSError: if the folder isn't the one in which the training began.
+        """
+        if not self._is_in_place():
+            moved = "the folder was moved or removed"
+            raise FileNotFoundError(errno.ENOENT, moved, str(self.folder))
+
+    def _is_in_place(self) -> bool:
+        try:
+            return os.path.samestat(self.folder.stat(), self._place)
+        except FileNotFoundError:
+            return False
 
     def _content(self) -> dict[str, Any]:
         return {
@@ -301,6 +322,7 @@ class Training:
             if self._algorithm.settle():
                 self._save()
             else:
+                self._check_place()
                 self._checkpoints.save_failure(self._content())
 
     # --- the end --------------------------------------------------------------------------------
@@ -309,9 +331,10 @@ class Training:
         """Draws and tells; then passes a failure on, unless the user had stopped anyway."""
         outcome = TrainingOutcome(
             self._options, self.folder, self._history, self._algorithm.steps, self._is_complete(),
-            self._interrupt.requested(), self._evaluation,
+            self._interrupt.requested(), self._evaluation, self._is_in_place(),
         )  # fmt: skip
         try:
+            self._check_place()
             self._algorithm.export(self.folder)
             outcome.write(str(failure) if failure else None)
         except (OSError, MemoryError) as error:

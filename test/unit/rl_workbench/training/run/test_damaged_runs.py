@@ -108,7 +108,7 @@ def test_other_versions_are_told(stopped: Path, capsys) -> None:
     "content",
     ['{"algorithm": "dqn"}', "[]", "{", "", '{"algorithm": "dqn", "run": [1], "dqn": {}}',
      '{"algorithm": "dqn", "run": [1], "hyperparameters": {}}',
-     '{"algorithm": 3, "run": {}, "hyperparameters": {}}',
+     '{"algorithm": 3, "run": {}, "hyperparameters": {}}', "[" * 100_000,
      '{"algorithm": "dqn", "run": {"seed": "x"}, "hyperparameters": {}}'],
 )  # fmt: skip
 def test_a_damaged_record_is_one_line(stopped: Path, content: str) -> None:
@@ -200,3 +200,47 @@ def test_a_checkpoint_of_another_model_is_refused(whole, tmp_path: Path, key: st
     run = Path(shutil.copytree(whole("ppo"), tmp_path / "run"))
     rewrite(run, lambda content: content.pop(key))
     assert "the checkpoint" in refusal(run)
+
+
+class MovedAfter(InterruptAfter):
+    """Somebody moves the run folder when the training asks for the n-th time; it isn't interrupted."""
+
+    def __init__(self, asked: int, folder: Path, comes: Path | None) -> None:
+        super().__init__()
+        self._moved_at, self._folder, self._comes = asked, folder, comes
+
+    def requested(self) -> bool:
+        super().requested()
+        if self.times == self._moved_at:
+            self._folder.rename(self._folder.with_name("moved"))
+            if self._comes:
+                shutil.copytree(self._comes, self._folder)
+        return False
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_another_run_that_comes_into_its_place_is_left_alone(
+    whole, times, tmp_path: Path, capsys, name: str
+) -> None:
+    other = tmp_path / "other"
+    shutil.copytree(whole(name), other)
+    (folder := tmp_path / "run").mkdir()
+    moving = MovedAfter(round(0.5 * times(name)), folder, other)
+    with pytest.raises(WorkbenchError, match="moved or removed") as raised:
+        train(folder, name, moving)
+    assert f"everything lies in {folder}" not in capsys.readouterr().out
+    assert str(folder) in str(raised.value) and "goes on from" not in str(raised.value)
+    assert list(contents(folder).values()) == list(contents(other).values())
+    assert_same_run(whole(name), resume(tmp_path / "moved"))
+
+
+def test_a_folder_that_is_moved_away_is_one_line(tmp_path: Path, times) -> None:
+    (folder := tmp_path / "run").mkdir()
+    with pytest.raises(WorkbenchError, match="can't write .*: the folder was moved or removed; stopped"):
+        train(folder, "dqn", MovedAfter(round(0.5 * times("dqn")), folder, None))
+    assert not folder.exists()
+    assert summary(resume(tmp_path / "moved"))["complete"]

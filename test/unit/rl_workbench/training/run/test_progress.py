@@ -75,3 +75,22 @@ def test_a_pipe_that_is_gone_costs_no_training() -> None:
     tell("nobody listens", pipe)
     with pytest.raises(BrokenPipeError):  # it was gone indeed
         pipe.close()
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_a_sign_that_the_output_cannot_write_costs_no_training(terminal: bool) -> None:
+    """Paths hold any bytes, and LC_ALL=C or PYTHONIOENCODING make any output ASCII."""
+    raw = io.BytesIO()
+    stream = io.TextIOWrapper(raw, encoding="ascii", errors="strict", write_through=True)
+    stream.isatty = lambda: terminal  # type: ignore[method-assign]
+    bar = Progress(5, "episode", 0, stream)
+    bar.say("runs/\u00fc\udcff: going on")
+    bar.close()
+    tell("runs/\u4e16\udcff", stream)
+    assert rb"runs/\xfc\udcff: going on" in raw.getvalue()
+    assert raw.getvalue().endswith(rb"runs/\u4e16\udcff" + b"\n")
+
+
+def test_bytes_of_a_path_that_are_no_text(capsys) -> None:
+    tell("runs/\udcff")
+    assert capsys.readouterr().out == "runs/\\udcff\n"

@@ -23,6 +23,13 @@ def small_files() -> Iterator[None]:
     resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
+def test_settings_with_bytes_that_are_no_text(tmp_path: Path) -> None:
+    """A path may hold any."""
+    ScalarLog(tmp_path, {"run_dir": "runs/\udcff"}).close()
+    (events,) = tmp_path.glob("events*")
+    assert rb"|run_dir|runs/\udcff|" in events.read_bytes()
+
+
 @pytest.mark.usefixtures("small_files")
 def test_tensorboards_file_that_may_not_grow_fails_where_it_is_written(tmp_path: Path) -> None:
     """The CSV has room still: a point is longer in TensorBoard's."""
