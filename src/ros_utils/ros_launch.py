@@ -10,6 +10,7 @@ from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages
 from ros_utils._internal.processes import processes as _processes
 from ros_utils._internal.processes import roslaunch as _roslaunch
+from ros_utils._internal.processes.program import CannotStart, Handle
 from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
 from ros_utils._internal.processes.started import Started
 
@@ -86,7 +87,7 @@ def ros_launch_from_path(
             command = [path, *(args or [])]
             screen = output == "screen"
             handle = _roslaunch.start(command, label, launch_new_term, screen, log_file, env)
-        except (_packages.NotFound, _processes.CannotStart, _master.MasterDown) as fault:
+        except (_packages.NotFound, CannotStart, _master.MasterDown) as fault:
             _log.error(f"{label}: {fault}")
             return False
         if not wait:
@@ -106,7 +107,7 @@ def ros_kill_launch_process() -> bool:
     return _processes.end([entry for entry in _processes.started() if entry.kind == "launch"])
 
 
-def _report(handle: _processes.Handle, readiness: Readiness, timeout: float) -> Started | bool:
+def _report(handle: Handle, readiness: Readiness, timeout: float) -> Started | bool:
     label = handle.entry.label
     if readiness is Readiness.LATE:
         _log.error(f"{label}: nothing runs after {timeout:g} s; ended it{handle.where()}")

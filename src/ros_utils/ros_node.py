@@ -15,6 +15,7 @@ from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages
 from ros_utils._internal.processes import nodes as _nodes
 from ros_utils._internal.processes import processes as _processes
+from ros_utils._internal.processes.program import CannotStart, Handle
 from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
 from ros_utils._internal.processes.started import Started
 
@@ -84,7 +85,7 @@ def ros_node_from_pkg(
             )
         except (
             _packages.NotFound,
-            _processes.CannotStart,
+            CannotStart,
             _master.MasterDown,
             ValueError,
         ) as fault:
@@ -223,7 +224,7 @@ def _start_master(window: bool, timeout: float) -> bool:
     return False
 
 
-def _is_registered(handle: _processes.Handle, name: str | None, before: set[str]) -> bool:
+def _is_registered(handle: Handle, name: str | None, before: set[str]) -> bool:
     """True if a node of this process is registered; a node of the same name from before doesn't
     count."""
     addresses = [_nodes.node_uri(name)] if name else list(_nodes.node_uris().values())
@@ -231,7 +232,7 @@ def _is_registered(handle: _processes.Handle, name: str | None, before: set[str]
     return any(handle.owns(_nodes.node_pid(address)) for address in new)
 
 
-def _report(handle: _processes.Handle, readiness: Readiness, timeout: float) -> Started | bool:
+def _report(handle: Handle, readiness: Readiness, timeout: float) -> Started | bool:
     label = handle.entry.label
     if readiness is Readiness.LATE:
         _log.error(

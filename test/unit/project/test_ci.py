@@ -1,9 +1,18 @@
-"""What CI runs: a failed check is named, stops neither other checks nor the tests, and fails the run."""
+"""What CI runs: a failed check is named, stops neither other checks nor the tests, and fails the run.
 
+The workflow of the public CI, which nobody can run here, is read, and its trainings are run in short.
+"""
+
+import re
+import shlex
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
+import yaml
+
+from cartpole import pg_train, workbench
 
 # Two checks, `bad` fails; sourced as ws does it.
 CHECKS = """
@@ -107,3 +116,72 @@ def test_a_check_that_could_not_run_fails_the_run_as_well(ci):
 def test_tests_that_could_not_run_are_a_failure(ci):
     code, lines = ci("ws check: passed: lint", 0, "no network", 1)
     assert (code, lines[-1]) == (1, "0 passed, 1 failed")
+
+
+# --- the workflow of the public CI ------------------------------------------------------------
+
+KEYS = {"runs-on", "container", "timeout-minutes", "steps"}
+ACTIONS = {"actions/checkout@v4": set(), "actions/setup-python@v5": {"python-version"}}
+
+
+@pytest.fixture(scope="module")
+def workflow(root):
+    (path,) = (root / ".github/workflows").iterdir()
+    return yaml.load(path.read_text(), yaml.BaseLoader)  # `on` is no boolean there
+
+
+def commands(job):
+    return [shlex.split(step["run"]) for step in job["steps"] if "run" in step]
+
+
+def test_the_workflow_is_one(workflow):
+    assert set(workflow) == {"name", "on", "permissions", "jobs"}
+    assert set(workflow["on"]) == {"push", "pull_request"}
+    for job in workflow["jobs"].values():
+        assert set(job) <= KEYS and {"runs-on", "timeout-minutes", "steps"} <= set(job)
+        assert job["steps"][0] == {"uses": "actions/checkout@v4"}
+        for step in job["steps"]:
+            assert ("uses" in step) != ("run" in step)
+            if "uses" in step:
+                assert set(step.get("with", {})) <= ACTIONS[step["uses"]]
+                assert set(step) <= {"uses", "with"}
+            assert set(step) <= {"uses", "with", "run", "working-directory"}
+
+
+def test_the_workflow_has_the_machines_that_are_promised(workflow, root):
+    readme = (root / "README.md").read_text()
+    for name in ("checks", "readme"):
+        system, version = workflow["jobs"][name]["container"].split(":")
+        assert f"{system.title()} {version}" in readme
+    (python,) = [step["with"] for step in workflow["jobs"]["wheel"]["steps"] if "with" in step]
+    wanted = re.search(r'requires-python = ">=(.*)"', (root / "pyproject.toml").read_text())[1]
+    assert python["python-version"] == wanted
+    assert f"Python {wanted}" in readme
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("signals")
+def test_the_commands_of_the_workflow(workflow, tmp_path, monkeypatch):
+    """Those of the checkout are known to ws; those that train do so, without ROS."""
+    monkeypatch.chdir(tmp_path)
+    trained = 0
+    for words in [words for job in workflow["jobs"].values() for words in commands(job)]:
+        if words[:4] == ["./ws", "rosrun", "cartpole", "pg_train.py"]:
+            assert pg_train.main([*words[4:], "--backend=bullet"]) == 0
+            trained += 1
+        elif words[0] == "cartpole-pg":
+            assert pg_train.main(words[1:]) == 0
+            trained += 1
+        elif words[0] == "rl-workbench":
+            assert workbench.main(words[1:]) == 0
+            trained += 1
+        elif words[0] == "test":
+            assert Path(words[2]).stat().st_size > 0
+        else:
+            assert words[:2] in (
+                ["./ws", "check"],
+                ["./ws", "test"],
+                ["pip", "wheel"],
+                ["pip", "install"],
+            )
+    assert trained == 3

@@ -17,6 +17,7 @@ from ros_utils._internal.processes import processes as _processes
 from ros_utils._internal.processes import procfs as _procfs
 from ros_utils._internal.processes import registry as _registry
 from ros_utils._internal.processes import termination as _termination
+from ros_utils._internal.processes.program import CannotStart
 from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
 
 SLEEP = ["sleep", "1000"]
@@ -243,7 +244,7 @@ def test_a_wait_has_a_bound():
 
 
 def test_a_missing_program_is_refused():
-    with pytest.raises(_processes.CannotStart, match="nix"):
+    with pytest.raises(CannotStart, match="nix"):
         _processes.start(["/nix"], "node", "nix")
 
 

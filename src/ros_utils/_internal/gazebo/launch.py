@@ -12,6 +12,7 @@ from ros_utils._internal import packages as _packages
 from ros_utils._internal.processes import nodes as _nodes
 from ros_utils._internal.processes import processes as _processes
 from ros_utils._internal.processes import roslaunch as _roslaunch
+from ros_utils._internal.processes.program import CannotStart, Handle
 from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
 from ros_utils._internal.processes.started import Started
 
@@ -121,7 +122,7 @@ def launch_Gazebo(
             command = ["gazebo_ros", "empty_world.launch", *arguments]
             screen = output == "screen" and not launch_new_term
             handle = _roslaunch.start(command, LABEL, launch_new_term, screen, log_file, env)
-        except (_packages.NotFound, _processes.CannotStart, _master.MasterDown) as fault:
+        except (_packages.NotFound, CannotStart, _master.MasterDown) as fault:
             _log.error(f"launch_Gazebo: {fault}")
             return False
         readiness = wait_until_ready(lambda: service_answers(ready), handle, timeout)
@@ -173,9 +174,7 @@ def _world(path: str | None, package: str | None, name: str | None) -> str | Non
     return None
 
 
-def _report(
-    handle: _processes.Handle, readiness: Readiness, ready: str, timeout: float
-) -> Started | bool:
+def _report(handle: Handle, readiness: Readiness, ready: str, timeout: float) -> Started | bool:
     if readiness is Readiness.READY:
         return Started(handle)
     if readiness is Readiness.ENDED:

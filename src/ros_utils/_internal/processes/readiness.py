@@ -6,7 +6,7 @@ import enum
 from collections.abc import Callable
 
 from ros_calls.waiting import wait_until
-from ros_utils._internal.processes.processes import Handle
+from ros_utils._internal.processes.program import Handle
 
 
 class Readiness(enum.Enum):

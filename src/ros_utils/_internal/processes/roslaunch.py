@@ -11,6 +11,7 @@ from ros_calls.xmlrpc import NoAnswer, Refused, call_plain
 from ros_utils._internal import log as _log
 from ros_utils._internal.processes import nodes as _nodes
 from ros_utils._internal.processes import processes as _processes
+from ros_utils._internal.processes.program import Handle
 
 SETTLE = 5.0  # [s] at most, for the nodes of a launch file to register after their processes run
 STABLE = 0.3  # [s] without a further process: roslaunch has started them all
@@ -25,7 +26,7 @@ def start(
     screen: bool,
     log_file: str | None = None,
     env: Mapping[str, str] | None = None,
-) -> _processes.Handle:
+) -> Handle:
     """Start roslaunch without waiting for anything.
 
     Raises:
@@ -44,7 +45,7 @@ def start(
     )
 
 
-def list_processes(handle: _processes.Handle) -> tuple[list[str], list[str]] | None:
+def list_processes(handle: Handle) -> tuple[list[str], list[str]] | None:
     """Processes of the launch, running and dead, without master and rosout; None as long as
     roslaunch doesn't tell."""
     try:
@@ -61,7 +62,7 @@ def list_processes(handle: _processes.Handle) -> tuple[list[str], list[str]] | N
     return None
 
 
-def let_settle(handle: _processes.Handle) -> None:
+def let_settle(handle: Handle) -> None:
     """Wait until the launch's processes have registered as nodes, but not for long: not every
     program is a node."""
     deadline = time.monotonic() + SETTLE
@@ -81,11 +82,11 @@ def let_settle(handle: _processes.Handle) -> None:
         _warn(handle, line)
 
 
-def _warn(handle: _processes.Handle, text: str) -> None:
+def _warn(handle: Handle, text: str) -> None:
     _log.warn(f"{handle.entry.label}: {text}{handle.where()}")
 
 
-def _own_nodes(handle: _processes.Handle) -> int:
+def _own_nodes(handle: Handle) -> int:
     """How many registered nodes came from the launch."""
     nodes = [
         address for name, address in _nodes.node_uris().items() if name not in _nodes.CORE_NODES

@@ -6,6 +6,7 @@ from types import TracebackType
 
 from ros_calls import master as _master
 from ros_utils._internal.processes import processes as _processes
+from ros_utils._internal.processes.program import Handle
 
 
 class Started(int):
@@ -14,10 +15,10 @@ class Started(int):
     Ends with `close` or at the end of a ``with`` block; in any case when this Python process exits.
     """
 
-    _handle: _processes.Handle | None
+    _handle: Handle | None
     master_uri: str
 
-    def __new__(cls, handle: _processes.Handle | None = None) -> Started:
+    def __new__(cls, handle: Handle | None = None) -> Started:
         """Without a handle: something that ran already, and that `close` leaves alone."""
         self = super().__new__(cls, 1)
         self._handle = handle

@@ -1,0 +1,213 @@
+"""Every command of the documentation is one that its program takes: flags, files, arguments, requests.
+
+Those of the tutorial and of README's workbench are run by test_tutorial.py, those of docs/catkin.md by
+test_catkin_workspace.py. A command that nothing here knows how to look at is a fault.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import runpy
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+from xml.etree import ElementTree
+
+import genpy
+import pytest
+import rospkg
+import yaml
+from bullet_gazebo_msgs.srv import StepWorldRequest
+from gazebo_msgs.srv import GetWorldPropertiesRequest
+
+from cartpole import dqn_train, pg_train, workbench
+
+pytestmark = pytest.mark.usefixtures("signals")
+
+ROOT = Path(__file__).resolve().parents[3]
+RUN_ELSEWHERE = ("docs/tutorial_dqn.md", "docs/tutorial_dqn.zh.md", "docs/catkin.md")
+STARTS = re.compile(
+    r"(?:ROS_PACKAGE_PATH=\S+ )?(\./ws|rosrun|roslaunch|rosservice|gz|spawn_model)\s"
+)
+PLACEHOLDERS = {"your_script.py", "ppo.py", "my_arm"}  # the reader's own
+TRAININGS = {"pg_train.py": pg_train.main, "dqn_train.py": dqn_train.main}
+SHORT = ["--episodes=2", "--eval-episodes=1"]
+REQUESTS = {
+    "/gazebo/get_world_properties": GetWorldPropertiesRequest,
+    "/gazebo/step_world": StepWorldRequest,
+}
+
+
+class Command(NamedTuple):
+    page: str
+    words: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.page}: {' '.join(self.words)}"
+
+
+def commands() -> Iterator[Command]:
+    """All commands in blocks of code, without ./ws in front and remarks behind."""
+    tools = runpy.run_path(str(ROOT / "tools/check_links.py"))
+    for path in tools["markdown_files"](ROOT):
+        page = str(path.relative_to(ROOT))
+        if page not in RUN_ELSEWHERE:
+            for block in tools["BLOCK"].finditer(path.read_text(encoding="utf-8")):
+                text = block["fenced"] or block["indented"] or ""
+                for line in re.sub(r"\\\n", " ", text).splitlines():
+                    if found := STARTS.match(line.strip()):
+                        words = shlex.split(line.strip()[found.start(1) :], comments=True)
+                        ours = words[0] == "./ws"
+                        yield Command(page, tuple(words[ours:]))
+
+
+ALL = sorted(set(commands()))
+
+
+class Parsed(BaseException):
+    """The command line was taken; nothing of it is done."""
+
+
+@pytest.fixture
+def only_parsing(monkeypatch: pytest.MonkeyPatch) -> None:
+    take = argparse.ArgumentParser.parse_args
+
+    def parse(self: argparse.ArgumentParser, *arguments: object, **options: object) -> NoReturn:
+        take(self, *arguments, **options)
+        raise Parsed
+
+    monkeypatch.setattr(argparse.ArgumentParser, "parse_args", parse)
+
+
+def of(*starts: str) -> list[Command]:
+    chosen = []
+    for command in ALL:
+        words = command.words[command.words[0] == "extras" :]
+        if any(" ".join(words).startswith(start) for start in starts):
+            chosen.append(Command(command.page, words))
+    return chosen
+
+
+GROUPS = {
+    "trainings": of("rosrun cartpole pg_train.py", "rosrun cartpole dqn_train.py"),
+    "workbench": of("rosrun cartpole workbench.py"),
+    "scripts": of("python3"),
+    "launches": of("roslaunch"),
+    "requests": of("rosservice call"),
+    "tests": of("test", "rostest", "check", "shell", "tensorboard"),
+    "gains": of("rosrun dynamic_reconfigure dynparam set"),
+}
+
+
+def test_every_command_is_looked_at() -> None:
+    assert len(ALL) > 50
+    known = {(command.page, command.words) for group in GROUPS.values() for command in group}
+    strange = [
+        str(each)
+        for each in ALL
+        if (each.page, each.words[each.words[0] == "extras" :]) not in known
+    ]
+    assert strange == []
+    assert all(GROUPS.values())
+
+
+@pytest.mark.parametrize("command", GROUPS["trainings"], ids=str)
+def test_a_training_runs(command: Command, tmp_path: Path, monkeypatch, capsys) -> None:
+    """A short one, without ROS."""
+    monkeypatch.chdir(tmp_path)
+    *_, program = command.words[:3]
+    flags = list(command.words[3:])
+    if "--help" in flags:
+        with pytest.raises(SystemExit, match="^0$"):
+            TRAININGS[program](flags)
+        return
+    flags += SHORT
+    if not any(flag.startswith("--env-id") for flag in flags):
+        flags.append("--backend=bullet")
+    assert TRAININGS[program](flags) == 0, capsys.readouterr()
+
+
+@pytest.mark.parametrize("command", GROUPS["workbench"], ids=str)
+def test_the_workbench_takes_it(command: Command, only_parsing: None) -> None:
+    name, *arguments = command.words[3:]
+    if name == "--help":
+        return
+    if name == "train":  # has a parser of its own, and is run by test_tutorial.py
+        assert command.page == "README.md"
+        return
+    if name == "benchmark" and arguments and not arguments[0].startswith("-"):
+        suites = yaml.safe_load((ROOT / "config/benchmark.yaml").read_text(encoding="utf-8"))
+        assert arguments[0] in suites or arguments[0] == "SUITE"
+    with pytest.raises(Parsed):
+        workbench.main([name, *arguments])
+
+
+@pytest.mark.parametrize("command", GROUPS["scripts"], ids=str)
+def test_a_script_takes_it(command: Command, only_parsing: None, monkeypatch) -> None:
+    script, *arguments = command.words[1:]
+    if script in PLACEHOLDERS or script == "examples/own_task.py":  # run by test_own_task.py
+        return
+    monkeypatch.setattr(sys, "argv", [script, *arguments])
+    monkeypatch.setattr(sys, "path", [str((ROOT / script).parent), *sys.path])
+    with pytest.raises(Parsed):
+        runpy.run_path(str(ROOT / script), run_name="__main__")
+
+
+@pytest.mark.parametrize("command", GROUPS["launches"], ids=str)
+def test_a_launch_file_takes_the_arguments(command: Command) -> None:
+    package, name, *arguments = command.words[1:]
+    if package in PLACEHOLDERS:
+        return
+    file = Path(rospkg.RosPack().get_path(package), "launch", name)
+    known = {each.get("name") for each in ElementTree.parse(file).iter("arg")}
+    assert {argument.partition(":=")[0] for argument in arguments} <= known
+
+
+@pytest.mark.parametrize("command", GROUPS["requests"], ids=str)
+def test_a_request_fits_its_service(command: Command) -> None:
+    service, *texts = command.words[2:]
+    values = [yaml.safe_load(text) for text in texts]
+    genpy.message.fill_message_args(REQUESTS[service](), values)
+
+
+@pytest.mark.parametrize("command", GROUPS["gains"], ids=str)
+def test_a_gain_is_one_of_a_controllers(command: Command) -> None:
+    node, name, value = command.words[4:]
+    controller = node.strip("/").removesuffix("/pid")
+    file = ROOT / "companions/cartpole_controller/config"
+    texts = [path.read_text(encoding="utf-8") for path in file.glob("*.yaml")]
+    assert any(controller in text for text in texts)
+    assert name in ("p", "i", "d", "i_clamp") and float(value) >= 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", GROUPS["tests"], ids=str)
+def test_ws_takes_it(command: Command, tmp_path: Path) -> None:
+    name, *arguments = command.words
+    if name == "shell":
+        return  # test_ws_shell.py
+    if name in ("rostest", "tensorboard"):
+        assert all((ROOT / each).exists() for each in arguments if each.startswith("test/"))
+        return
+    if name == "check":
+        script = f"source {ROOT}/tools/ws_check.sh; printf '%s\\n' \"${{CHECKS[@]}}\""
+        done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
+        assert set(arguments) <= set(done.stdout.split())
+        return
+    arguments = [argument for argument in arguments if argument != "--fast"]  # ws's own
+    is_whole = not any(argument.startswith("test/") for argument in arguments)
+    if is_whole:  # a part will do to see that the options are known
+        arguments.append("test/stress" if "stress" in arguments else __file__)
+    found = subprocess.run(
+        [sys.executable, "-m", "pytest", "--collect-only", "-qq", "-p", "no:cacheprovider", *arguments],
+        cwd=ROOT, env=dict(os.environ), capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    none_of_the_part = pytest.ExitCode.NO_TESTS_COLLECTED
+    assert found.returncode == 0 or (is_whole and found.returncode == none_of_the_part), (
+        found.stdout
+    )
