@@ -240,7 +240,9 @@ def test_another_run_that_comes_into_its_place_is_left_alone(
 
 def test_a_folder_that_is_moved_away_is_one_line(tmp_path: Path, times) -> None:
     (folder := tmp_path / "run").mkdir()
-    with pytest.raises(WorkbenchError, match="can't write .*: the folder was moved or removed; stopped"):
+    with pytest.raises(
+        WorkbenchError, match="can't write .*: the folder was moved or removed; stopped"
+    ):
         train(folder, "dqn", MovedAfter(round(0.5 * times("dqn")), folder, None))
     assert not folder.exists()
     assert summary(resume(tmp_path / "moved"))["complete"]
