@@ -36,7 +36,7 @@ def growth(action: Callable[[int], None], cycles: int, warm_up: int) -> int:
 def stays(action: Callable[[int], None], cycles: int, warm_up: int, most: int) -> bool:
     """Whether `cycles` calls keep less than `most` [bytes] in one of some rounds.
 
-    What is kept of each call is kept in each round. What comes once is not: a thread of somebody else's, pages
+    What is kept of each call is kept in each round. What comes once is not: a thread of another test, pages
     that the allocator gives back late.
     """
     return any(
