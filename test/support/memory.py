@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 _LIBC = ctypes.CDLL("libc.so.6")
+ROUNDS = 3
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
@@ -30,3 +31,14 @@ def growth(action: Callable[[int], None], cycles: int, warm_up: int) -> int:
     for cycle in range(warm_up, warm_up + cycles):
         action(cycle)
     return kept() - before
+
+
+def stays(action: Callable[[int], None], cycles: int, warm_up: int, most: int) -> bool:
+    """Whether `cycles` calls keep less than `most` [bytes] in one of some rounds.
+
+    What is kept of each call is kept in each round. What comes once is not: a thread of another test, pages
+    that the allocator gives back late.
+    """
+    return any(
+        growth(action, cycles, warm_up if number == 0 else 0) < most for number in range(ROUNDS)
+    )

@@ -12,6 +12,7 @@ import time
 import uuid
 from pathlib import Path
 
+BOUND = 120.0  # [s] for anything that a run does on a busy machine
 MARK = "CARTPOLE_TEST_RUN"
 NETWORKS = {"policy_network.pth", "value_network.pth"}
 
@@ -50,7 +51,7 @@ class Place:
                     found[pid] = command
         return found
 
-    def left_after(self, seconds: float) -> dict[int, str]:
+    def left_after(self, seconds: float = BOUND) -> dict[int, str]:
         """What still lives after waiting that long for it to end."""
         deadline = time.monotonic() + seconds
         while self.processes() and time.monotonic() < deadline:
@@ -107,7 +108,7 @@ class Process:
     def output(self) -> str:
         return "".join(self._lines)
 
-    def wait_for(self, text: str, seconds: float = 60) -> None:
+    def wait_for(self, text: str, seconds: float = BOUND) -> None:
         deadline = time.monotonic() + seconds
         while text not in self.output:
             assert self._process.poll() is None, f"ended before {text!r}:\n{self.output}"
@@ -118,7 +119,7 @@ class Process:
         """As the terminal's Ctrl-C: to the whole process group."""
         os.killpg(self._process.pid, signal.SIGINT)
 
-    def end(self, seconds: float = 60) -> int:
+    def end(self, seconds: float = BOUND) -> int:
         """Waits for the exit code."""
         code = self._process.wait(seconds)
         self._reader.join(2)

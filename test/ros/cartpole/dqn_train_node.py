@@ -26,7 +26,7 @@ class DqnTrain(unittest.TestCase):
 
     def launched(self, place: Place, *arguments: str) -> str:
         launched = place.start("roslaunch", "cartpole", "dqn_train.launch", *SHORT, *arguments)
-        launched.end(90)
+        launched.end()
         self.assertNotIn("Traceback", launched.output)
         return launched.output
 
@@ -53,18 +53,18 @@ class DqnTrain(unittest.TestCase):
             run = place.folder / backend
             training = place.start("rosrun", "cartpole", "dqn_train.py", f"--run-dir={run}",
                                    f"--env-kwargs=backend={backend}", *options)  # fmt: skip
-            self.assertEqual(training.end(90), 0, training.output)
+            self.assertEqual(training.end(), 0, training.output)
             with (run / "scalars.csv").open() as rows:
                 figures.append([row.split(",")[:3] for row in rows if "SPS" not in row])
         self.assertTrue(any(tag == "eval/mean_reward" for _, tag, _ in figures[0]))
         self.assertEqual(*figures)
-        self.assertEqual(place.left_after(20), {})
+        self.assertEqual(place.left_after(), {})
 
     def test_rosrun_needs_no_master_and_starts_none(self):
         place = self.place()
         training = place.start("rosrun", "cartpole", "dqn_train.py", f"--run-dir={place.run}",
                                "--total-timesteps=300", "__name:=learner")  # fmt: skip
-        self.assertEqual(training.end(90), 0, training.output)
+        self.assertEqual(training.end(), 0, training.output)
         self.assertEqual(place.processes(), {})
         self.assertIn("last.pt", place.files())
 
@@ -73,7 +73,7 @@ class DqnTrain(unittest.TestCase):
         self.addCleanup(place.close)
         training = place.start("rosrun", "cartpole", "dqn_train.py", f"--run-dir={place.run}",
                                "--total-timesteps=300")  # fmt: skip
-        self.assertEqual(training.end(90), 0, training.output)
+        self.assertEqual(training.end(), 0, training.output)
 
     def test_an_unknown_parameter_is_one_line(self):
         place = self.place()

@@ -38,7 +38,7 @@ class PgTrain(unittest.TestCase):
 
     def trained(self, place: Place, *flags: str) -> str:
         training = place.train(*flags)
-        self.assertEqual(training.end(90), 0, training.output)
+        self.assertEqual(training.end(), 0, training.output)
         self.assertNotIn("Traceback", training.output)
         return training.output
 
@@ -48,7 +48,7 @@ class PgTrain(unittest.TestCase):
     def test_from_nothing(self):
         place = self.place()
         output = self.trained(place, "--episodes=5", "--seed=1", "--save-every=4")
-        self.assertEqual(place.left_after(5), {})
+        self.assertEqual(place.left_after(), {})
         self.assertIn("trained 5 episodes", output)
         self.assertIn(str(place.run), output)
         self.assertLessEqual(
@@ -91,10 +91,10 @@ class PgTrain(unittest.TestCase):
                 os.kill(pid, signal.SIGKILL)
         training.end()
         resumed = killed.start("rosrun", "cartpole", "pg_train.py", f"--resume={killed.run}")
-        self.assertEqual(resumed.end(90), 0, resumed.output)
+        self.assertEqual(resumed.end(), 0, resumed.output)
         self.assertIn("going on at step", resumed.output)
         self.assertTrue(torch.equal(self.weights(whole), self.weights(killed)))
-        self.assertEqual(killed.left_after(5), {})
+        self.assertEqual(killed.left_after(), {})
 
     def test_another_environment_needs_no_master_and_starts_none(self):
         place = self.place()
@@ -107,7 +107,7 @@ class PgTrain(unittest.TestCase):
         self.trained(place, "--episodes=3", "--realtime")
         lengths = json.loads((place.run / "summary.json").read_text())["lengths"]
         self.assertGreater(min(lengths), 1)
-        self.assertEqual(place.left_after(5), {})
+        self.assertEqual(place.left_after(), {})
 
     def test_a_simulator_already_there_is_used_and_left_as_it_was(self):
         place = self.place()
@@ -121,7 +121,7 @@ class PgTrain(unittest.TestCase):
         self.assertEqual(self.models(place), [])
         world.interrupt()
         world.end()
-        self.assertEqual(place.left_after(5), {})
+        self.assertEqual(place.left_after(), {})
 
     def test_a_robot_already_there_is_used_and_stays(self):
         place = self.place()
@@ -139,7 +139,7 @@ class PgTrain(unittest.TestCase):
         world.wait_for("process[gazebo-2]: started")
         self.wait_for_service(place, "/gazebo/get_world_properties")
         training = place.train("--episodes=2")
-        self.assertEqual(training.end(30), 1)
+        self.assertEqual(training.end(), 1)
         self.assertIn("lockstep:=true", training.output)
         self.assertIn("--realtime", training.output)
         self.assertFalse(place.run.exists())
@@ -150,19 +150,19 @@ class PgTrain(unittest.TestCase):
             "roslaunch", "cartpole", "pg_train.launch", "episodes:=3", "seed:=2",
             f"run_dir:={place.run}", "algo:=reinforce", "params:=batch_episodes=2",
         )  # fmt: skip
-        training.end(90)
-        self.assertEqual(place.left_after(5), {}, training.output)
+        training.end()
+        self.assertEqual(place.left_after(), {}, training.output)
         record = json.loads((place.run / "config.json").read_text())
         self.assertEqual((record["run"]["episodes"], record["run"]["seed"]), (3, 2))
         self.assertEqual(record["hyperparameters"]["batch_episodes"], 2)
 
     def wait_for_service(self, place: Place, name: str) -> None:
         script = f"import rospy; rospy.wait_for_service('{name}', 30)"
-        self.assertEqual(place.start("python3", "-c", script).end(40), 0)
+        self.assertEqual(place.start("python3", "-c", script).end(), 0)
 
     def models(self, place: Place) -> list[str]:
         asked = place.start("rosservice", "call", "/gazebo/get_world_properties")
-        self.assertEqual(asked.end(20), 0, asked.output)
+        self.assertEqual(asked.end(), 0, asked.output)
         return ["cartpole"] if "cartpole" in asked.output else []
 
 

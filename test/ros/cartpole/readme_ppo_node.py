@@ -28,9 +28,9 @@ class ReadmePpo(unittest.TestCase):
         script = place.folder / "ppo.py"
         script.write_text(code.replace("60_000", "1_024") + "\nprint(model.num_timesteps)\n")
         training = place.start("python3", str(script))
-        self.assertEqual(training.end(100), 0, training.output)
+        self.assertEqual(training.end(), 0, training.output)
         self.assertTrue(training.output.rstrip().endswith("1024"), training.output)
-        self.assertEqual(place.left_after(10), {})
+        self.assertEqual(place.left_after(), {})
 
 
 if __name__ == "__main__":

@@ -139,7 +139,7 @@ class All(unittest.TestCase):
             "gazebo_ros", "gzclient", name="window", master_uri=self.simulation.master_uri
         )
         self.assertTrue(node)
-        deadline = time.monotonic() + 20.0
+        deadline = time.monotonic() + 60.0
         while node.running and time.monotonic() < deadline:  # it is a node for a moment only
             time.sleep(0.05)
         self.assertEqual(node.exit_code(), 0)

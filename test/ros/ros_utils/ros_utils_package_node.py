@@ -85,7 +85,7 @@ class Package(unittest.TestCase):
     def run_in_simulation(self, *command):
         environment = self.simulation.environment()
         return subprocess.run(
-            command, env=environment, check=True, capture_output=True, text=True, timeout=30
+            command, env=environment, check=True, capture_output=True, text=True, timeout=120
         ).stdout
 
     def test_the_packages_world(self):

@@ -138,15 +138,13 @@ class StepClientTest(unittest.TestCase):
         simulation = self.simulate()
         with simulation.active():
             add_cartpole()
+            self.client().step(1)
             client = self.client(timeout=1.0)
-            client.step(1)
             process = simulator_process(simulation.master_uri)
             os.kill(process, signal.SIGSTOP)
             self.addCleanup(os.kill, process, signal.SIGCONT)  # before the simulation is closed
-            begin = time.monotonic()
-            with self.assertRaises(ServiceHangs):
+            with self.assertRaisesRegex(ServiceHangs, r"within 1(\.\d+)? s"):
                 client.step(1)
-            self.assertLess(time.monotonic() - begin, 5.0)
 
     def test_the_world_survives_a_client_that_goes_in_the_middle(self):
         with self.simulate().active():

@@ -16,7 +16,7 @@ from bullet_gazebo.physics.world import World
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import NotInLockstep, Simulator
 
-BOUND = 10.0  # [s]
+BOUND = 60.0  # [s]
 CART = {"type": "effort_controllers/JointPositionController", "joint": "stand_cart",
         "pid": {"p": 100.0, "i": 0.01, "d": 10.0}}  # fmt: skip
 STATES = {"type": "joint_state_controller/JointStateController", "publish_rate": 120}

@@ -10,7 +10,7 @@ import pytest
 
 pytestmark = pytest.mark.slow
 
-BOUND = 15.0  # [s]
+BOUND = 60.0  # [s]
 MAIN = "import sys; from bullet_gazebo.ros.{} import main; sys.exit(main())"
 PROGRAMS = {  # module: arguments, exit code after Ctrl-C
     "clients.spawner": (["a_controller"], 0),

@@ -34,7 +34,7 @@ class GainsTest(SlidesTest):
         self.run_controllers("effort_position")
         state = Topic("effort_position/state", JointControllerState)
         command = ["rosrun", "dynamic_reconfigure", "dynparam", "set", PID, "p", "250.0"]
-        subprocess.run(command, check=True, timeout=30)
+        subprocess.run(command, check=True, timeout=60)
         self.step(1)
         self.assertTrue(state.wait_for(lambda got: got and got[-1].p == 250.0))
         self.assertEqual(rospy.get_param(f"{PID}/p"), 250.0)

@@ -15,7 +15,7 @@ from controller_manager_msgs.srv import (
 from gazebo_msgs.srv import DeleteModel, SpawnModel, SpawnModelRequest
 from std_srvs.srv import Empty
 
-BOUND = 20.0  # [s of wall time]
+BOUND = 60.0  # [s of wall time]
 STRICT = 2
 MANAGER = "/slides/controller_manager/"
 

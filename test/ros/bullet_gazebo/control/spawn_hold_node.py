@@ -17,7 +17,7 @@ from gazebo_msgs.srv import (
 )
 from std_srvs.srv import Empty, EmptyResponse
 
-BOUND = 30.0  # [s of wall time]
+BOUND = 60.0  # [s of wall time]
 CALLS = 100  # while plugins load; each takes as long as several ticks
 FALL = 0.5  # [s of simulated time]
 

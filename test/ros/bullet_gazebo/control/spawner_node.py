@@ -15,7 +15,7 @@ from gazebo_msgs.srv import DeleteModel, SpawnModel, SpawnModelRequest
 from std_msgs.msg import Bool
 from std_srvs.srv import Empty
 
-BOUND = 20.0  # [s of wall time]
+BOUND = 60.0  # [s of wall time]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"
 EXTRA = """
 another_controller:

@@ -21,7 +21,7 @@ from gazebo_msgs.srv import (
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
 
-BOUND = 20.0  # [s of wall time]
+BOUND = 60.0  # [s of wall time]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"
 WITHOUT = """
 import importlib.util, sys

@@ -21,7 +21,7 @@ from geometry_msgs.msg import Pose
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
 
-BOUND = 40.0  # [s]
+BOUND = 60.0  # [s]
 PACKAGE = """<package format="2"><name>my_arm</name><version>0.0.1</version>
 <description>An arm.</description><maintainer email="a@example.com">a</maintainer>
 <license>BSD</license></package>"""
@@ -193,14 +193,15 @@ class GazeboRos(unittest.TestCase):
         }
         self.assertEqual(steps, {0.02})
         call("/gazebo/pause_physics", Empty)
+        stopped = sim_time()
         time.sleep(0.3)
+        stamps = [message.header.stamp.to_sec() for message in heard]
+        self.assertEqual(len(set(stamps)), len(stamps))
+        self.assertLessEqual(max(stamps), stopped, "time stands still")
         heard.clear()
-        time.sleep(0.3)
-        self.assertEqual(heard, [], "time stands still")
         call("/gazebo/reset_simulation", Empty)
         call("/gazebo/unpause_physics", Empty)
-        wait_until(lambda: len(heard) > 3)
-        self.assertLess(heard[0].header.stamp.to_sec(), 0.1)
+        wait_until(lambda: any(message.header.stamp.to_sec() < 0.1 for message in list(heard)))
         listener.unregister()
 
     def test_3_plugins_of_a_user(self):
@@ -208,8 +209,7 @@ class GazeboRos(unittest.TestCase):
 
         self.assertEqual(rospy.wait_for_message("/mine/count", Int32, BOUND).data, 50)
         before = sim_time()
-        time.sleep(0.2)
-        self.assertGreater(sim_time(), before, "the world goes on")
+        wait_until(lambda: sim_time() > before)
 
     def test_4_spawn_model(self):
         path = f"{self.folder.name}/my_arm/urdf/arm.urdf"

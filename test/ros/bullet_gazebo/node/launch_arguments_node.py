@@ -13,7 +13,7 @@ import xmlrpc.client
 import rosgraph
 import rostest
 
-BOUND = 40.0  # [s]
+BOUND = 60.0  # [s]
 SERVER = ("rosrun", "gazebo_ros", "gzserver")
 SPAWN = ("rosrun", "gazebo_ros", "spawn_model", "-urdf", "-param", "/box", "-model", "box")
 BOX = """<robot name="box"><link name="body"><inertial><mass value="1"/>

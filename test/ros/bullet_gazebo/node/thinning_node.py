@@ -2,6 +2,7 @@
 """Beyond real time topics are thinned, and the last message before a pause always comes; else all come."""
 
 import threading
+import time
 import unittest
 
 import rospy
@@ -24,7 +25,7 @@ from ros_utils import ros_gazebo
 from ros_utils.service_client import ServiceGone
 from ros_utils.step_client import StepClient
 
-BOUND = 20.0  # [s of wall time]
+BOUND = 60.0  # [s of wall time]
 MILLISECOND = 1_000_000  # [ns]
 REAL_TIME, UNLIMITED = 1000.0, 0.0  # [Hz]
 
@@ -109,9 +110,10 @@ class ThinningTest(unittest.TestCase):
     def test_as_fast_as_it_can_less_comes_but_the_last_before_each_pause(self):
         self.set_rate(UNLIMITED)
         for _ in range(5):
-            begin = self.time()
-            seen = self.run_until(begin + 1000 * MILLISECOND)
-            self.assertLess(len(seen), (seen[-1] - begin) / MILLISECOND / 2)
+            start = time.monotonic()
+            seen = self.run_until(self.time() + 1000 * MILLISECOND)
+            # At most one in each millisecond of the wall's, and the one before the pause.
+            self.assertLessEqual(len(seen), (time.monotonic() - start) * 1000 + 2)
 
     def test_a_change_of_the_rate_at_run_time_counts_at_once(self):
         self.set_rate(UNLIMITED)

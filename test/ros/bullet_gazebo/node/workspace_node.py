@@ -32,16 +32,16 @@ class Workspace(unittest.TestCase):
     def test_master(self):
         publisher = rospy.Publisher("said", String, queue_size=1, latch=True)
         publisher.publish("hello")
-        heard = rospy.wait_for_message("said", String, timeout=10)
+        heard = rospy.wait_for_message("said", String, timeout=60)
         self.assertEqual(heard.data, "hello")
 
     def test_topic_tools(self):
         publisher = rospy.Publisher("fast", String, queue_size=1, latch=True)
         publisher.publish("once")
-        self.assertEqual(rospy.wait_for_message("slow", String, timeout=30).data, "once")
+        self.assertEqual(rospy.wait_for_message("slow", String, timeout=60).data, "once")
 
     def test_nodelet(self):
-        rospy.wait_for_service("manager/list", timeout=30)
+        rospy.wait_for_service("manager/list", timeout=60)
         self.assertEqual(rospy.ServiceProxy("manager/list", NodeletList)().nodelets, [])
 
 

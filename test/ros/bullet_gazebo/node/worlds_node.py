@@ -29,7 +29,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
 
 from ros_utils import ros_gazebo
 
-BOUND = 20.0  # [s of wall time]
+BOUND = 60.0  # [s of wall time]
 UNKNOWN = (
     "GazeboRosApiPlugin SpawnModel Failure: input model_xml not SDF or URDF, or cannot be converted "
     "to Gazebo compatible format."
@@ -191,7 +191,7 @@ class Spawning(unittest.TestCase):
         start = time.monotonic()
         xml = URDF.replace("</robot>", f"{blocks}{plugins}</robot>")
         self.spawned("wordy", xml, initial_pose=at(0.0, -30.0, 1.0))
-        self.assertLess(time.monotonic() - start, 30.0)
+        self.assertLess(time.monotonic() - start, 2 * BOUND)
 
     def test_static_models_can_be_deleted(self):
         spawn("block", BOX.format(more="<static>true</static>"), initial_pose=at(9.0))
@@ -220,7 +220,7 @@ class Refusals(unittest.TestCase):
         answer = spawn(name, xml, **kwargs)
         self.assertFalse(answer.success)
         self.assertIn(text, answer.status_message)
-        self.assertLess(time.monotonic() - start, 10.0)
+        self.assertLess(time.monotonic() - start, BOUND)
         self.assertEqual(models(), before)
 
     def test_texts_of_gazebo(self):

@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Clock
 
 from bullet_gazebo.ros.clients.world_client import RemoteWorld
 
-BOUND = 20.0  # [s of wall time]
+BOUND = 60.0  # [s of wall time]
 PERIOD = 10_000_000  # [ns] of the 100 Hz that the launch file asks for
 
 
@@ -41,10 +41,13 @@ class ParametersTest(unittest.TestCase):
 
     def test_the_clock_goes_on_after_a_reset(self):
         RemoteWorld("/gazebo", rosgraph.get_master_uri()).command("reset")
+        # Those that were on their way may come first.
         with self.news:
-            self.stamps.clear()
-        self.wait_for(10)
-        self.assertLess(self.stamps[-1], 1_000_000_000)
+            self.assertTrue(
+                self.news.wait_for(lambda: any(b < a for a, b in pairwise(self.stamps)), BOUND)
+            )
+            count = len(self.stamps)
+        self.wait_for(count + 10)
 
     def test_without_the_network_there_is_the_clock_and_nothing_else(self):
         publishers, subscribers, services = rosgraph.Master("/gazebo_parameters").getSystemState()

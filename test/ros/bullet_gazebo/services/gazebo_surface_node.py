@@ -9,7 +9,7 @@ import rospy
 import rosservice
 import rostest
 
-BOUND = 20.0  # [s of wall time]
+BOUND = 60.0  # [s of wall time]
 SERVICES = {
     "gazebo_msgs/SpawnModel": ["spawn_sdf_model", "spawn_urdf_model"],
     "std_srvs/Empty": ["pause_physics", "unpause_physics", "reset_simulation", "reset_world"],

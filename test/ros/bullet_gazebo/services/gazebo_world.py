@@ -8,7 +8,7 @@ from gazebo_msgs.msg import ODEPhysics
 from geometry_msgs.msg import Point, Pose, Vector3
 from std_srvs.srv import Empty
 
-BOUND = 20.0  # [s of wall time]
+BOUND = 60.0  # [s of wall time]
 NAN, INF = float("nan"), float("inf")
 SCOPE = "did you forget to scope the link by model name?"
 BOX = """<robot name="box"><link name="body"><inertial><mass value="2"/>

@@ -12,7 +12,7 @@ from gazebo_msgs.srv import GetWorldProperties, SpawnModel, SpawnModelRequest
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
 
-BOUND = 20.0  # [s of wall time]
+BOUND = 60.0  # [s of wall time]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from memory import growth
+from memory import stays
 from robots import cartpole_urdf
 
 from bullet_gazebo.physics.description import DescriptionError
@@ -77,7 +77,7 @@ def test_models_that_come_and_go_leave_no_memory_behind(world, shape, tmp_path):
         world.step()
         world.delete("m")
 
-    assert growth(cycle, CYCLES, WARM_UP) < MOST_GROWTH
+    assert stays(cycle, CYCLES, WARM_UP, MOST_GROWTH)
 
 
 def test_inertias_that_change_leave_no_memory_behind(world):
@@ -90,7 +90,7 @@ def test_inertias_that_change_leave_no_memory_behind(world):
         world.set_inertia(model, "3", replace(nominal, com=com))
         world.step()
 
-    assert growth(cycle, CYCLES, WARM_UP) < MOST_GROWTH
+    assert stays(cycle, CYCLES, WARM_UP, MOST_GROWTH)
 
 
 def test_models_that_the_engine_refuses_leave_no_memory_behind(often, monkeypatch, tmp_path):
@@ -106,7 +106,7 @@ def test_models_that_the_engine_refuses_leave_no_memory_behind(often, monkeypatc
         with pytest.raises(DescriptionError):
             world.spawn("m", model_of("cylinder", tmp_path), Pose())
 
-    assert growth(cycle, CYCLES, WARM_UP) < MOST_GROWTH
+    assert stays(cycle, CYCLES, WARM_UP, MOST_GROWTH)
     world.close()
 
 

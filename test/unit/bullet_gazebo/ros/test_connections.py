@@ -30,7 +30,7 @@ from bullet_gazebo.ros.wire.rospy_patches import (
     bound_messages,
 )
 
-BOUND = 30.0  # [s]
+BOUND = 60.0  # [s]
 LOOPBACK = "127.0.0.1"
 HELLO = encode_ros_handshake_header({"callerid": "/test", "service": "/any"})
 

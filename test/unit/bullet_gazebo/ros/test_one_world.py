@@ -8,7 +8,7 @@ from ros_fakes import FakeMaster
 from bullet_gazebo.ros.node import one_world
 from bullet_gazebo.ros.node.one_world import NameTaken, full_name, one_at_a_time, refuse_twin
 
-BOUND = 30.0  # [s]
+BOUND = 60.0  # [s]
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 from bullet_gazebo.ros.wire import thinning
 from bullet_gazebo.ros.wire.thinning import ThinnedTopic, Thinner
 
-BOUND = 10.0  # [s]
+BOUND = 60.0  # [s]
 
 
 class FakeSimulator:

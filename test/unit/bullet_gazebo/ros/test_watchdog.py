@@ -11,7 +11,7 @@ import rospy
 
 from bullet_gazebo.ros.node.watchdog import Watchdog
 
-BOUND = 30.0  # [s]
+BOUND = 60.0  # [s]
 
 
 class FakeSimulator:
