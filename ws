@@ -141,6 +141,10 @@ main() {
 }
 
 run() {
+    # Of itself it takes port 11311, where nobody else in this workspace looks for a master.
+    if [[ $1 == roscore && $ROS_MASTER_URI =~ :([0-9]+)/?$ ]]; then
+        set -- roscore -p "${BASH_REMATCH[1]}" "${@:2}"
+    fi
     # exec, so that CMD gets the signals and its exit code is ours.
     if ! type -P -- "$1" >/dev/null; then
         echo "ws: no such command: $1" >&2

@@ -18,6 +18,10 @@ done
 unset _ws_name _ws_kept
 hash -r
 
+roscore() {  # as ws does
+    command "$CARTPOLE_WS" roscore "$@"
+}
+
 PS1="(cartpole) ${PS1-\$ }"
 
 # roscd, rosls, rosed, ..., and the completion of all ROS commands. They leave out what lies below a

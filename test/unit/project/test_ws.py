@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
+import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -236,6 +239,26 @@ def test_users_network_stays(ws, name, value):
 
 def test_a_remote_master_gets_no_loopback_address(ws):
     assert variable(ws, "ROS_IP", ROS_MASTER_URI="http://robot.example:11311") == "-"
+
+
+def test_roscore_is_the_master_that_the_workspace_looks_for(ws, root, tmp_path):
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        uri = f"http://127.0.0.1:{probe.getsockname()[1]}"
+    with (tmp_path / "log").open("w+") as log:
+        process = subprocess.Popen(
+            [root / "ws", "roscore"],
+            stdout=log, stderr=log,
+            env={**os.environ, "ROS_MASTER_URI": uri, "ROS_LOG_DIR": str(tmp_path)},
+        )  # fmt: skip
+        try:
+            while "started core service" not in (tmp_path / "log").read_text():
+                assert process.poll() is None
+                time.sleep(0.1)
+            assert ws("rosnode", "list", ROS_MASTER_URI=uri).stdout == "/rosout\n"
+        finally:
+            process.send_signal(signal.SIGINT)
+            assert process.wait(60) == 0
 
 
 # --- tests and checks --------------------------------------------------------------------------
