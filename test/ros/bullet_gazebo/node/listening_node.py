@@ -59,7 +59,7 @@ class Listening(unittest.TestCase):
             except rosgraph.MasterException:  # not registered yet
                 pass
             time.sleep(0.1)
-        self.fail(f"{name} doesn't listen at two ports")
+        raise self.failureException(f"{name} doesn't listen at two ports")
 
     def test_the_workspace_asks_for_loopback(self):
         self.assertEqual(os.environ["ROS_IP"], LOOPBACK)
