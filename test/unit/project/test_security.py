@@ -1,0 +1,87 @@
+"""What docs/security.md says of files, imports and folders."""
+
+import ast
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.files.model_file import read_entity
+from bullet_gazebo.physics.files.reading import Reading
+from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.scratch import scratch_folder
+
+ROOT = Path(__file__).resolve().parents[3]
+MODULES = sorted(
+    path for folder in ("src", "scripts", "companions") for path in (ROOT / folder).rglob("*.py")
+)
+# What runs code of whoever wrote the file or the text.
+DANGEROUS = {
+    "eval", "exec", "compile", "os.system", "os.popen", "pickle.load", "pickle.loads", "yaml.load",
+    "marshal.load", "marshal.loads", "shelve.open", "joblib.load", "cloudpickle.load", "dill.load",
+}  # fmt: skip
+MODEL = '<sdf version="1.6"><model name="m">{}</model></sdf>'
+INCLUDE = "<include><uri>{}</uri></include>"
+MESH = """<link name="l"><collision name="c"><geometry><mesh><uri>{}</uri></mesh></geometry></collision>
+</link>"""
+
+
+def spawn(entity: str) -> None:
+    """Reads a model with it, as a client may have it spawned."""
+    read_entity(MODEL.format(entity), "m", Resources(), Reading())
+
+
+def calls(path: Path) -> Iterator[tuple[str, ast.Call]]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call):
+            yield ast.unparse(node.func), node
+
+
+def test_no_file_is_run_as_code() -> None:
+    assert len(MODULES) > 250
+    for path in MODULES:
+        for name, call in calls(path):
+            options = {each.arg: ast.unparse(each.value) for each in call.keywords}
+            assert name not in DANGEROUS, f"{path}:{call.lineno}"
+            assert options.get("shell", "False") == "False", f"{path}:{call.lineno}"
+            if name == "torch.load":
+                assert options["weights_only"] == "True", f"{path}:{call.lineno}"
+
+
+def test_the_check_finds_what_it_looks_for(tmp_path: Path) -> None:
+    path = tmp_path / "module.py"
+    path.write_text("import torch\ntorch.load(open('x'))\nyaml.load(text, Loader=L)\n")
+    assert {"torch.load", "yaml.load"} <= {name for name, _ in calls(path)}
+
+
+@pytest.mark.parametrize(
+    "entity",
+    [INCLUDE, MESH],
+    ids=["include", "mesh"],
+)
+@pytest.mark.parametrize("scheme", ["http", "https", "ftp"])
+def test_nothing_is_fetched_from_a_network(entity: str, scheme: str) -> None:
+    uri = f"{scheme}://127.0.0.1:9/thing.stl"
+    with pytest.raises(DescriptionError, match=f"{scheme}:// is not read here"):
+        spawn(entity.format(uri))
+
+
+@pytest.mark.parametrize(
+    "entity",
+    [INCLUDE, MESH],
+    ids=["include", "mesh"],
+)
+@pytest.mark.parametrize("name", ["secret.sdf", "secret.stl", "secret.obj", "secret.dae"])
+def test_the_contents_of_a_file_are_not_given_back(entity: str, name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("s3same hunter2\n")
+    with pytest.raises(DescriptionError) as raised:
+        spawn(entity.format(f"file://{tmp_path}/{name}"))
+    assert name in str(raised.value)
+    assert "s3same" not in str(raised.value) and "hunter2" not in str(raised.value)
+
+
+def test_temporary_folders_are_the_users_own() -> None:
+    with scratch_folder() as path:
+        assert stat.S_IMODE(path.stat().st_mode) == 0o700
