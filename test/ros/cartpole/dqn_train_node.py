@@ -34,9 +34,7 @@ class DqnTrain(unittest.TestCase):
         place = self.place()
         self.launched(place, f"run_dir:={place.run}", "seed:=7", "params:=gamma=0.9 n_step=2")
         config = self.config(place)
-        self.assertEqual(
-            (config["run"]["seed"], config["hyperparameters"]["total_timesteps"]), (7, 300)
-        )
+        self.assertEqual((config["run"]["seed"], config["run"]["total_timesteps"]), (7, 300))
         self.assertEqual(
             (config["hyperparameters"]["gamma"], config["hyperparameters"]["n_step"]), (0.9, 2)
         )
@@ -78,7 +76,9 @@ class DqnTrain(unittest.TestCase):
     def test_an_unknown_parameter_is_one_line(self):
         place = self.place()
         output = self.launched(place, f"run_dir:={place.run}", "params:=gama=0.9")
-        self.assertIn("dqn_train.py: --params: unknown option 'gama'; did you mean gamma?", output)
+        self.assertIn(
+            "dqn_train.py: error: --params: unknown option 'gama'; did you mean gamma?", output
+        )
         self.assertFalse(place.run.exists())
 
 
