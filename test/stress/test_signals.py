@@ -34,7 +34,7 @@ def test_to_a_training(scenario: Scenario, tmp_path: Path, name: str) -> None:
         run, sent = tmp_path / str(number) / "run", SIGNALS[number % len(SIGNALS)]
         with forked(new(name, run), run.parent, NO_CORE) as training:
             for _ in range(dice.randint(1, 6)):
-                wait_for_newer_checkpoint(run, training)
+                wait_for_newer_checkpoint(run, training.is_running)
             time.sleep(dice.uniform(0.0, 0.2))
             ran = training.is_running()
             send(training.pid, sent, dice)

@@ -10,7 +10,7 @@ import resource
 import shlex
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -136,7 +136,7 @@ def forked(
         training.kill()
 
 
-def wait_for_newer_checkpoint(run: Path, training: Forked) -> None:
+def wait_for_newer_checkpoint(run: Path, is_running: Callable[[], bool]) -> None:
     """Or for the training's end."""
 
     def written() -> int:
@@ -145,7 +145,7 @@ def wait_for_newer_checkpoint(run: Path, training: Forked) -> None:
         return 0
 
     before, deadline = written(), time.monotonic() + BOUND
-    while written() == before and training.is_running():
+    while written() == before and is_running():
         assert time.monotonic() < deadline, f"no checkpoint after {BOUND:.0f} s"
         time.sleep(0.002)
 
@@ -155,5 +155,5 @@ def random_moment(dice: random.Random, run: Path, training: Forked) -> None:
     if dice.random() < 0.2:
         time.sleep(dice.uniform(0.0, 1.0))
     else:
-        wait_for_newer_checkpoint(run, training)
+        wait_for_newer_checkpoint(run, training.is_running)
         time.sleep(dice.uniform(0.0, 0.3))

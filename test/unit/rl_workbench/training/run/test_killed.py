@@ -12,13 +12,12 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from stress.trainings import OPTIONS, forked, new, wait_for_newer_checkpoint
 from training_runs import (
     EXACT,
     OTHERS,
-    SMALL,
     assert_no_doubles,
     assert_same_run,
-    flags,
     summary,
     train,
 )
@@ -26,12 +25,6 @@ from training_runs import (
 pytestmark = pytest.mark.slow
 
 FREQUENT = {"env_id": "CartPole-v1", "env_kwargs": None}
-LONG = {
-    "dqn": {"total_timesteps": 6000, "eval_frequency": 1000, "checkpoint_frequency": 250},
-    "reinforce": {"episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
-    "reinforce-document": {"episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
-    "ppo": {"total_timesteps": 5000, "eval_frequency": 1000, "checkpoint_frequency": 250},
-}
 COMMAND = [sys.executable, "-m", "rl_workbench", "train"]
 Start = Callable[..., subprocess.Popen]
 
@@ -57,19 +50,11 @@ def start(tmp_path: Path) -> Iterator[Start]:
             each.communicate()
 
 
-def new(name: str, run: Path) -> list[str]:
-    """The arguments of a training that takes some seconds; no file's options count."""
-    (run.parent / "none.yaml").write_text("{}")
-    options = {**SMALL[name], **FREQUENT, **LONG[name], "run_dir": run}
-    chosen = {key: value for key, value in options.items() if value is not None}
-    return ["--algo", name, "--config", str(run.parent / "none.yaml"), *flags(chosen)]
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """The same, in this process, and never interrupted."""
     folder = tmp_path_factory.mktemp("whole")
-    return cache(lambda name: train(folder / name, name, **{**FREQUENT, **LONG[name]}))
+    return cache(lambda name: train(folder / name, name, **{**FREQUENT, **OPTIONS[name]}))
 
 
 def ended(process: subprocess.Popen, code: int = 0) -> str:
@@ -80,30 +65,23 @@ def ended(process: subprocess.Popen, code: int = 0) -> str:
 
 
 def newer_checkpoint(run: Path, process: subprocess.Popen) -> None:
-    """Waits for one: starting up takes longer than all the rest."""
-
-    def written() -> int:
-        return (run / "last.pt").stat().st_mtime_ns if (run / "last.pt").exists() else 0
-
-    before, deadline = written(), time.monotonic() + 120
-    while written() == before and process.poll() is None:
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
+    """Waits for one, or for the end: starting up takes longer than all the rest."""
+    wait_for_newer_checkpoint(run, lambda: process.poll() is None)
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_killed_at_random_moments(start: Start, whole, tmp_path: Path, name: str) -> None:
+def test_killed_at_random_moments(whole, tmp_path: Path, name: str) -> None:
     """Hundreds of times: test/stress/test_kills.py."""
     run, moments, killed = tmp_path / "run", random.Random(0), 0
-    process = start(*new(name, run))
+    arguments = new(name, run)
     for _ in range(3):
-        newer_checkpoint(run, process)
-        time.sleep(moments.uniform(0, 0.4))  # anywhere: in a step, an evaluation, a checkpoint
-        process.kill()
-        process.communicate()
-        killed += process.returncode == -signal.SIGKILL
-        process = start("--resume", str(run))
-    ended(process)
+        with forked(arguments, tmp_path) as training:
+            wait_for_newer_checkpoint(run, training.is_running)
+            time.sleep(moments.uniform(0, 0.4))  # anywhere: in a step, an evaluation, a checkpoint
+            killed += training.kill()
+        arguments = ["--resume", str(run)]
+    with forked(arguments, tmp_path) as training:
+        training.ended()
     assert killed
     assert_same_run(whole(name), run)
     assert_no_doubles(run)
