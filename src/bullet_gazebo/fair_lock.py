@@ -9,15 +9,26 @@ class FairLock:
     """First come, first served.
 
     threading.Lock lets a thread that releases and re-acquires it in a loop, as the simulation does, keep
-    all others out. Here every waiter gets its turn after at most one tick. Not re-entrant.
+    all others out. Here every waiter gets its turn after at most one tick.
+
+    Raises:
+        RuntimeError: if the thread that holds it takes it once more, for which it would wait for ever.
     """
 
     def __init__(self) -> None:
         self._guard = threading.Lock()
         self._waiting: deque[threading.Lock] = deque()
         self._held = False
+        self._holder: int | None = None  # the thread
 
     def __enter__(self) -> None:
+        thread = threading.get_ident()
+        if self._holder == thread:
+            raise RuntimeError("this thread holds the simulator's lock already")
+        self._take()
+        self._holder = thread
+
+    def _take(self) -> None:
         with self._guard:
             if not self._held:
                 self._held = True
@@ -44,6 +55,7 @@ class FairLock:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._holder = None
         with self._guard:
             if self._waiting:
                 self._waiting.popleft().release()  # the lock stays held: it is handed over

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -146,3 +147,36 @@ def test_a_master_that_is_away_leaves_no_model_half_there(setting, monkeypatch) 
     monkeypatch.setattr(rospy, "get_param", away)
     setting.delete(setting.spawn("good"))
     assert "no master" in setting.errors[0]
+
+
+WAITING = """
+class Waiting:
+    def __init__(self, context):
+        context.on_update(lambda now: {call})
+    def shutdown(self): pass
+"""
+
+
+@pytest.mark.parametrize(
+    "call",
+    ["context.sim.pause()", "context.sim.step(1)", "context.sim.reset_simulation()",
+     "context.on_update(print)", "context.release()", "context.sim.lock.__enter__()"],
+)  # fmt: skip
+def test_an_update_that_would_wait_for_itself_is_told(setting, call: str) -> None:
+    """It is called under the simulator's lock, and stopped the world without a word."""
+    setting.write("waiting", WAITING.format(call=call))
+    setting.write("good", GOOD)
+    setting.places = {"libwaiting.so": "waiting:Waiting", "libgood.so": "good:Good"}
+    setting.spawn("waiting", "good")
+
+    def move() -> None:
+        with setting.sim.lock:
+            setting.sim.advance(3)
+
+    world = threading.Thread(target=move, daemon=True)
+    world.start()
+    world.join(60.0)
+    assert not world.is_alive(), "the world stands still"
+    assert len(sys.modules["good"].seen) == 3
+    (error,) = setting.errors
+    assert "is not called any more" in error and "holds the simulator's lock already" in error
