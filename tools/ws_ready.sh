@@ -63,7 +63,7 @@ make_step() {  # step, title
     kill "$watcher" 2>/dev/null
     wait "$watcher" 2>/dev/null
     trap - EXIT
-    [[ $status -ne 0 ]] || "key_$1" | hash_of >"$WS/stamp/$1" || status=$?
+    [[ $status -ne 0 ]] || { "key_$1" | hash_of >"$WS/stamp/$1"; } 2>/dev/null || status=$?
     set -e
     [[ $status -eq 0 ]] || tell_failure "$1" "$2" "$status" "$((SECONDS - begin))"
     say "$2: done in $(duration $((SECONDS - begin)))"
@@ -82,7 +82,8 @@ tell_failure() {  # step, title, exit code, seconds
 
 # Its last line that looks like a reason, or else its last one.
 reason_in() {  # log
-    grep -aE '^(E:|ERROR:|CMake Error)|[Ee]rror:' -- "$1" | tail -n 1 | grep . || tail -n 1 -- "$1"
+    grep -aE '^(E:|ERROR:|CMake Error)|[Ee]rror:' -- "$1" | tail -n 1 | grep . ||
+        tail -n 1 -- "$1" | grep . || echo "it said nothing"
 }
 
 # Tells now and then how far a step is, until it is killed or ws is gone.
@@ -92,7 +93,8 @@ watch_step() {  # log, begin
     exec {silence}<> <(:)
     while ! read -rt "$PERIOD" -u "$silence" && kill -0 $$ 2>/dev/null; do
         last=$(tail -c 2000 -- "$1" | tr '\r' '\n' | grep -a '[[:alnum:]]' | tail -n 1 | cut -c 1-100) || true
-        say "    $(duration $((SECONDS - $2))): ${last#"${last%%[![:space:]]*}"}"
+        last=${last#"${last%%[![:space:]]*}"}
+        say "    $(duration $((SECONDS - $2))): ${last:-nothing said so far}"
     done
 }
 

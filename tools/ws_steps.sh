@@ -100,7 +100,11 @@ key_test_tools() { key_venv; cat -- "$ROOT/requirements/test.txt"; }
 key_extras() { key_venv; cat -- "$ROOT/requirements/extras.txt"; }
 
 plan_venv() {
-    if [[ -d $VENV ]]; then echo "what has changed in requirements/base.txt"; else size_of base.txt; fi
+    if compgen -G "$VENV/lib/*/site-packages/torch" >/dev/null; then  # the largest, so most is there
+        echo "what has changed in requirements/base.txt"
+    else
+        size_of base.txt
+    fi
 }
 plan_test_tools() { size_of test.txt; }
 plan_extras() { size_of extras.txt; }
