@@ -41,13 +41,14 @@ def test_ctrl_c_while_it_is_still_being_read(tmp_path: Path) -> None:
 def test_errors_begin_with_the_commands_name(
     tmp_path: Path, prog: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for arguments, name in (
-        (["eval", str(tmp_path)], prog),
-        (["train", f"--resume={tmp_path}"], f"{prog} train"),
-    ):
-        assert main(arguments, prog) == 1
-        (line,) = capsys.readouterr().err.splitlines()
-        assert line.startswith(f"{name}: {tmp_path} is no run folder")
+    assert main(["eval", str(tmp_path)], prog) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"{prog}: {tmp_path} is no run folder")
+    with pytest.raises(SystemExit) as ended:
+        main(["train", f"--resume={tmp_path}"], prog)
+    usage, line = capsys.readouterr().err.splitlines()
+    assert ended.value.code == 2 and usage.startswith(f"usage: {prog} train")
+    assert line.startswith(f"{prog} train: error: {tmp_path} is no run folder")
 
 
 def test_it_can_be_started_without_a_script() -> None:
@@ -109,5 +110,7 @@ def test_what_cannot_be_changed_of_one_by_stable_baselines(
     run = workbench_runs.record(tmp_path / "run", [1.0], exp_name="ppo", total_timesteps=64)
     content = json.loads((run / "config.json").read_text()) | {"algorithm": "ppo"}
     (run / "config.json").write_text(json.dumps(content))
-    assert main(["train", f"--resume={run}", given]) == 1
+    with pytest.raises(SystemExit) as ended:
+        main(["train", f"--resume={run}", given])
+    assert ended.value.code == 2
     assert told in capsys.readouterr().err

@@ -354,6 +354,8 @@ def test_an_extra_that_is_missing(runs: Path, tmp_path: Path, monkeypatch, capsy
     for arguments in (
         ["record", runs / "dqn_0", "--out", tmp_path / "a.mp4"],
         ["sweep", "--out", tmp_path / "sweep"],
-        ["train", "--algo", "ppo"],
     ):
         assert "/ws extras installs it" in refused(capsys, *arguments)
+    with pytest.raises(SystemExit):
+        work("train", "--algo", "ppo")
+    assert "/ws extras installs it" in capsys.readouterr().err
