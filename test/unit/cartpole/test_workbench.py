@@ -28,9 +28,12 @@ def test_errors_begin_with_the_name_it_was_called_by(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["/somewhere/workbench.py"])
-    assert main(["eval", str(tmp_path)]) == main(["train", f"--resume={tmp_path}"]) == 1
-    first, second = capsys.readouterr().err.splitlines()
-    assert first.startswith("workbench.py: ") and second.startswith("workbench.py train: ")
+    assert main(["eval", str(tmp_path)]) == 1
+    assert capsys.readouterr().err.startswith("workbench.py: ")
+    with pytest.raises(SystemExit) as ended:  # refused before it starts, as a wrong option is
+        main(["train", f"--resume={tmp_path}"])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith("workbench.py train: error: ")
 
 
 def test_its_trainings_in_processes_of_their_own_know_the_cart_pole(tmp_path: Path) -> None:
