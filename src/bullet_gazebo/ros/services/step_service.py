@@ -21,11 +21,18 @@ SLICE = 500  # ticks between which other services get their turn
 class StepService:
     """One call: reset, commands, exactly n ticks, state; in lock-step only (bullet_gazebo_msgs/StepWorld)."""
 
-    def __init__(self, sim: Simulator, watchdog: AbstractContextManager[object]) -> None:
-        """A fault in a block of `watchdog` ends the node."""
+    def __init__(
+        self,
+        sim: Simulator,
+        watchdog: AbstractContextManager[object],
+        one_at_a_time: threading.Lock,
+    ) -> None:
+        """A fault in a block of `watchdog` ends the node; with `one_at_a_time`, nobody else's ticks come
+        within a request's.
+        """
         self._sim = sim
         self._watchdog = watchdog
-        self._one_at_a_time = threading.Lock()  # nobody else's ticks within a request's
+        self._one_at_a_time = one_at_a_time
         self._service = rospy.Service("~step_world", StepWorld, self._step)
 
     def _step(self, request: StepWorldRequest) -> StepWorldResponse:

@@ -1,0 +1,43 @@
+"""time.sleep; with --virtual-wall-clock also time.time, monotonic and perf_counter."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from lockstep_runner import originals
+from lockstep_runner.callers import caller, is_the_script
+from lockstep_runner.runner import Runner
+
+
+def install(runner: Runner, virtual_wall_clock: bool) -> None:
+    """Puts the functions in place."""
+
+    def sleep(seconds: float) -> None:
+        """As time.sleep: the world moves on by as much."""
+        if not is_the_script(1) or caller(1) == "actionlib" and runner.waits_for_others(seconds):
+            originals.sleep(seconds)
+        elif not runner.clock.covers_this_thread():
+            runner.notices.once(
+                f"sleep {threading.current_thread().name}",
+                f"thread '{threading.current_thread().name}' sleeps by time.sleep, outside the main"
+                " thread: its sleeps are wall time, so that what it does isn't repeatable; rospy.sleep,"
+                " rospy.Rate and rospy.Timer are covered",
+            )
+            originals.sleep(seconds)
+        elif runner.is_connected():
+            if seconds < 0:
+                raise ValueError("sleep length must be non-negative")
+            runner.wait(seconds)
+        else:
+            originals.sleep(seconds)
+
+    time.sleep = sleep  # type: ignore[assignment]
+    if virtual_wall_clock:
+        start, passed = time.time(), runner.clock
+
+        def simulated() -> float:
+            return passed.passed / 1e9
+
+        time.time = lambda: start + simulated()
+        time.monotonic = time.perf_counter = simulated
