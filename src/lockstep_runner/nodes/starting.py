@@ -12,7 +12,7 @@ from typing import Any
 from lockstep_runner import originals
 from lockstep_runner.notices import Notices
 
-SITE = Path(__file__).with_name("site")
+SITE = Path(__file__).parent.with_name("site")
 LOOK = 0.03  # [s of wall time]
 QUIET = 5  # looks in a row
 PATIENCE = 30.0  # [s of wall time]

@@ -31,9 +31,9 @@ from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.node.world_control import WorldControl
 from bullet_gazebo.ros.node.world_loader import fill_world, load_plugins, read_world
 from bullet_gazebo.ros.plugins import PluginRegistry
-from bullet_gazebo.ros.services.advance_service import AdvanceService
 from bullet_gazebo.ros.services.spawn_services import SpawnServices
-from bullet_gazebo.ros.services.step_service import StepService
+from bullet_gazebo.ros.services.stepping.advance_service import AdvanceService
+from bullet_gazebo.ros.services.stepping.step_service import StepService
 from bullet_gazebo.ros.services.world_services import advertise_world_services
 from bullet_gazebo.ros.wire.rospy_patches import (
     Reception,

@@ -95,12 +95,12 @@ def test_a_topic_whose_message_can_not_be_sent_silences_no_other(thinner, monkey
     def fail(sample):
         raise OverflowError("no number for a message")
 
-    bad = ThinnedTopic(thinner, fail)
+    bad = ThinnedTopic(thinner, "/topic", fail)
     bad._kept = 1
     thinner.remember(bad)
     assert told.wait(BOUND)
     reader = Reader()
-    good = ThinnedTopic(thinner, reader)
+    good = ThinnedTopic(thinner, "/topic", reader)
     for sample in range(1000):
         good.send(sample)
     assert reader.wait_for(999)
@@ -110,6 +110,9 @@ class LateThinner:
     """Never comes round, as on a machine that has no time for its thread."""
 
     active = True
+
+    def is_whole(self, name):
+        return False
 
     def remember(self, topic):
         pass

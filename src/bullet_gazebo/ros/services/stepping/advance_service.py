@@ -7,7 +7,7 @@ import genpy
 import rospy
 from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldRequest, AdvanceWorldResponse
 
-from bullet_gazebo.ros.services.step_requests import MAX_TICKS
+from bullet_gazebo.ros.services.stepping.step_requests import MAX_TICKS
 from bullet_gazebo.ros.wire.conversions import to_time
 from bullet_gazebo.ros.wire.mailboxes import Mailboxes
 from bullet_gazebo.ros.wire.rospy_patches import deliver

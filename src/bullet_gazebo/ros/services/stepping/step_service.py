@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.ros.services.step_requests import StepPlan
+from bullet_gazebo.ros.services.stepping.step_requests import StepPlan
 from bullet_gazebo.ros.wire.conversions import to_pose_msg, to_time, to_twist_msg
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.simulator import Simulator

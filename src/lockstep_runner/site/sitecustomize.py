@@ -1,4 +1,4 @@
-"""Read by every Python process below a script in lock-step, and by no other (see nodes/starting.py)."""
+"""Read by every Python process below a script in lock-step, and by no other (see ../nodes/starting.py)."""
 
 import importlib.machinery
 import importlib.util
@@ -19,7 +19,7 @@ def _go_on() -> None:
 
 _go_on()
 try:
-    from lockstep_runner.nodes.following import watch_for_rospy
+    from lockstep_runner.following import watch_for_rospy
 except ImportError:  # another Python, without ROS
     pass
 else:
