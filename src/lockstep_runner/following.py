@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from lockstep_runner.nodes.wire import ADDRESS, Ended, Line
-from lockstep_runner.seeds import AfterImport
+from lockstep_runner.script.seeds import AfterImport
 
 # They are the simulation and the graph themselves.
 NOT_FOLLOWING = frozenset(
@@ -50,7 +50,7 @@ def _follow(name: str) -> None:
         connection.close()
         return
     from lockstep_runner.install import install
-    from lockstep_runner.world import World, WorldFailed
+    from lockstep_runner.simulation.world import World, WorldFailed
 
     class FollowedWorld(World):
         """The simulator; for time it asks the script's process."""

@@ -9,7 +9,7 @@ import rospy
 from lockstep_runner.nodes.followers import Followers
 from lockstep_runner.replaced import python_threads, python_time, ros_services, ros_time, ros_topics
 from lockstep_runner.runner import Runner
-from lockstep_runner.world import World
+from lockstep_runner.simulation.world import World
 
 
 def install(args: argparse.Namespace, world: World | None = None) -> Runner:

@@ -10,10 +10,10 @@ import threading
 import types
 from collections.abc import Callable, Sequence
 
-from lockstep_runner import script
+from lockstep_runner.script import running
 from lockstep_runner.notices import tell
-from lockstep_runner.seeds import seed_everything
-from lockstep_runner.world import NotInLockstep, is_running
+from lockstep_runner.script.seeds import seed_everything
+from lockstep_runner.simulation.world import NotInLockstep, is_running
 
 USAGE = 2
 SERVER_ARGUMENTS = "GZSERVER_ARGS"  # read by every simulator that is started below us
@@ -26,9 +26,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs the script that the command line names; returns the exit code, unless it leaves by itself."""
     args = _parse(sys.argv[1:] if argv is None else argv)
     try:
-        code = script.compiled(args.script)
+        code = running.compiled(args.script)
         is_running()
-    except (script.NoScript, NotInLockstep) as fault:
+    except (running.NoScript, NotInLockstep) as fault:
         tell(str(fault))
         return USAGE
     if args.seed is not None and os.environ.get(HASHES) != str(args.seed % MOST_SEED):
@@ -49,7 +49,7 @@ def _run(args: argparse.Namespace, code: types.CodeType) -> int:
     runner.watch()
     show, sys.excepthook = sys.excepthook, _hide_ourselves(sys.excepthook, args.script)
     try:
-        script.run(args.script, args.arguments, code)
+        running.run(args.script, args.arguments, code)
         others = [
             each
             for each in threading.enumerate()
@@ -73,7 +73,7 @@ def _hide_ourselves(show: Hook, path: str) -> Hook:
     def shown(
         kind: type[BaseException], fault: BaseException, trace: types.TracebackType | None
     ) -> None:
-        fault.__traceback__ = script.own_part(trace, path)  # which is what is shown
+        fault.__traceback__ = running.own_part(trace, path)  # which is what is shown
         show(kind, fault, fault.__traceback__)
 
     return shown

@@ -6,7 +6,7 @@ import threading
 import time
 
 from lockstep_runner import originals
-from lockstep_runner.callers import caller, is_the_script
+from lockstep_runner.script.callers import caller, is_the_script
 from lockstep_runner.runner import Runner
 
 

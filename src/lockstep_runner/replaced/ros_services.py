@@ -12,7 +12,7 @@ import rospy.impl.tcpros_service
 from rospy.impl.tcpros_service import ServiceProxy
 
 from lockstep_runner.runner import Runner
-from lockstep_runner.world import SERVICE as ADVANCE
+from lockstep_runner.simulation.world import SERVICE as ADVANCE
 from ros_calls.service import ServiceClient
 
 

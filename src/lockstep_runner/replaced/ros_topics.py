@@ -12,7 +12,7 @@ import rospy.topics
 from rospy.topics import _PublisherImpl, _SubscriberImpl, _TopicImpl
 
 from lockstep_runner.runner import Runner
-from lockstep_runner.world import NODE
+from lockstep_runner.simulation.world import NODE
 
 
 def install(runner: Runner) -> None:

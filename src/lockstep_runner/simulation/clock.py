@@ -18,9 +18,9 @@ import rospy
 import rospy.impl.simtime
 
 from lockstep_runner import originals
-from lockstep_runner.callbacks import Callbacks
+from lockstep_runner.simulation.callbacks import Callbacks
 from lockstep_runner.notices import Notices
-from lockstep_runner.world import World
+from lockstep_runner.simulation.world import World
 
 NANOSECONDS = 1_000_000_000
 LOOK = 0.002  # [s of wall time] between two looks whether a thread that computes has ended

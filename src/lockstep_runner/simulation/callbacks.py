@@ -12,7 +12,7 @@ import rospy.impl.registration
 from bullet_gazebo_msgs.msg import TopicMessage
 
 from lockstep_runner import originals
-from lockstep_runner.world import NODE
+from lockstep_runner.simulation.world import NODE
 
 QUIET = (
     20  # callbacks in a row that did nothing towards the simulator: time needn't stop for the topic

@@ -11,7 +11,7 @@ from bullet_gazebo_msgs.msg import TopicMessage
 
 from lockstep_runner import originals
 from lockstep_runner.notices import Notices
-from lockstep_runner.world import NODE, World
+from lockstep_runner.simulation.world import NODE, World
 
 CONNECTING = 2.0  # [s of wall time]
 LOOK = 0.001  # [s]

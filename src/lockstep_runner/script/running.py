@@ -10,6 +10,8 @@ import tokenize
 import types
 from collections.abc import Sequence
 
+OURS = __name__.partition(".")[0]
+
 
 class NoScript(Exception):
     """The file can't be run; the text says why."""
@@ -71,7 +73,7 @@ def own_part(trace: types.TracebackType | None, path: str) -> types.TracebackTyp
     last = part
     while last.tb_next is not None:
         name = last.tb_next.tb_frame.f_globals.get("__name__", "")
-        if name.partition(".")[0] == __package__:
+        if name.partition(".")[0] == OURS:
             last.tb_next = last.tb_next.tb_next
         else:
             last = last.tb_next
