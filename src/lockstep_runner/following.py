@@ -85,5 +85,5 @@ def _follow(name: str) -> None:
         except (Ended, KeyError) as fault:
             raise WorldFailed("the script that it followed has ended") from fault
 
-    options = argparse.Namespace(dt=0.001, step_on=["none"], virtual_wall_clock=False)
+    options = argparse.Namespace(seed=None, dt=0.001, step_on=["none"], virtual_wall_clock=False)
     install(options, FollowedWorld())

@@ -25,7 +25,7 @@ def install(args: argparse.Namespace, world: World | None = None) -> Runner:
     triggers = None
     if args.step_on is not None:
         triggers = [_global(name) for name in args.step_on if name != "none"]
-    runner = Runner(args.dt, triggers, world or World())
+    runner = Runner(args.dt, triggers, world or World(args.seed))
     if world is None:
         followers = Followers(runner.notices)
         followers.passed = lambda: runner.clock.passed

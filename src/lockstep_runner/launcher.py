@@ -57,6 +57,7 @@ def _run(args: argparse.Namespace, code: types.CodeType) -> int:
         ]
         runner.finish(others)
     finally:
+        runner.hand_over()
         for name in runner.triggers.unused():
             seen = ", ".join(runner.triggers.seen) or "nothing"
             tell(f"--step-on {name}: the script used no topic or service of that name, but {seen}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import os
@@ -15,12 +16,14 @@ from lockstep_runner.simulation.clock import NANOSECONDS, Clock, Condition
 from lockstep_runner.notices import Notices, tell
 from lockstep_runner.simulation.topics import Topics
 from lockstep_runner.triggers import Triggers
-from lockstep_runner.simulation.world import NotInLockstep, World, WorldFailed, WorldGone
+from lockstep_runner.simulation.world import NODE, NotInLockstep, World, WorldFailed, WorldGone
 
 USAGE, FAILED = 2, 1  # exit codes
 SILENCE = 30.0  # [s of wall time] without simulated time, after which the user is told
 OTHERS = 2.0  # [s of wall time] in which another node may come up without time passing
 LOOK = 0.05  # [s of wall time]
+PAUSE = f"{NODE}/pause_physics"
+SWITCHES = (PAUSE, f"{NODE}/unpause_physics")
 POLLED = 10  # equal questions to a service in a row
 QUIET = ("get_", "list_", "pause_physics", "unpause_physics")  # services that publish nothing
 
@@ -153,6 +156,19 @@ class Runner:
         if may and self.triggers.after(topic, topic in self.topics.commands):
             self._pass_period()
 
+    @_ends_with_the_world(False)
+    def switches(self, service: str) -> bool:
+        """Whether a service pauses or unpauses physics; then it is seen to, and needn't be called."""
+        if service not in SWITCHES or not self.is_connected():
+            return False
+        self.clock.callbacks.acted()
+        if self._may_step():
+            self.clock.others.settle()
+        self.world.switch(paused=service == PAUSE)
+        if self._may_step() and self.triggers.called(service):
+            self._pass_period()
+        return True
+
     @_ends_with_the_world(None)
     def before_call(self, service: str) -> None:
         """A service is about to be called: what was published before it, comes before it."""
@@ -161,7 +177,7 @@ class Runner:
             self.clock.others.settle()
         if self.is_connected() and (self.world.has_post or not self.topics.are_settled):
             self._settle()
-            if self.world.has_post and not _is_quiet(service):
+            if self.world.has_post:
                 self.clock.exchange()
 
     @_ends_with_the_world(None)
@@ -174,7 +190,7 @@ class Runner:
         if self._may_step():
             if self.triggers.called(service):
                 self._pass_period()
-            elif _is_quiet(service) and "pause" not in service:
+            elif _is_quiet(service) and service not in SWITCHES:
                 self.polls(service, POLLED, request())
 
     @_ends_with_the_world(None)
@@ -182,6 +198,12 @@ class Runner:
         """Something was looked at; done often enough, with nothing in between, it is waited for."""
         if self._may_step() and self.world.there and self.triggers.polled(what, often, detail):
             self._pass_period()
+
+    def hand_over(self) -> None:
+        """Gives the simulator what it hasn't got yet, at the script's end."""
+        if self.world.there and self.world.has_post:
+            with contextlib.suppress(WorldGone, WorldFailed):
+                self.world.advance(0)
 
     def finish(self, threads: Sequence[threading.Thread]) -> None:
         """Lets time pass, at the end of the script, until its other threads have ended."""

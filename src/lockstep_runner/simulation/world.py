@@ -35,7 +35,8 @@ class WorldFailed(Exception):
 class World:
     """One simulator at a time, found by itself; thread-safe."""
 
-    def __init__(self) -> None:
+    def __init__(self, seed: int | None = None) -> None:
+        """`seed` is for the random numbers of each simulator that is found."""
         self.now = 0  # [ns] simulated
         self.step = 1_000_000  # [ns]
         self.paused = False
@@ -44,6 +45,9 @@ class World:
         self._guard = threading.RLock()
         self._call: ServiceClient | None = None
         self._pending: list[TopicMessage] = []
+        self._physics = AdvanceWorldRequest.AS_IT_IS
+        self._seed = seed
+        self._seeded = False
         self._next_look = 0.0
 
     @property
@@ -69,6 +73,8 @@ class World:
                 return False
             self._call = ServiceClient(SERVICE, AdvanceWorld, persistent=True, timeout=TIMEOUT)
             self._pending.clear()
+            self._physics = AdvanceWorldRequest.AS_IT_IS
+            self._seeded = self._seed is None
         return True
 
     def post(self, topic: str, data: bytes) -> None:
@@ -76,10 +82,17 @@ class World:
         with self._guard:
             self._pending.append(TopicMessage(topic, data))
 
+    def switch(self, paused: bool) -> None:
+        """Pauses or unpauses; it goes with the next call, which is soon enough: no time passes before."""
+        with self._guard:
+            pause, unpause = AdvanceWorldRequest.PAUSE_PHYSICS, AdvanceWorldRequest.UNPAUSE_PHYSICS
+            self._physics = pause if paused else unpause
+            self.paused = paused
+
     @property
     def has_post(self) -> bool:
-        """Whether messages for the simulator wait for the next call."""
-        return bool(self._pending)
+        """Whether anything for the simulator waits for the next call."""
+        return bool(self._pending) or self._physics != AdvanceWorldRequest.AS_IT_IS
 
     def advance(
         self,
@@ -106,8 +119,12 @@ class World:
             request.subscriptions, request.publications = map(list, connect)
         with self._guard:
             request.published, self._pending = self._pending, []
+            request.physics, self._physics = self._physics, AdvanceWorldRequest.AS_IT_IS
             if self._call is None:
                 raise WorldGone("there is no simulator")
+            if not self._seeded:
+                request.reseed, request.seed = True, self._seed
+                self._seeded = True
             try:
                 response: AdvanceWorldResponse = self._call(request)
             except (ServiceGone, ServiceHangs) as fault:

@@ -11,6 +11,7 @@ from bullet_gazebo.ros.services.stepping.step_requests import MAX_TICKS
 from bullet_gazebo.ros.wire.conversions import to_time
 from bullet_gazebo.ros.wire.mailboxes import Mailboxes
 from bullet_gazebo.ros.wire.rospy_patches import deliver
+from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.ros.wire.thinning import Thinner
 from bullet_gazebo.simulator import Simulator
 
@@ -57,7 +58,13 @@ class AdvanceService:
             )
         with self._one_at_a_time:
             self._sim.post_goes_with_steps = True
+            if request.reseed:
+                seed_random_numbers(request.seed, tell=False)
             faults = self._deliver(request)
+            if request.physics == AdvanceWorldRequest.PAUSE_PHYSICS:
+                self._sim.pause()
+            elif request.physics == AdvanceWorldRequest.UNPAUSE_PHYSICS:
+                self._sim.unpause()
             passed = self._advance(request.ticks)
             with self._sim.lock:
                 messages = mailbox.take()
