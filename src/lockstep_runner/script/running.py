@@ -5,11 +5,13 @@ from __future__ import annotations
 import ast
 import builtins
 import os
+import re
 import sys
 import tokenize
 import types
 from collections.abc import Sequence
 
+PYTHON_2 = re.compile(r"<>|^\s*raise [\w.]+,|\bur['\"]|`")
 OURS = __name__.partition(".")[0]
 
 
@@ -30,14 +32,16 @@ def compiled(path: str) -> types.CodeType:
     except (OSError, UnicodeDecodeError) as fault:
         raise NoScript(f"{path}: {fault}") from fault
     except (SyntaxError, ValueError) as fault:
+        what, line, place = str(fault), "", ""
+        if isinstance(fault, SyntaxError):
+            what, line, place = fault.msg, fault.text or "", f", line {fault.lineno}"
         hint = ""
-        if _is_for_python_2(str(fault)):
+        if _is_for_python_2(what, line):
             hint = " (a script for Python 2: this is Python 3; 2to3 mends most of it)"
-        place = f", line {fault.lineno}" if isinstance(fault, SyntaxError) else ""
-        raise NoScript(f"{path}{place}: {fault}{hint}") from fault
+        raise NoScript(f"{path}{place}: {what}{hint}") from fault
 
 
-def _is_for_python_2(fault: str) -> bool:
+def _is_for_python_2(fault: str, line: str) -> bool:
     signs = (
         "Missing parentheses in call to 'print'",
         "Missing parentheses in call to 'exec'",
@@ -45,9 +49,8 @@ def _is_for_python_2(fault: str) -> bool:
         "leading zeros in decimal integer literals",
         "invalid decimal literal",
         "inconsistent use of tabs",
-        "'<>'",
     )
-    return any(sign in fault for sign in signs)
+    return any(sign in fault for sign in signs) or PYTHON_2.search(line) is not None
 
 
 def run(path: str, arguments: Sequence[str], code: types.CodeType) -> None:

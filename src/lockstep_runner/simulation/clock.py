@@ -117,7 +117,8 @@ class Clock:
         Returns:
             Whether `until` has become true.
         """
-        span = max(0.0, seconds) * NANOSECONDS
+        # Whole: of a fraction that no tick reaches nobody would wake.
+        span = seconds if seconds == math.inf else round(max(0.0, seconds) * NANOSECONDS)
         if threading.current_thread() is not threading.main_thread():
             return self._rest(span, until)
         self.driving = True
