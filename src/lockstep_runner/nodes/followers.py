@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lockstep_runner import originals
-from lockstep_runner.nodes.starting import LOOK, Seen, Starting
+from lockstep_runner.looks import LOOK, Seen
+from lockstep_runner.nodes.starting import Starting
 from lockstep_runner.nodes.wire import ADDRESS, Ended, Line
 from lockstep_runner.notices import Notices
 
@@ -31,7 +32,14 @@ class _Node:
     began: float = 0.0  # [ns of time passed] to rest
     wake: float = math.inf  # [ns of time passed]
     covered: bool = True  # waited for; not while it waits for something that isn't simulated time
-    seen: Seen = field(default_factory=Seen)
+    seen: Seen = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.look_anew()
+
+    def look_anew(self) -> None:
+        """From now on."""
+        self.seen = Seen(Path("/proc", str(self.pid)))
 
 
 class Followers:
@@ -99,7 +107,7 @@ class Followers:
                 for node in self._nodes.values():
                     if node.rests or not node.covered:
                         continue
-                    if node.seen.is_quiet(node.pid):
+                    if node.seen.is_quiet():
                         node.covered = False  # it waits for something that isn't simulated time
                     elif originals.monotonic() > deadline:
                         node.covered = False
@@ -127,7 +135,7 @@ class Followers:
                     node.began = self.passed()
                     node.wake = math.inf if rest is None else node.began + rest
                     node.rests = node.covered = True
-                    node.seen = Seen()
+                    node.look_anew()
                     self._guard.notify_all()
         except (Ended, KeyError, TypeError, ValueError):
             line.close()

@@ -10,32 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from lockstep_runner import originals
+from lockstep_runner.looks import LOOK, QUIET, WORKING, look_at
 from lockstep_runner.notices import Notices
 
 SITE = Path(__file__).parent.with_name("site")
-LOOK = 0.03  # [s of wall time]
-QUIET = 5  # looks in a row
 PATIENCE = 30.0  # [s of wall time]
-WORKING = "RD"  # states of a process: running, waiting for a disk
-
-
-class Seen:
-    """What was seen of one process."""
-
-    def __init__(self) -> None:
-        self._used = -1  # [ticks] of processor time
-        self._quiet = 0  # looks in a row
-        self._next = 0.0
-
-    def is_quiet(self, pid: int) -> bool:
-        """Looks, not too often, whether a process has done nothing in the last few looks."""
-        if originals.monotonic() >= self._next:
-            self._next = originals.monotonic() + LOOK
-            look = _look(pid)
-            works = look is not None and (look[1] in WORKING or look[2] != self._used)
-            self._quiet = 0 if works else self._quiet + 1
-            self._used = look[2] if look else -1
-        return self._quiet >= QUIET
 
 
 class Starting:
@@ -90,7 +69,7 @@ def _below() -> dict[int, tuple[str, int]]:
     """Returns state and processor time [ticks] of the processes that come of this one."""
     parents: dict[int, tuple[int, str, int]] = {}
     for entry in os.listdir("/proc"):
-        look = _look(int(entry)) if entry.isdigit() else None
+        look = look_at(Path("/proc", entry)) if entry.isdigit() else None
         if look is not None:
             parents[int(entry)] = look
     below = {os.getpid()}
@@ -101,15 +80,6 @@ def _below() -> dict[int, tuple[str, int]]:
         grown = bool(more)
     below.discard(os.getpid())
     return {pid: parents[pid][1:] for pid in below if parents[pid][1] != "Z"}
-
-
-def _look(pid: int) -> tuple[int, str, int] | None:
-    """Returns parent, state and processor time [ticks] of a process, if it is there."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()
-    except OSError:
-        return None
-    return int(fields[1]), fields[0], int(fields[11]) + int(fields[12])
 
 
 def _name(pid: int) -> str:

@@ -1,4 +1,4 @@
-"""threading.Event.wait, Condition.wait and Thread.join, where the script itself calls them."""
+"""threading.Event.wait, Condition.wait, Thread.start and join, where the script itself calls them."""
 
 from __future__ import annotations
 
@@ -35,6 +35,12 @@ def install(runner: Runner) -> None:
         else:
             originals.join(self, timeout)
 
+    def start(self: threading.Thread) -> None:
+        originals.start(self)
+        if is_the_script(1) and runner.world.there:
+            runner.clock.began_own(self)
+
+    threading.Thread.start = start  # type: ignore[method-assign]
     threading.Event.wait = event_wait  # type: ignore[method-assign]
     threading.Condition.wait = condition_wait  # type: ignore[method-assign]
     threading.Thread.join = join  # type: ignore[method-assign]

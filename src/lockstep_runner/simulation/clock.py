@@ -11,7 +11,8 @@ import math
 import threading
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
-from typing import Protocol
+from pathlib import Path
+from weakref import WeakKeyDictionary
 
 import genpy
 import rospy
@@ -19,7 +20,9 @@ import rospy.impl.simtime
 
 from lockstep_runner import originals
 from lockstep_runner.simulation.callbacks import Callbacks
+from lockstep_runner.looks import Seen
 from lockstep_runner.notices import Notices
+from lockstep_runner.simulation.others import NobodyElse, Others
 from lockstep_runner.simulation.world import World
 
 NANOSECONDS = 1_000_000_000
@@ -27,6 +30,7 @@ LOOK = 0.002  # [s of wall time] between two looks whether a thread that compute
 PATIENCE = (
     10.0  # [s of wall time] with a thread that computes, or waits for something that isn't time
 )
+OWN_QUIET = 30  # looks in a row at a thread of the script's that does nothing; 1 s
 PAUSED_LOOK = 0.005  # [s of wall time] between two looks at a paused world
 Condition = Callable[[], bool]
 
@@ -49,38 +53,6 @@ class _Sleeper:
         return self.wake <= passed or (self.until is not None and self.until())
 
 
-class Others(Protocol):
-    """Other processes under the same clock."""
-
-    def settle(self) -> None:
-        """Waits until all of them rest."""
-
-    def next_wake(self) -> float:
-        """When the first of them is to go on [ns of time passed]."""
-
-    def wake_due(self, passed: int) -> None:
-        """Lets those go on whose time has come, one after the other, until they rest again."""
-
-    def wake(self, node: str) -> None:
-        """Lets a node go on that has a message, until it rests again."""
-
-
-class NobodyElse:
-    """There are none."""
-
-    def settle(self) -> None:
-        pass
-
-    def next_wake(self) -> float:
-        return math.inf
-
-    def wake_due(self, passed: int) -> None:
-        pass
-
-    def wake(self, node: str) -> None:
-        pass
-
-
 class Clock:
     """Lets threads wait in simulated time."""
 
@@ -94,6 +66,8 @@ class Clock:
         self._guard = originals.Condition()
         self._sleepers: list[_Sleeper] = []
         self._running: dict[int, threading.Thread] = {}
+        # Threads that the script has started by itself, and what was seen of them
+        self._own: WeakKeyDictionary[threading.Thread, Seen] = WeakKeyDictionary()
         self._order = 0
         self.callbacks = Callbacks(self.began, self.ended)
 
@@ -141,6 +115,16 @@ class Clock:
             ident = thread.ident
             if ident is not None and all(each.thread != ident for each in self._sleepers):
                 self._running[ident] = thread
+
+    def began_own(self, thread: threading.Thread) -> None:
+        """The script has started a thread: as `began`, but it may wait for something that isn't time."""
+        place = Path("/proc/self/task", str(thread.native_id))
+        self._own[thread] = Seen(place, OWN_QUIET)
+        self.began(thread)
+
+    def is_own(self, thread: threading.Thread) -> bool:
+        """Whether the script has started a thread by itself."""
+        return thread in self._own
 
     def ended(self, thread: threading.Thread) -> None:
         """A thread has done what there was to do."""
@@ -254,6 +238,13 @@ class Clock:
                 for ident, thread in list(self._running.items()):
                     if not thread.is_alive():
                         del self._running[ident]
+                    elif ident != me and thread in self._own and self._own[thread].is_quiet():
+                        del self._running[ident]
+                        self._notices.once(
+                            f"waits {thread.name}",
+                            f"thread '{thread.name}' waits for something that isn't simulated time: what it"
+                            " does from here on isn't repeatable",
+                        )
                     elif ident != me and originals.monotonic() > deadline:
                         del self._running[ident]
                         self._notices.once(
