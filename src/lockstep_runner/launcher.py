@@ -10,8 +10,8 @@ import threading
 import types
 from collections.abc import Callable, Sequence
 
-from lockstep_runner.script import running
 from lockstep_runner.notices import tell
+from lockstep_runner.script import running
 from lockstep_runner.script.seeds import seed_everything
 from lockstep_runner.simulation.world import NotInLockstep, is_running
 

@@ -12,11 +12,12 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Concatenate, NoReturn, ParamSpec, TypeVar
 
 from lockstep_runner import originals
-from lockstep_runner.simulation.clock import NANOSECONDS, Clock, Condition
 from lockstep_runner.notices import Notices, tell
+from lockstep_runner.simulation.clock import NANOSECONDS, Clock
+from lockstep_runner.simulation.sleeper import Condition
 from lockstep_runner.simulation.topics import Topics
-from lockstep_runner.triggers import Triggers
 from lockstep_runner.simulation.world import NODE, NotInLockstep, World, WorldFailed, WorldGone
+from lockstep_runner.triggers import Triggers
 
 USAGE, FAILED = 2, 1  # exit codes
 SILENCE = 30.0  # [s of wall time] without simulated time, after which the user is told

@@ -7,10 +7,8 @@ import threading
 from typing import Any
 
 from lockstep_runner import originals
-from lockstep_runner.script.callers import is_the_script
 from lockstep_runner.runner import Runner
-
-CALLERS = 2  # how far up the script may be: actionlib's waits are its own
+from lockstep_runner.script.callers import is_the_script
 
 
 def install(runner: Runner) -> None:

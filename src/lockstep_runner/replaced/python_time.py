@@ -8,8 +8,8 @@ import time
 import rospy
 
 from lockstep_runner import originals
-from lockstep_runner.script.callers import caller, is_the_script
 from lockstep_runner.runner import Runner
+from lockstep_runner.script.callers import caller, is_the_script
 
 
 def install(runner: Runner, virtual_wall_clock: bool) -> None:
@@ -17,9 +17,12 @@ def install(runner: Runner, virtual_wall_clock: bool) -> None:
 
     def sleep(seconds: float) -> None:
         """As time.sleep: the world moves on by as much."""
-        if rospy.core.is_shutdown() or not is_the_script(1):
-            originals.sleep(seconds)
-        elif caller(1) == "actionlib" and runner.waits_for_others(seconds):
+        if (
+            rospy.core.is_shutdown()
+            or not is_the_script(1)
+            or caller(1) == "actionlib"
+            and runner.waits_for_others(seconds)
+        ):
             originals.sleep(seconds)
         elif _is_wall_time(runner):
             runner.notices.once(

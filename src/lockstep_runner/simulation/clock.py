@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, field
+from collections.abc import Collection
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
@@ -19,10 +18,11 @@ import rospy
 import rospy.impl.simtime
 
 from lockstep_runner import originals
-from lockstep_runner.simulation.callbacks import Callbacks
 from lockstep_runner.looks import Seen
 from lockstep_runner.notices import Notices
+from lockstep_runner.simulation.callbacks import Callbacks
 from lockstep_runner.simulation.others import NobodyElse, Others
+from lockstep_runner.simulation.sleeper import Condition, Sleeper
 from lockstep_runner.simulation.world import World
 
 NANOSECONDS = 1_000_000_000
@@ -31,26 +31,10 @@ PATIENCE = (
     10.0  # [s of wall time] with a thread that computes, or waits for something that isn't time
 )
 OWN_QUIET = 30  # looks in a row at a thread of the script's that does nothing; 1 s
-PAUSED_LOOK = 0.005  # [s of wall time] between two looks at a paused world
-Condition = Callable[[], bool]
-
-
-@dataclass
-class _Sleeper:
-    """A thread other than the main one that waits for simulated time."""
-
-    thread: int
-    wake: float  # [ns] of time passed
-    until: Condition | None
-    order: int
-    came: bool = False
-    resting: threading.Lock = field(default_factory=threading.Lock)
-
-    def __post_init__(self) -> None:
-        self.resting.acquire()
-
-    def is_due(self, passed: int) -> bool:
-        return self.wake <= passed or (self.until is not None and self.until())
+PAUSED_LOOKS = (
+    0.001,
+    0.05,
+)  # [s of wall time] between two looks at a paused world, at first and at most
 
 
 class Clock:
@@ -64,7 +48,7 @@ class Clock:
         self.others: Others = NobodyElse()
         self._notices = notices
         self._guard = originals.Condition()
-        self._sleepers: list[_Sleeper] = []
+        self._sleepers: list[Sleeper] = []
         self._running: dict[int, threading.Thread] = {}
         # Threads that the script has started by itself, and what was seen of them
         self._own: WeakKeyDictionary[threading.Thread, Seen] = WeakKeyDictionary()
@@ -144,7 +128,7 @@ class Clock:
         with self._guard:
             self._order += 1
             ident = threading.get_ident()
-            sleeper = _Sleeper(ident, self.passed + span, until, self._order)
+            sleeper = Sleeper(ident, self.passed + span, until, self._order)
             self._sleepers.append(sleeper)
             self._running.pop(ident, None)
             self._guard.notify_all()
@@ -200,9 +184,11 @@ class Clock:
         """A sleep in a paused world ends at once; what others may do is waited for, in wall time."""
         if until is None and end < math.inf:
             return False
+        look, longest = PAUSED_LOOKS
         limit = originals.monotonic() + (end - self.passed) / NANOSECONDS
         while originals.monotonic() < limit and not rospy.core.is_shutdown():
-            originals.sleep(PAUSED_LOOK)
+            originals.sleep(look)
+            look = min(look * 1.5, longest)
             self.exchange()
             if until is not None and until():
                 return True

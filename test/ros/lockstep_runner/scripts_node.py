@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Scripts under lockstep.py, in a world in lock-step that runs already (docs/lockstep.md)."""
 
+import importlib.util
 import itertools
 import os
 import signal
@@ -64,9 +65,9 @@ class LockstepTest(unittest.TestCase):
         self.assertNotIn("Traceback", run.stderr)
         return run.stdout
 
-    def twice(self, name):
-        one = lockstep("--seed", 3, SCRIPTS / name)
-        two = lockstep("--seed", 3, SCRIPTS / name)
+    def twice(self, name, *arguments):
+        one = lockstep("--seed", 3, SCRIPTS / name, *arguments)
+        two = lockstep("--seed", 3, SCRIPTS / name, *arguments)
         self.check(one)
         self.check(two)
         self.assertEqual(one.stdout, two.stdout)
@@ -106,6 +107,78 @@ class LockstepTest(unittest.TestCase):
     def test_a_thread_that_sleeps_is_told_of_once(self):
         run = self.twice("sleeping_thread.py")
         self.assertEqual(run.stderr.count("thread 'heart' sleeps by time.sleep"), 1, run.stderr)
+
+    @unittest.skipUnless(
+        importlib.util.find_spec("stable_baselines3"), "./ws extras isn't installed"
+    )
+    def test_an_environment_that_sleeps_trains_with_stable_baselines3(self):
+        one = self.twice("gym_sleep.py", 256).stdout.splitlines()[-1]
+        other = lockstep("--seed", 4, SCRIPTS / "gym_sleep.py", 256)
+        self.assertNotEqual(self.check(other).splitlines()[-1].split()[0], one.split()[0])
+
+    def test_a_thread_with_a_rate_is_under_the_clock(self):
+        script = HEAD + (
+            "seen = []\n"
+            "def work():\n"
+            "    rate = rospy.Rate(100)\n"
+            "    for _ in range(10):\n"
+            "        seen.append(rospy.get_time())\n"
+            "        rate.sleep()\n"
+            "thread = threading.Thread(target=work)\nthread.start()\n"
+            "for _ in range(4):\n    time.sleep(0.025)\n    seen.append(rospy.get_time())\n"
+            "thread.join()\nprint(*seen)\n"
+        )
+        seen = [float(each) for each in self.check(lockstep(written(script))).split()]
+        self.assertEqual(len(seen), 14)
+        self.assertEqual(seen, sorted(seen))
+        expected = [n / 100 for n in range(10)] + [n * 0.025 for n in range(1, 5)]
+        for one, two in zip(seen, sorted(expected), strict=True):
+            self.assertAlmostEqual(one, two, 6)
+
+    def test_the_wall_clock_may_be_simulated(self):
+        script = written(
+            HEAD + "from time import monotonic, perf_counter, sleep, time\n"
+            "before = time(), monotonic(), perf_counter()\nsleep(25.0)\n"
+            "after = time(), monotonic(), perf_counter()\n"
+            "print(*(round(two - one, 6) for one, two in zip(before, after)))\n"
+        )
+        out = self.check(lockstep("--virtual-wall-clock", script))
+        self.assertEqual(out.split(), ["25.0"] * 3)
+        self.assertNotIn("25.0", self.check(lockstep(script)))
+
+    def test_scripts_that_were_cut_off_leave_the_world_to_the_next(self):
+        endless = written(
+            HEAD
+            + "while not rospy.is_shutdown():\n    time.sleep(0.5)\n    print('on', flush=True)\n"
+        )
+        for cut_off in ("closed", "killed"):
+            process = subprocess.Popen(
+                ["rosrun", "cartpole", "lockstep.py", str(endless)],
+                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+            )  # fmt: skip
+            self.assertEqual(process.stdout.readline(), "on\n")
+            if cut_off == "killed":
+                process.kill()
+            process.stdout.close()
+            self.assertNotEqual(process.wait(BOUND), 0)
+            self.check(lockstep(SCRIPTS / "rate_loop.py"))
+
+    def test_two_scripts_at_once_share_the_time(self):
+        text = HEAD.replace("reset_simulation", "unpause_physics") + (
+            "for _ in range(50):\n    before = rospy.get_time()\n    time.sleep(0.02)\n"
+            "    assert rospy.get_time() - before > 0.0199\nprint('done')\n"
+        )
+        scripts = [written(text.replace('"script"', f'"script_{n}"')) for n in range(2)]
+        processes = [
+            subprocess.Popen(
+                ["rosrun", "cartpole", "lockstep.py", str(each)],
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            )
+            for each in scripts
+        ]  # fmt: skip
+        for process in processes:
+            out, err = process.communicate(timeout=BOUND)
+            self.assertEqual((process.returncode, out), (0, "done\n"), err)
 
     def test_a_command_is_a_control_period_where_nobody_waits(self):
         out = self.check(lockstep(written(HEAD + COMMANDS)))

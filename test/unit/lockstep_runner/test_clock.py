@@ -110,9 +110,7 @@ def rest_in_threads(clock, spans):
 @given(st.lists(st.lists(st.integers(1, 40), min_size=1, max_size=5), min_size=1, max_size=4))
 def test_sleepers_wake_when_they_asked_for_in_one_order(spans):
     one = rest_in_threads(Clock(Counter(), Notices()), spans)
-    expected = sorted(
-        sum(mine[: count + 1]) for mine in spans for count in range(len(mine))
-    )
+    expected = sorted(sum(mine[: count + 1]) for mine in spans for count in range(len(mine)))
     assert [at for at, _ in one] == expected
     for number, mine in enumerate(spans):
         assert [at for at, who in one if who == number] == [

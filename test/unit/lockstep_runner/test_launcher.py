@@ -13,7 +13,12 @@ from lockstep_runner.script.seeds import AfterImport, seed_everything
     [
         (["a.py", "--seed", "5"], None, "a.py", ["--seed", "5"]),
         (["--step-on", "/t", "a.py", "x"], ["/t"], "a.py", ["x"]),
-        (["--step-on", "/t", "/s", "a.py", "--step-on", "x"], ["/t", "/s"], "a.py", ["--step-on", "x"]),
+        (
+            ["--step-on", "/t", "/s", "a.py", "--step-on", "x"],
+            ["/t", "/s"],
+            "a.py",
+            ["--step-on", "x"],
+        ),
         (["--step-on", "none", "--seed", "3", "a.py"], ["none"], "a.py", []),
         (["--step-on", "/t", "--step-on", "/s", "--dt", "0.002", "a.py"], ["/t", "/s"], "a.py", []),
         (["--step-on=/t", "a.py", "__name:=x"], ["/t"], "a.py", ["__name:=x"]),

@@ -33,7 +33,8 @@ class Script:
 
 def test_one_topic_lets_a_period_pass_with_each_message_from_the_second_on():
     script = Script()
-    assert [script.publish("/a") for _ in range(4)] == [0, 2, 3, 4]  # the first one's is made up for
+    # The first one's is made up for
+    assert [script.publish("/a") for _ in range(4)] == [0, 2, 3, 4]
 
 
 def test_several_joints_are_one_round():
