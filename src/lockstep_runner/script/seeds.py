@@ -6,24 +6,19 @@ import importlib.abc
 import importlib.machinery
 import importlib.util
 import random
-import secrets
 import sys
 import types
 from collections.abc import Callable, Sequence
+
+import numpy
 
 
 def seed_everything(seed: int) -> None:
     """Seeds random and NumPy now, and torch when the script imports it."""
     random.seed(seed)
-    draw = random.Random(seed)
-    original = secrets.randbits
-    # NumPy takes this function for generators that nobody seeds, once, when it is first imported.
-    secrets.randbits = draw.getrandbits  # type: ignore[assignment]
-    try:
-        import numpy
-    finally:
-        secrets.randbits = original
     numpy.random.seed(seed)
+    # What generators begin with that nobody seeds, as Gymnasium's of an environment
+    numpy.random.bit_generator.randbits = random.Random(seed).getrandbits
     if "torch" in sys.modules:
         sys.modules["torch"].manual_seed(seed)
     else:

@@ -50,13 +50,22 @@ def test_no_such_script_is_one_line(tmp_path, capsys, monkeypatch):
 
 def test_seeds_reach_every_generator(monkeypatch):
     import random
+    import secrets
 
+    import gymnasium
     import numpy
     import torch
 
     def drawn():
-        return random.random(), numpy.random.random(), torch.rand(1).item()
+        return (
+            random.random(),
+            numpy.random.random(),
+            numpy.random.default_rng().random(),
+            gymnasium.utils.seeding.np_random()[0].random(),
+            torch.rand(1).item(),
+        )
 
+    monkeypatch.setattr(numpy.random.bit_generator, "randbits", secrets.randbits)
     states = random.getstate(), numpy.random.get_state(), torch.get_rng_state()
     try:
         seed_everything(5)
