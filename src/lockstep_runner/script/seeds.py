@@ -18,7 +18,7 @@ def seed_everything(seed: int) -> None:
     random.seed(seed)
     numpy.random.seed(seed)
     # What generators begin with that nobody seeds, as Gymnasium's of an environment
-    numpy.random.bit_generator.randbits = random.Random(seed).getrandbits
+    vars(numpy.random.bit_generator)["randbits"] = random.Random(seed).getrandbits
     if "torch" in sys.modules:
         sys.modules["torch"].manual_seed(seed)
     else:
