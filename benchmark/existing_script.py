@@ -22,6 +22,7 @@ import tempfile
 import threading
 import time
 import uuid
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,8 @@ class Watcher:
     def __init__(self) -> None:
         self.lengths: list[int] = []  # of finished episodes
         self.returns: list[float] = []
+        self.stepping: list[float] = []  # [s of wall time] from its first step to its last one
+        self.first_step = time.monotonic()
         self.last_step = time.monotonic()
         self._steps, self._total = 0, 0.0
 
@@ -54,9 +57,12 @@ class Watcher:
         if episode > len(self.lengths):
             self.lengths.append(self._steps)
             self.returns.append(self._total)
+            self.stepping.append(self.last_step - self.first_step)
             self._total = 0.0
         self._steps, self._total = step + 1, self._total + reward
         self.last_step = time.monotonic()
+        if step == 0:
+            self.first_step = self.last_step
 
 
 def follow(process: subprocess.Popen[str], watcher: Watcher, log: Path) -> threading.Thread:
@@ -114,14 +120,14 @@ def press_ctrl_c(process: subprocess.Popen[str], mark: str) -> tuple[int, float,
     return code, seconds, list(marked(mark).values())
 
 
-def run(script: Path, episodes: int, folder: Path) -> dict[str, Any]:
-    """Runs the script in that folder; returns the benchmark's result."""
+def run(command: Sequence[str | Path], episodes: int, folder: Path) -> dict[str, Any]:
+    """Runs a script in that folder, for so many episodes; returns the benchmark's result."""
     mark = uuid.uuid4().hex
     with socket.create_server(("127.0.0.1", 0)) as probe:
         master = f"http://127.0.0.1:{probe.getsockname()[1]}"
     started = time.monotonic()
     process = subprocess.Popen(
-        [sys.executable, str(script)],
+        [str(part) for part in command],
         cwd=folder,
         env=os.environ | {"PYTHONUNBUFFERED": "1", "ROS_MASTER_URI": master, MARK: mark},
         stdin=subprocess.DEVNULL,
@@ -151,9 +157,16 @@ def run(script: Path, episodes: int, folder: Path) -> dict[str, Any]:
         "exit_code_after_ctrl_c": code,
         "seconds_to_end_after_ctrl_c": round(ending, 1),
         "processes_left": left,
+        "steps_per_second": speed(lengths, watcher.stepping),
         "lengths": lengths,
         "returns": returns,
     }
+
+
+def speed(lengths: Sequence[int], stepping: Sequence[float]) -> float:
+    """Steps per second within episodes: without what lies between them, the learning."""
+    pairs = list(zip(lengths, stepping, strict=False))
+    return round(sum(steps - 1 for steps, _ in pairs) / max(sum(each for _, each in pairs), 1e-9))
 
 
 def means(lengths: list[int]) -> dict[str, float]:
@@ -171,6 +184,7 @@ def report(result: dict[str, Any]) -> str:
             "| episodes | mean steps |",
             "|---|---|",
             *rows,
+            f"steps per second within episodes: {result['steps_per_second']}",
             f"episodes of a single step: {result['one_step_episodes']}",
             f"after Ctrl-C: exit code {result['exit_code_after_ctrl_c']} in "
             f"{result['seconds_to_end_after_ctrl_c']} s, processes left: "
@@ -190,7 +204,7 @@ def main() -> int:
         parser.error(f"no such file: {chosen.script}")
     chosen.out.mkdir(parents=True, exist_ok=True)
     folder = Path(tempfile.mkdtemp(prefix="existing_script_"))
-    result = run(chosen.script.resolve(), chosen.episodes, folder)
+    result = run([sys.executable, chosen.script.resolve()], chosen.episodes, folder)
     (chosen.out / "existing_script.json").write_text(json.dumps(result, indent=1) + "\n")
     title = "the existing script, unchanged, in real time"
     figure = learning_curve(result["lengths"], result["returns"], title)

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Mapping
+from typing import Protocol
 
 from bullet_gazebo.applied_forces import AppliedForces
 from bullet_gazebo.fair_lock import FairLock
@@ -16,6 +17,16 @@ from bullet_gazebo.robot import ControlledRobot
 
 NANOSECONDS = 1_000_000_000
 IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()
+
+
+class Postman(Protocol):
+    """Tells clients something that a tick has brought up, outside of it."""
+
+    def has_post(self) -> bool:
+        """Whether there is something to tell; the caller holds the lock."""
+
+    def deliver(self) -> None:
+        """Tells it; the caller doesn't hold the lock."""
 
 
 class NotInLockstep(RuntimeError):
@@ -48,6 +59,9 @@ class Simulator:
         self.applied = AppliedForces()
         # Called with `now` before each physics step.
         self.listeners: list[Callable[[int], None]] = []
+        # What tells clients something after the ticks, and whether somebody who steps calls them.
+        self.postmen: list[Postman] = []
+        self.post_goes_with_steps = False
         self._period = round(world.time_step * NANOSECONDS)
         self._paused = False
         self._flowing = threading.Event()  # set while time runs by itself
@@ -113,8 +127,15 @@ class Simulator:
         """Makes run() return after the tick in progress."""
         self._stopping.set()
 
-    def advance(self, ticks: int) -> None:
+    def advance(self, ticks: int, until: Callable[[], bool] | None = None) -> int:
         """Moves time by `ticks` physics steps; the caller holds the lock.
+
+        Args:
+            ticks: at least 1.
+            until: asked after each tick; ends it early.
+
+        Returns:
+            How many ticks have passed.
 
         Raises:
             NotInLockstep: if time runs by itself.
@@ -126,10 +147,14 @@ class Simulator:
             )
         if ticks < 1:
             raise ValueError(f"ticks is {ticks}: at least 1 is needed")
-        for _ in range(ticks):
+        passed = 0
+        for passed in range(1, ticks + 1):  # noqa: B007 - used behind the loop
             self._tick()
+            if until is not None and until():
+                break
         for robot in self.robots:
             robot.read()
+        return passed
 
     def step(self, ticks: int) -> None:
         """Pauses the world and moves it by `ticks` physics steps, as fast as they can be computed.

@@ -80,7 +80,11 @@ class ControllerPorts:
             rospy.names.ns_join(namespace, output.topic), kind, queue_size=queue, tcp_nodelay=True
         )
         self._closing.callback(publisher.unregister)
-        topic = ThinnedTopic(self._thinner, lambda sample: _deliver(publisher, convert(sample)))
+        topic = ThinnedTopic(
+            self._thinner,
+            publisher.resolved_name,
+            lambda sample: _deliver(publisher, convert(sample)),
+        )
         self._closing.callback(topic.close)
 
         def send(sample: object) -> None:

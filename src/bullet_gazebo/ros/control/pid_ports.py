@@ -48,7 +48,9 @@ class PidPorts:
         self._publisher: rospy.Publisher | None = None
         if pid.publish_state:
             self._publisher = rospy.Publisher(f"{namespace}/state", PidState, queue_size=1)
-            self._topic = ThinnedTopic(thinner, self._publisher.publish)
+            self._topic = ThinnedTopic(
+                thinner, self._publisher.resolved_name, self._publisher.publish
+            )
             pid.sink = self._publish
 
     def shutdown(self) -> None:

@@ -1,6 +1,5 @@
 """actionlib's server for simulated time, which stands still, runs fast and goes back."""
 
-import time
 from collections.abc import Callable
 
 import rospy
@@ -12,7 +11,7 @@ from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from bullet_gazebo.ros.wire.rospy_patches import wait_until_sent
 
 QUEUE = 50
-KEPT = 5.0  # [s of wall time]; how long the status of a goal is told after its end, as by actionlib
+KEPT = 5.0  # [s]; how long the status of a goal is told after its end, as by actionlib
 MOST_KEPT = 100  # goals that have ended
 NEVER = rospy.Duration(10**9)
 ENDED = (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.REJECTED,
@@ -36,7 +35,10 @@ class SteadyActionServer(ActionServer):
         action: type,
         on_goal: Callable[[ServerGoalHandle], None],
         on_cancel: Callable[[ServerGoalHandle], None],
+        clock: Callable[[], float],
     ) -> None:
+        """With the `clock` [s] that statuses are kept by."""
+        self._clock = clock
         super().__init__(name, action, on_goal, on_cancel, auto_start=False)
         self._ended: dict[str, float] = {}  # when goals were seen to have ended, by id
 
@@ -81,10 +83,10 @@ class SteadyActionServer(ActionServer):
             super().publish_status()
 
     def _forget_ended(self) -> None:
-        now = time.monotonic()
+        now = self._clock()
         ended = [_id(tracker) for tracker in self.status_list if _has_ended(tracker)]
         kept = {goal: self._ended.get(goal, now) for goal in ended[-MOST_KEPT:]}
-        self._ended = {goal: since for goal, since in kept.items() if now - since <= KEPT}
+        self._ended = {goal: since for goal, since in kept.items() if 0.0 <= now - since <= KEPT}
         self.status_list = [
             tracker
             for tracker in self.status_list

@@ -19,12 +19,14 @@ from bullet_gazebo.ros.control.steady_action_server import SteadyActionServer
 from bullet_gazebo.ros.control.trajectory_conversions import to_feedback, to_request
 from bullet_gazebo.simulator import Simulator
 
-STATUS_PERIOD = 0.2  # [s of wall time]
+STATUS_PERIOD = (
+    0.2  # [s of wall time; of simulated time where somebody asks for it by advance_world]
+)
 STOP_TIMEOUT = 5.0  # [s]
 
 
 class TrajectoryAction:
-    """Serves the action from load to unload, in a thread of its own.
+    """Serves the action from load to unload, in a thread of its own, or as a postman of the simulator.
 
     Locks are taken in this order: the action server's, the simulator's, ours. The control tick holds the
     simulator's and takes only ours, so it waits for nobody.
@@ -39,16 +41,19 @@ class TrajectoryAction:
         self._feedback: tuple[ServerGoalHandle, TrajectorySample] | None = None  # the newest one
         self._outcomes: list[tuple[ServerGoalHandle, Outcome]] = []
         self._closing = False
+        self._status_due = 0.0  # [s]
         self._name = rospy.names.ns_join(namespace, "follow_joint_trajectory")
         self._server = SteadyActionServer(
-            self._name, FollowJointTrajectoryAction, self._pursue, self._cancel
+            self._name, FollowJointTrajectoryAction, self._pursue, self._cancel, self._clock
         )
         self._server.start()
+        sim.postmen.append(self)
         self._thread = threading.Thread(target=self._deliver, name=self._name, daemon=True)
         self._thread.start()
 
     def shutdown(self) -> None:
         """Tells what is left to tell, and takes the action away. The controller has been stopped before."""
+        self._sim.postmen.remove(self)
         with self._news:
             self._closing = True
             self._news.notify()
@@ -88,26 +93,44 @@ class TrajectoryAction:
         with self._sim.lock:
             self._controller.cancel(handle.get_goal_id().id)
 
+    def has_post(self) -> bool:
+        """Whether there is something to tell; asked for within a tick."""
+        return bool(self._feedback or self._outcomes) or self._status_is_due()
+
+    def deliver(self) -> None:
+        """Publishes results and the newest feedback and, now and then, the status."""
+        with self._news:
+            feedback, self._feedback = self._feedback, None
+            outcomes, self._outcomes = self._outcomes, []
+        if feedback is not None:
+            feedback[0].publish_feedback(to_feedback(feedback[1]))
+        for handle, outcome in outcomes:
+            _settle(handle, outcome)
+        if self._status_is_due():
+            self._status_due = self._clock() + STATUS_PERIOD
+            self._server.publish_status()
+
+    def _status_is_due(self) -> bool:
+        now = self._clock()
+        return not now < self._status_due <= now + STATUS_PERIOD  # time may have gone back
+
     def _deliver(self) -> None:
-        """Publishes results, feedback and, of itself, the status, until the action is closed."""
-        status_due = time.monotonic() + STATUS_PERIOD
+        """Delivers as soon as there is something, until the action is closed."""
         closing = False
         while not (closing or rospy.is_shutdown()):
             with self._news:
-                self._news.wait_for(self._has_news, max(0.0, status_due - time.monotonic()))
-                feedback, self._feedback = self._feedback, None
-                outcomes, self._outcomes = self._outcomes, []
+                self._news.wait_for(self._has_news, STATUS_PERIOD)
                 closing = self._closing
-            if feedback is not None:
-                feedback[0].publish_feedback(to_feedback(feedback[1]))
-            for handle, outcome in outcomes:
-                _settle(handle, outcome)
-            if time.monotonic() >= status_due:
-                status_due = time.monotonic() + STATUS_PERIOD
-                self._server.publish_status()
+            if closing or not self._sim.post_goes_with_steps:
+                self.deliver()
+
+    def _clock(self) -> float:
+        """Returns the time [s] for the status."""
+        return self._sim.sim_time if self._sim.post_goes_with_steps else time.monotonic()
 
     def _has_news(self) -> bool:
-        return bool(self._closing or self._feedback or self._outcomes)
+        post = self._feedback or self._outcomes
+        return self._closing or bool(post and not self._sim.post_goes_with_steps)
 
 
 class GoalPort:

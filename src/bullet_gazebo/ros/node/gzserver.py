@@ -1,7 +1,10 @@
 """The node `gazebo`: what `rosrun gazebo_ros gzserver` runs."""
 
 import argparse
+import os
+import shlex
 import sys
+import threading
 from collections.abc import Callable
 from functools import partial
 
@@ -29,7 +32,8 @@ from bullet_gazebo.ros.node.world_control import WorldControl
 from bullet_gazebo.ros.node.world_loader import fill_world, load_plugins, read_world
 from bullet_gazebo.ros.plugins import PluginRegistry
 from bullet_gazebo.ros.services.spawn_services import SpawnServices
-from bullet_gazebo.ros.services.step_service import StepService
+from bullet_gazebo.ros.services.stepping.advance_service import AdvanceService
+from bullet_gazebo.ros.services.stepping.step_service import StepService
 from bullet_gazebo.ros.services.world_services import advertise_world_services
 from bullet_gazebo.ros.wire.rospy_patches import (
     Reception,
@@ -45,6 +49,7 @@ from bullet_gazebo.simulator import Simulator
 NAME = "gazebo"
 MOST_FREQUENT = 1e9  # [Hz]; time is counted in nanoseconds
 EXIT_TIMEOUT = 10.0  # [s] for what plugins may have left to be done at the end
+MORE_ARGUMENTS = "GZSERVER_ARGS"  # variable: for a server that somebody else's program starts
 
 
 class GazeboNode:
@@ -82,7 +87,13 @@ class GazeboNode:
         if not network:
             return
         # Clients take the world for ready once it can be paused, so the step service comes first.
-        stepping = [StepService(self.sim, self._watchdog)] if self.sim.lockstep else []
+        stepping: list[object] = []
+        if self.sim.lockstep:
+            one_at_a_time = threading.Lock()
+            stepping = [
+                StepService(self.sim, self._watchdog, one_at_a_time),
+                AdvanceService(self.sim, self._watchdog, thinner, one_at_a_time),
+            ]
         self._services = [
             *stepping,
             SpawnServices(self.sim, plugins),
@@ -125,7 +136,8 @@ def main(argv: list[str] | None = None) -> int:
     """Runs the node; returns its exit code."""
     use_one_arena()
     command_line = sys.argv if argv is None else argv
-    args = parse_args(rospy.myargv(command_line)[1:])
+    more = shlex.split(os.environ.get(MORE_ARGUMENTS, ""))
+    args = parse_args([*more, *rospy.myargv(command_line)[1:]])
     name = full_name(command_line, NAME)
     try:
         wait_for_master(NAME)

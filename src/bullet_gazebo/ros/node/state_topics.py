@@ -47,7 +47,7 @@ class StateTopic(ThinnedTopic):
             name, kind, subscriber_listener=self._subscribers, queue_size=QUEUE, tcp_nodelay=True
         )
         # A sample only says that there is news: states are many, and made up when they are sent.
-        super().__init__(thinner, lambda now: publisher.publish(make()))
+        super().__init__(thinner, publisher.resolved_name, lambda now: publisher.publish(make()))
 
     def __call__(self, now: int) -> None:
         if self._subscribers.size:
@@ -63,7 +63,7 @@ class ClockTopic(ThinnedTopic):
 
     def __init__(self, sim: Simulator, thinner: Thinner, frequency: float) -> None:
         """`frequency` [Hz of simulated time, up to 1e9] is ~pub_clock_frequency; 0 means every tick."""
-        super().__init__(thinner, self._publish_time)
+        super().__init__(thinner, "/clock", self._publish_time)
         self._publisher = rospy.Publisher("/clock", Clock, queue_size=QUEUE, tcp_nodelay=True)
         self._period = round(1e9 / frequency) if frequency > 0 else 0
         self._last = -self._period

@@ -11,6 +11,9 @@ needed with rospy 1.15.15 (Debian 12), and are held by the test that is named.
 - `answer_xmlrpc`: a node can't answer one XML-RPC call more (gazebo_ros.test, `gz`)
 - `stop_hearing_clock`: who makes /clock hears it over a socket to itself (gazebo_parameters.test)
 - `wait_until_sent`: what was published just before a topic is closed is thrown away (test_rospy_patches.py)
+- `divert_messages`, `deliver`, `is_connected`: messages of a node in lock-step go with its calls
+  (advance.test)
+- `on_topics_changed`: and it has to know when there are others (advance.test)
 - `set_time`: and so has to tell rospy the time by itself (gazebo_ros.test, a plugin)
 
 Classes that merely override a method stand where they are used: `SteadyActionServer` (actionlib),
@@ -27,10 +30,12 @@ import struct
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import genpy
 import rospy
+import rospy.impl.registration
 import rospy.impl.simtime
 import rospy.impl.tcpros_base
 from rosgraph.network import ROSHandshakeException, decode_ros_handshake_header
@@ -40,6 +45,7 @@ from rospy.impl.masterslave import ROSHandler
 from rospy.impl.tcpros_base import TCPROSTransport, TCPROSTransportProtocol
 from rospy.impl.tcpros_pubsub import QueuedConnection
 from rospy.impl.tcpros_service import ServiceImpl
+from rospy.topics import _PublisherImpl, _SubscriberImpl, _TopicImpl
 
 Address = tuple[str, int]
 LENGTH = struct.Struct("<I")  # in front of all that ROS sends
@@ -279,3 +285,79 @@ def _has_sent(connection: Any) -> bool:
     with connection._lock:
         waits = bool(connection._cond_data_available._waiters)  # else it is still writing
         return bool(connection.done) or (waits and not connection._queue)
+
+
+Sink = Callable[[str, bytes], None]
+"""Takes a topic and a message as it goes over the wire, its length in front."""
+
+
+def divert_messages(sink_of: Callable[[str], Sink | None]) -> None:
+    """Gives what is published for some nodes to a sink instead of to their connections, once for a process.
+
+    Args:
+        sink_of: the sink of a node by name, or None where its messages are sent as ever; asked for each
+            new connection. For those that exist already there is `divert_connections`.
+    """
+    add_connection = _TopicImpl.add_connection
+
+    def diverting(topic: _TopicImpl, connection: Any) -> bool:
+        if isinstance(topic, _PublisherImpl):
+            sink = sink_of(connection.endpoint_id)
+            if sink is not None:
+                connection.write_data = partial(sink, topic.resolved_name)
+        return bool(add_connection(topic, connection))
+
+    _TopicImpl.add_connection = diverting
+
+
+def divert_connections(node: str, sink: Sink) -> None:
+    """As `divert_messages`, for the connections that a node has already."""
+    for topic in list(_topics().pubs.values()):
+        for connection in list(topic.connections):
+            if connection.endpoint_id == node:
+                connection.write_data = partial(sink, topic.resolved_name)
+
+
+def deliver(topic: str, data: bytes, node: str) -> None:
+    """Hands a message of a node to this process's subscribers, in this thread; without any, to nobody.
+
+    Raises:
+        genpy.DeserializationError: if it can't be read.
+    """
+    subscription: _SubscriberImpl | None = _topics().get_subscriber_impl(topic)
+    if subscription is None:
+        return
+    connections = [each for each in subscription.connections if each.callerid_pub == node]
+    if connections:  # without a connection a message would have got lost, too
+        message = subscription.data_class().deserialize(data[4:])
+        message._connection_header = connections[-1].header
+        subscription.receive_callback([message], connections[-1])
+
+
+def is_connected(topic: str, node: str, publishes: bool) -> bool | None:
+    """Whether a node is connected to a topic; None if this process has no such topic.
+
+    Args:
+        publishes: this process does, and the node subscribes; else the other way round.
+    """
+    if publishes:
+        publication = _topics().get_publisher_impl(topic)
+        return publication and any(each.endpoint_id == node for each in publication.connections)
+    subscription = _topics().get_subscriber_impl(topic)
+    return subscription and any(each.callerid_pub == node for each in subscription.connections)
+
+
+def on_topics_changed(call: Callable[[], None]) -> None:
+    """Has a function called when this process publishes or subscribes to a topic more, or less."""
+
+    class Listener(rospy.impl.registration.RegistrationListener):
+        def reg_added(self, _name: str, _kind: str, _way: str) -> None:
+            call()
+
+        reg_removed = reg_added
+
+    rospy.impl.registration.get_registration_listeners().add_listener(Listener())
+
+
+def _topics() -> Any:
+    return rospy.impl.registration.get_topic_manager()

@@ -21,8 +21,10 @@ REPEAT = 1.0  # [s]; how often the same complaint is logged
 class ThinnedTopic:
     """One topic. `publish` is called with the samples that are to be sent, in order."""
 
-    def __init__(self, thinner: "Thinner", publish: Callable[[Any], None]) -> None:
+    def __init__(self, thinner: "Thinner", name: str, publish: Callable[[Any], None]) -> None:
+        """The `name` is the topic's, resolved."""
         self._thinner = thinner
+        self._name = name
         self._publish = publish
         self._guard = threading.Lock()
         self._waiting = False  # for the thinner, which will take what is kept then
@@ -34,14 +36,14 @@ class ThinnedTopic:
         """Publishes the sample, or keeps it until its turn or a newer one comes; called by the tick."""
         # Nearly always, beyond real time: so this goes without the lock. When the world has just been
         # slowed down, the thinner may not have come round yet; then nothing waits for it any more.
-        if self._waiting and self._thinner.active:
+        if self._waiting and self._thinned():
             self._kept = sample
             if self._waiting:  # still: flush() takes what is kept after it has cleared this
                 return
         with self._guard:
             if sample is self._newest:  # flush() has been quicker
                 return
-            if self._thinner.active and time.monotonic() - self._sent < PERIOD:
+            if self._thinned() and time.monotonic() - self._sent < PERIOD:
                 self._kept = sample
                 self._waiting = True
             else:
@@ -49,6 +51,9 @@ class ThinnedTopic:
                 self._send_now(sample)
         if self._waiting:
             self._thinner.remember(self)
+
+    def _thinned(self) -> bool:
+        return self._thinner.active and not self._thinner.is_whole(self._name)
 
     def _send_now(self, sample: Any) -> None:
         self._kept, self._newest = None, sample
@@ -73,6 +78,10 @@ def _drop(sample: Any) -> None:
     """For a topic that has been closed."""
 
 
+def _never(_name: str) -> bool:
+    return False
+
+
 class Thinner:
     """Sends what thinned topics kept, from a thread of its own."""
 
@@ -84,6 +93,7 @@ class Thinner:
         self._ending = threading.Event()
         self._sender = threading.Thread(target=self._send, name="thinned topics", daemon=True)
         self._sender.start()
+        self.is_whole: Callable[[str], bool] = _never  # a topic that somebody needs all messages of
         rospy.on_shutdown(self._stop)
 
     @property

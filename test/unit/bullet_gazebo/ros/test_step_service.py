@@ -2,6 +2,7 @@
 
 import contextlib
 import random
+import threading
 from functools import lru_cache
 
 import numpy as np
@@ -19,7 +20,7 @@ from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.robot import ControlledRobot
-from bullet_gazebo.ros.services.step_service import StepService
+from bullet_gazebo.ros.services.stepping.step_service import StepService
 from bullet_gazebo.simulator import Simulator
 
 WORLD = StepWorldRequest.WORLD
@@ -38,7 +39,7 @@ class Slides:
         self.sim = Simulator(World(make_engine()), lockstep=True)
         self._urdf = slides(root)
         self._params = yaml.safe_load((root / "test/data/robots/slides.yaml").read_text())
-        self.service = StepService(self.sim, contextlib.nullcontext())
+        self.service = StepService(self.sim, contextlib.nullcontext(), threading.Lock())
 
     def add(self, name, *controllers):
         model = self.sim.world.spawn(name, parse_urdf(self._urdf), Pose())

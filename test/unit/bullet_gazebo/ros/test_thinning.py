@@ -47,7 +47,7 @@ def thinner(sim):
 
 def test_the_newest_is_always_sent_and_order_kept(thinner):
     reader = Reader()
-    topic = ThinnedTopic(thinner, reader)
+    topic = ThinnedTopic(thinner, "/topic", reader)
     for sample in range(100_000):
         topic.send(sample)
     assert reader.wait_for(99_999)
@@ -59,7 +59,7 @@ def test_the_newest_is_always_sent_and_order_kept(thinner):
 def test_in_real_time_everything_is_sent_at_once(sim, thinner):
     sim.outruns_the_clock = False
     reader = Reader()
-    topic = ThinnedTopic(thinner, reader)
+    topic = ThinnedTopic(thinner, "/topic", reader)
     for sample in range(1000):
         topic.send(sample)
     assert reader.got == list(range(1000))
@@ -68,7 +68,7 @@ def test_in_real_time_everything_is_sent_at_once(sim, thinner):
 def test_a_world_that_slows_down_sends_nothing_stale(sim, thinner, monkeypatch):
     monkeypatch.setattr(thinning, "PERIOD", BOUND)
     reader = Reader()
-    topic = ThinnedTopic(thinner, reader)
+    topic = ThinnedTopic(thinner, "/topic", reader)
     topic.send(1)
     topic.send(2)  # kept
     sim.outruns_the_clock = False
@@ -79,7 +79,7 @@ def test_a_world_that_slows_down_sends_nothing_stale(sim, thinner, monkeypatch):
 
 def test_a_closed_topic_publishes_nothing(thinner):
     reader = Reader()
-    topic = ThinnedTopic(thinner, reader)
+    topic = ThinnedTopic(thinner, "/topic", reader)
     topic.send(1)
     topic.send(2)
     topic.close()
@@ -95,12 +95,12 @@ def test_a_topic_whose_message_can_not_be_sent_silences_no_other(thinner, monkey
     def fail(sample):
         raise OverflowError("no number for a message")
 
-    bad = ThinnedTopic(thinner, fail)
+    bad = ThinnedTopic(thinner, "/topic", fail)
     bad._kept = 1
     thinner.remember(bad)
     assert told.wait(BOUND)
     reader = Reader()
-    good = ThinnedTopic(thinner, reader)
+    good = ThinnedTopic(thinner, "/topic", reader)
     for sample in range(1000):
         good.send(sample)
     assert reader.wait_for(999)
@@ -111,13 +111,16 @@ class LateThinner:
 
     active = True
 
+    def is_whole(self, name):
+        return False
+
     def remember(self, topic):
         pass
 
 
 def test_a_world_that_is_slowed_down_sends_everything_from_then_on():
     thinner, got = LateThinner(), []
-    topic = ThinnedTopic(thinner, got.append)
+    topic = ThinnedTopic(thinner, "/topic", got.append)
     for sample in range(3):
         topic.send(sample)
     assert got == [0]

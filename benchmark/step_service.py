@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Steps a second over ROS: in lock-step, and with the usual unpause / publish / wait / pause.
 
-    ./ws python3 benchmark/lockstep.py [--out FOLDER] [--steps 5000] [--rounds 5]
+    ./ws python3 benchmark/step_service.py [--out FOLDER] [--steps 5000] [--rounds 5]
 
 A step is 8 physics steps of 1 ms of the cart-pole with its two controllers. Prints tables and writes
 lockstep.json. It starts simulators on masters of its own.

@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.ros.services.step_requests import StepPlan
+from bullet_gazebo.ros.services.stepping.step_requests import StepPlan
 from bullet_gazebo.ros.wire.conversions import to_pose_msg, to_time, to_twist_msg
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.simulator import Simulator
@@ -21,11 +21,18 @@ SLICE = 500  # ticks between which other services get their turn
 class StepService:
     """One call: reset, commands, exactly n ticks, state; in lock-step only (bullet_gazebo_msgs/StepWorld)."""
 
-    def __init__(self, sim: Simulator, watchdog: AbstractContextManager[object]) -> None:
-        """A fault in a block of `watchdog` ends the node."""
+    def __init__(
+        self,
+        sim: Simulator,
+        watchdog: AbstractContextManager[object],
+        one_at_a_time: threading.Lock,
+    ) -> None:
+        """A fault in a block of `watchdog` ends the node; with `one_at_a_time`, nobody else's ticks come
+        within a request's.
+        """
         self._sim = sim
         self._watchdog = watchdog
-        self._one_at_a_time = threading.Lock()  # nobody else's ticks within a request's
+        self._one_at_a_time = one_at_a_time
         self._service = rospy.Service("~step_world", StepWorld, self._step)
 
     def _step(self, request: StepWorldRequest) -> StepWorldResponse:

@@ -1,0 +1,114 @@
+"""What is published for nodes that let time pass in lock-step, kept in order until they ask for it."""
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+
+from bullet_gazebo_msgs.msg import TopicMessage
+
+from bullet_gazebo.ros.wire.rospy_patches import (
+    divert_connections,
+    divert_messages,
+    is_connected,
+    on_topics_changed,
+)
+
+CONNECTING = 2.0  # [s of wall time] for a node that has just said what it publishes and hears
+LOOK = 0.002  # [s]
+MOST_BYTES = 256 * 2**20  # [bytes] kept for one node; more is somebody who listens and never asks
+
+
+class Mailbox:
+    """The messages for one node."""
+
+    def __init__(self) -> None:
+        self._guard = threading.Lock()
+        self._kept: list[TopicMessage] = []
+        self._topics: set[str] = set()
+        self._size = 0  # [bytes]
+        self.awaited: frozenset[str] = frozenset()  # topics whose messages the node waits for
+
+    def put(self, topic: str, data: bytes) -> None:
+        """Keeps a message; when there are far too many, the oldest go."""
+        with self._guard:
+            self._kept.append(TopicMessage(topic, data))
+            self._topics.add(topic)
+            self._size += len(data)
+            while self._size > MOST_BYTES:
+                self._size -= len(self._kept.pop(0).data)
+
+    @property
+    def has_awaited(self) -> bool:
+        """Whether there is what the node waits for."""
+        return not self._topics.isdisjoint(self.awaited)
+
+    def take(self) -> list[TopicMessage]:
+        """Returns what is kept, in the order in which it was published, and keeps it no longer."""
+        with self._guard:
+            taken, self._kept = self._kept, []
+            self._topics.clear()
+            self._size = 0
+        return taken
+
+
+class Mailboxes:
+    """Those of all nodes that have asked for time."""
+
+    def __init__(self) -> None:
+        self.changes = 0  # of the topics that this process publishes or subscribes to
+        self._boxes: dict[str, Mailbox] = {}
+        divert_messages(self._sink)
+        on_topics_changed(self._count_change)
+
+    def of(self, node: str) -> Mailbox:
+        """The mailbox of a node. From the first time on its messages go there."""
+        box = self._boxes.get(node)
+        if box is None:
+            box = self._boxes[node] = Mailbox()
+            divert_connections(node, box.put)
+        return box
+
+    @property
+    def has_awaited(self) -> bool:
+        """Whether some node has what it waits for."""
+        return any(box.has_awaited for box in self._boxes.values())
+
+    def nodes_to_wake(self) -> list[str]:
+        """Nodes that have what they wait for."""
+        return [node for node, box in self._boxes.items() if box.has_awaited]
+
+    def any_hears(self, topic: str) -> bool:
+        """Whether one of the nodes is connected to a topic that this process publishes."""
+        return any(is_connected(topic, node, publishes=True) for node in self._boxes)
+
+    def connect(
+        self, node: str, subscriptions: Sequence[str], publications: Sequence[str]
+    ) -> tuple[list[str], list[str]]:
+        """Waits until a node is connected to its topics, as far as they are this process's, too.
+
+        Returns:
+            Those of its subscriptions that this process publishes, and those of its publications that
+            this process subscribes to.
+        """
+        deadline = time.monotonic() + CONNECTING
+        ways = ((subscriptions, True), (publications, False))
+        while any(
+            is_connected(topic, node, publishes) is False
+            for topics, publishes in ways
+            for topic in topics
+        ):
+            if time.monotonic() > deadline:
+                break
+            time.sleep(LOOK)  # rospy doesn't tell when a connection has come
+        heard, told = (
+            [topic for topic in topics if is_connected(topic, node, publishes) is not None]
+            for topics, publishes in ways
+        )
+        return heard, told
+
+    def _sink(self, node: str) -> Callable[[str, bytes], None] | None:
+        box = self._boxes.get(node)
+        return box.put if box else None
+
+    def _count_change(self) -> None:
+        self.changes += 1

@@ -1,0 +1,145 @@
+"""Command line: runs a script in lock-step (docs/lockstep.md)."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+import threading
+import types
+from collections.abc import Callable, Sequence
+
+from lockstep_runner.notices import tell
+from lockstep_runner.script import running
+from lockstep_runner.script.seeds import seed_everything
+from lockstep_runner.simulation.world import NotInLockstep, is_running
+
+USAGE = 2
+SERVER_ARGUMENTS = "GZSERVER_ARGS"  # read by every simulator that is started below us
+STEP_ON = "--step-on"
+HASHES = "PYTHONHASHSEED"
+MOST_SEED = 2**32 - 1
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the script that the command line names; returns the exit code, unless it leaves by itself."""
+    args = _parse(sys.argv[1:] if argv is None else argv)
+    try:
+        code = running.compiled(args.script)
+        is_running()
+    except (running.NoScript, NotInLockstep) as fault:
+        tell(str(fault))
+        return USAGE
+    if args.seed is not None and os.environ.get(HASHES) != str(args.seed % MOST_SEED):
+        # The order of sets is drawn when Python starts.
+        os.environ[HASHES] = str(args.seed % MOST_SEED)
+        os.execv(sys.executable, [sys.executable, *sys.argv])
+    server = "--lockstep" if args.seed is None else f"--lockstep --seed {args.seed}"
+    os.environ[SERVER_ARGUMENTS] = f"{os.environ.get(SERVER_ARGUMENTS, '')} {server}".strip()
+    return _run(args, code)
+
+
+def _run(args: argparse.Namespace, code: types.CodeType) -> int:
+    from lockstep_runner.install import install
+
+    runner = install(args)
+    if args.seed is not None:
+        seed_everything(args.seed)
+    runner.watch()
+    show, sys.excepthook = sys.excepthook, _hide_ourselves(sys.excepthook, args.script)
+    try:
+        running.run(args.script, args.arguments, code)
+        others = [
+            each
+            for each in threading.enumerate()
+            if not each.daemon and each is not threading.main_thread()
+        ]
+        runner.finish(others)
+    finally:
+        runner.hand_over()
+        for name in runner.triggers.unused():
+            seen = ", ".join(runner.triggers.seen) or "nothing"
+            tell(f"--step-on {name}: the script used no topic or service of that name, but {seen}")
+    sys.excepthook = show
+    return 0
+
+
+Hook = Callable[[type[BaseException], BaseException, types.TracebackType | None], object]
+
+
+def _hide_ourselves(show: Hook, path: str) -> Hook:
+    """Tracebacks begin with the script."""
+
+    def shown(
+        kind: type[BaseException], fault: BaseException, trace: types.TracebackType | None
+    ) -> None:
+        fault.__traceback__ = running.own_part(trace, path)  # which is what is shown
+        show(kind, fault, fault.__traceback__)
+
+    return shown
+
+
+def _parse(argv: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="lockstep.py",
+        description="Runs a script that was written for Gazebo, unchanged, in lock-step: repeatable, and as"
+        " fast as it computes. A simulator that it launches comes up in lock-step.",
+    )
+    parser.add_argument("--seed", type=_seed, help="of random, NumPy, torch, and the simulator")
+    parser.add_argument(
+        "--dt",
+        type=_period,
+        default=0.008,
+        help="what passes at a trigger [s], in whole physics steps (default: %(default)s)",
+    )
+    parser.add_argument(
+        STEP_ON,
+        action="append",
+        metavar="TOPIC-OR-SERVICE",
+        help="let that time pass at each message on, or call of, these; 'none' for none; else at commands"
+        " to controllers, where the script doesn't wait by itself",
+    )
+    parser.add_argument(
+        "--virtual-wall-clock",
+        action="store_true",
+        help="time.time(), monotonic() and perf_counter() are simulated, too",
+    )
+    parser.add_argument("script", help="the Python file")
+    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="what the script gets")
+    return parser.parse_args(_one_by_one(argv))
+
+
+def _one_by_one(argv: Sequence[str]) -> list[str]:
+    """Gives each of the names behind --step-on an option of its own: else the script would be one more."""
+    left, given = list(argv), []
+    while left:
+        argument = left.pop(0)
+        if argument != STEP_ON:
+            given.append(argument)
+            if not argument.startswith("-") and given[-2:-1] not in (["--seed"], ["--dt"]):
+                return given + left  # the script, and what it gets
+            continue
+        names = []
+        while left and not (left[0].startswith("-") or _is_a_script(left[0])):
+            names.append(left.pop(0))
+        given += [part for name in names for part in (STEP_ON, name)] or [STEP_ON]
+    return given
+
+
+def _is_a_script(argument: str) -> bool:
+    return argument.endswith(".py") or os.path.isfile(argument)
+
+
+def _seed(text: str) -> int:
+    value = int(text)
+    if not 0 <= value <= MOST_SEED:
+        raise argparse.ArgumentTypeError(f"{text}: 0 to {MOST_SEED}")
+    return value
+
+
+def _period(text: str) -> float:
+    value = float(text)
+    if not (value > 0.0 and math.isfinite(value)):
+        raise argparse.ArgumentTypeError(f"{text}: a positive number of seconds is needed")
+    return value

@@ -1,0 +1,42 @@
+"""Looks at processes and threads from outside: whether they compute, or wait for something."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lockstep_runner import originals
+
+LOOK = 0.03  # [s of wall time]
+QUIET = 5  # looks in a row
+WORKING = "RD"  # states of a process: running, waiting for a disk
+
+
+class Seen:
+    """What was seen of one process, or one thread."""
+
+    def __init__(self, place: Path, quiet: int = QUIET) -> None:
+        """`place` is its folder in /proc; it is quiet after as many looks in a row."""
+        self._place = place
+        self._looks = quiet
+        self._used = -1  # [ticks] of processor time
+        self._quiet = 0  # looks in a row
+        self._next = 0.0
+
+    def is_quiet(self) -> bool:
+        """Looks, not too often, whether it has done nothing in the last few looks."""
+        if originals.monotonic() >= self._next:
+            self._next = originals.monotonic() + LOOK
+            look = look_at(self._place)
+            works = look is not None and (look[1] in WORKING or look[2] != self._used)
+            self._quiet = 0 if works else self._quiet + 1
+            self._used = look[2] if look else -1
+        return self._quiet >= self._looks
+
+
+def look_at(place: Path) -> tuple[int, str, int] | None:
+    """Returns parent, state and processor time [ticks] of a process or thread, if it is there."""
+    try:
+        fields = Path(place, "stat").read_text().rpartition(") ")[2].split()
+    except OSError:
+        return None
+    return int(fields[1]), fields[0], int(fields[11]) + int(fields[12])

@@ -1,0 +1,13 @@
+"""The functions of Python that are replaced for the script, as they were; ours use these."""
+
+import threading
+import time
+
+sleep = time.sleep
+monotonic = time.monotonic
+Event = threading.Event
+Condition = threading.Condition
+event_wait = threading.Event.wait
+condition_wait = threading.Condition.wait
+join = threading.Thread.join
+start = threading.Thread.start

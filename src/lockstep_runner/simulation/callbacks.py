@@ -1,0 +1,126 @@
+"""Hands messages of the simulator to the script's callbacks, in order, in a thread as rospy does."""
+
+from __future__ import annotations
+
+import threading
+from collections import defaultdict, deque
+from collections.abc import Callable, Collection, Iterable
+from typing import Any
+
+import rospy
+import rospy.impl.registration
+from bullet_gazebo_msgs.msg import TopicMessage
+
+from lockstep_runner import originals
+from lockstep_runner.simulation.world import NODE
+
+QUIET = (
+    20  # callbacks in a row that did nothing towards the simulator: time needn't stop for the topic
+)
+
+Told = Callable[[threading.Thread], None]
+
+
+class Callbacks:
+    """Runs callbacks one after the other.
+
+    A callback may wait for simulated time. Then other topics' messages go on in another thread, while those
+    of its own topic wait for it, as they do with rospy.
+    """
+
+    def __init__(self, began: Told, ended: Told) -> None:
+        """`began` and `ended` are told of a thread that runs callbacks."""
+        self._began = began
+        self._ended = ended
+        self._guard = threading.Lock()
+        self._waiting: deque[TopicMessage] = deque()
+        self._held: dict[str, list[TopicMessage]] = defaultdict(list)
+        self._busy: set[str] = set()  # topics with a callback that hasn't returned
+        self._idle: list[_Worker] = []
+        self._quiet: dict[str, int] = defaultdict(int)
+        self._current: dict[int, str] = {}  # the topic that a thread runs a callback of
+
+    def acted(self) -> None:
+        """The callback in this thread, if it is one, has done something towards the simulator."""
+        topic = self._current.get(threading.get_ident())
+        if topic is not None:
+            self._quiet[topic] = 0
+
+    def stops(self, topics: Collection[str]) -> list[str]:
+        """Topics after whose messages time stops: those asked for, and those whose callbacks act.
+
+        A callback that commands the robot has to have done so before the next tick; for one that only
+        keeps what it was told, stopping would cost time for nothing.
+        """
+        acting = [
+            name
+            for name, topic in list(_topics().subs.items())
+            if topic.callbacks and self._quiet[name] < QUIET
+        ]
+        return [*{*acting, *topics}]
+
+    def hand_out(self, messages: Iterable[TopicMessage]) -> None:
+        """Has the callbacks called; returns before they have been."""
+        with self._guard:
+            self._waiting.extend(messages)
+            worker = self._idle.pop() if self._idle else None
+        worker = worker or _Worker(self._work)
+        self._began(worker)
+        worker.go.release()
+
+    def _work(self, worker: _Worker) -> None:
+        while True:
+            with self._guard:
+                if not self._waiting:
+                    self._idle.append(worker)
+                    break
+                message = self._waiting.popleft()
+                if message.topic in self._busy:
+                    self._held[message.topic].append(message)
+                    continue
+                self._busy.add(message.topic)
+            try:
+                self._call(message)
+            finally:
+                with self._guard:
+                    self._busy.discard(message.topic)
+                    self._waiting.extendleft(reversed(self._held.pop(message.topic, [])))
+        self._ended(worker)
+
+    def _call(self, message: TopicMessage) -> None:
+        topic = _topics().get_subscriber_impl(message.topic)
+        if topic is None or not topic.callbacks:
+            return
+        connection = next((each for each in topic.connections if each.callerid_pub == NODE), None)
+        if connection is None:
+            return
+        content = topic.data_class().deserialize(message.data[4:])
+        content._connection_header = connection.header
+        if connection.is_latched:
+            connection.latch = content
+        self._quiet[message.topic] += 1
+        self._current[threading.get_ident()] = message.topic
+        try:
+            topic.receive_callback([content], connection)
+        finally:
+            del self._current[threading.get_ident()]
+
+
+class _Worker(threading.Thread):
+    """A thread that runs callbacks when it is told to go."""
+
+    def __init__(self, work: Callable[[_Worker], None]) -> None:
+        super().__init__(name="callbacks", daemon=True)
+        self.go = threading.Lock()
+        self.go.acquire()
+        self._work = work
+        originals.start(self)
+
+    def run(self) -> None:
+        while True:
+            self.go.acquire()
+            self._work(self)
+
+
+def _topics() -> Any:
+    return rospy.impl.registration.get_topic_manager()

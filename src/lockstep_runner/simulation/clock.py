@@ -1,0 +1,241 @@
+"""Simulated time for the threads of a script: it passes while the main thread waits, and all else rests.
+
+The main thread drives: while it waits, it asks the simulator for time, hands out messages, and wakes other
+threads (timers, callbacks, threads with a rospy.Rate) when theirs has come, one after the other. While one of
+them computes, no time passes. So who does what at which time doesn't depend on the machine.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Collection
+from pathlib import Path
+from weakref import WeakKeyDictionary
+
+import genpy
+import rospy
+import rospy.impl.simtime
+
+from lockstep_runner import originals
+from lockstep_runner.looks import Seen
+from lockstep_runner.notices import Notices
+from lockstep_runner.simulation.callbacks import Callbacks
+from lockstep_runner.simulation.others import NobodyElse, Others
+from lockstep_runner.simulation.sleeper import Condition, Sleeper
+from lockstep_runner.simulation.world import World
+
+NANOSECONDS = 1_000_000_000
+LOOK = 0.002  # [s of wall time] between two looks whether a thread that computes has ended
+PATIENCE = (
+    10.0  # [s of wall time] with a thread that computes, or waits for something that isn't time
+)
+OWN_QUIET = 30  # looks in a row at a thread of the script's that does nothing; 1 s
+PAUSED_LOOKS = (
+    0.001,
+    0.05,
+)  # [s of wall time] between two looks at a paused world, at first and at most
+
+
+class Clock:
+    """Lets threads wait in simulated time."""
+
+    def __init__(self, world: World, notices: Notices) -> None:
+        self.world = world
+        self.passed = 0  # [ns] simulated, in all; a reset of the simulation doesn't take it back
+        self.waits = 0  # counts waits of the main thread in which time has passed
+        self.driving = False  # whether the main thread waits
+        self.others: Others = NobodyElse()
+        self._notices = notices
+        self._guard = originals.Condition()
+        self._sleepers: list[Sleeper] = []
+        self._running: dict[int, threading.Thread] = {}
+        # Threads that the script has started by itself, and what was seen of them
+        self._own: WeakKeyDictionary[threading.Thread, Seen] = WeakKeyDictionary()
+        self._order = 0
+        self.callbacks = Callbacks(self.began, self.ended)
+
+    def covers_this_thread(self) -> bool:
+        """Whether this is the main thread, or one that computes while the main one waits for it."""
+        return (
+            threading.current_thread() is threading.main_thread()
+            or threading.get_ident() in self._running
+        )
+
+    def wait(
+        self, seconds: float, until: Condition | None = None, topics: Collection[str] = ()
+    ) -> bool:
+        """Waits, in the thread that calls.
+
+        Args:
+            seconds: at most, of simulated time; may be infinity.
+            until: ends the wait, once it is true; asked after messages, callbacks and other threads' turns.
+            topics: whose messages may make it true.
+
+        Returns:
+            Whether `until` has become true.
+        """
+        # Whole: of a fraction that no tick reaches nobody would wake.
+        span = seconds if seconds == math.inf else round(max(0.0, seconds) * NANOSECONDS)
+        if threading.current_thread() is not threading.main_thread():
+            return self._rest(span, until)
+        self.driving = True
+        try:
+            return self._drive(span, until, topics)
+        finally:
+            self.driving = False
+
+    def step(self, ticks: int) -> None:
+        """Lets some physics steps pass; for the main thread."""
+        self.wait(ticks * self.world.step / NANOSECONDS)
+
+    def exchange(self) -> None:
+        """Sends what the script has published, and hands out what has come; no time passes."""
+        self._advance(0, ())
+
+    def began(self, thread: threading.Thread) -> None:
+        """A thread computes: no time passes until it has `ended`, or waits."""
+        with self._guard:
+            ident = thread.ident
+            if ident is not None and all(each.thread != ident for each in self._sleepers):
+                self._running[ident] = thread
+
+    def began_own(self, thread: threading.Thread) -> None:
+        """The script has started a thread: as `began`, but it may wait for something that isn't time."""
+        place = Path("/proc/self/task", str(thread.native_id))
+        self._own[thread] = Seen(place, OWN_QUIET)
+        self.began(thread)
+
+    def is_own(self, thread: threading.Thread) -> bool:
+        """Whether the script has started a thread by itself."""
+        return thread in self._own
+
+    def ended(self, thread: threading.Thread) -> None:
+        """A thread has done what there was to do."""
+        with self._guard:
+            self._running.pop(thread.ident or 0, None)
+            self._guard.notify_all()
+
+    def release_all(self) -> None:
+        """Wakes everybody, at the shutdown of the node."""
+        with self._guard:
+            sleepers, self._sleepers = self._sleepers, []
+        for sleeper in sleepers:
+            sleeper.resting.release()
+
+    def _rest(self, span: float, until: Condition | None) -> bool:
+        """Waits in a thread that the main one will wake."""
+        with self._guard:
+            self._order += 1
+            ident = threading.get_ident()
+            sleeper = Sleeper(ident, self.passed + span, until, self._order)
+            self._sleepers.append(sleeper)
+            self._running.pop(ident, None)
+            self._guard.notify_all()
+        sleeper.resting.acquire()
+        return sleeper.came
+
+    def _drive(self, span: float, until: Condition | None, topics: Collection[str]) -> bool:
+        end = self.passed + span
+        self._let_others_finish()
+        if until is not None:
+            self.exchange()
+            if until():
+                return True
+        while self.passed < end and not rospy.core.is_shutdown():
+            self.others.settle()
+            wake = min([end, self.others.next_wake(), *(each.wake for each in self._sleepers)])
+            ticks = self.world.longest
+            if wake < math.inf:
+                ticks = math.ceil((wake - self.passed) / self.world.step - 1e-6)
+            if ticks > 0 and not self._advance(min(ticks, self.world.longest), topics):
+                return self._wait_paused(end, until)
+            self._wake_the_due()
+            self.others.wake_due(self.passed)
+            if until is not None and until():
+                return True
+        return False
+
+    def _advance(self, ticks: int, topics: Collection[str]) -> bool:
+        """Returns whether time has passed, or none was asked for."""
+        stops = self.callbacks.stops(topics) if ticks else ()
+        response = self.world.advance(ticks, stops)
+        self.take_over_time()
+        if response.ticks:
+            self.passed += response.ticks * self.world.step
+            self.waits += 1
+        if response.messages:
+            self.callbacks.hand_out(response.messages)
+            self._let_others_finish()
+        for node in response.others:
+            self.others.wake(node)
+        return not response.paused or not ticks
+
+    def take_over_time(self) -> None:
+        """Tells rospy the time, instead of /clock."""
+        hears = getattr(rospy.impl.simtime, "_clock_sub", None)
+        if hears is not None:
+            hears.unregister()
+            rospy.impl.simtime._clock_sub = None
+        rospy.rostime.set_rostime_initialized(True)
+        rospy.rostime._set_rostime(genpy.Time(0, self.world.now))
+
+    def _wait_paused(self, end: float, until: Condition | None) -> bool:
+        """A sleep in a paused world ends at once; what others may do is waited for, in wall time."""
+        if until is None and end < math.inf:
+            return False
+        look, longest = PAUSED_LOOKS
+        limit = originals.monotonic() + (end - self.passed) / NANOSECONDS
+        while originals.monotonic() < limit and not rospy.core.is_shutdown():
+            originals.sleep(look)
+            look = min(look * 1.5, longest)
+            self.exchange()
+            if until is not None and until():
+                return True
+            if not self.world.paused:
+                return self._drive(end - self.passed, until, ())
+        return False
+
+    def _wake_the_due(self) -> None:
+        while True:
+            with self._guard:
+                due = [each for each in self._sleepers if each.is_due(self.passed)]
+                if not due:
+                    return
+                sleeper = min(due, key=lambda each: (each.wake, each.order))
+                sleeper.came = sleeper.until is not None and sleeper.until()
+                self._sleepers.remove(sleeper)
+                thread = threading._active.get(sleeper.thread)  # type: ignore[attr-defined]
+                if thread is None:
+                    continue
+                self._running[sleeper.thread] = thread
+                sleeper.resting.release()
+            self._let_others_finish()
+
+    def _let_others_finish(self) -> None:
+        """Waits until no other thread computes."""
+        if not self._running:
+            return
+        deadline = originals.monotonic() + PATIENCE
+        me = threading.get_ident()
+        with self._guard:
+            while self._running.keys() - {me}:
+                originals.condition_wait(self._guard, LOOK)
+                for ident, thread in list(self._running.items()):
+                    if not thread.is_alive():
+                        del self._running[ident]
+                    elif ident != me and thread in self._own and self._own[thread].is_quiet():
+                        del self._running[ident]
+                        self._notices.once(
+                            f"waits {thread.name}",
+                            f"thread '{thread.name}' waits for something that isn't simulated time: what it"
+                            " does from here on isn't repeatable",
+                        )
+                    elif ident != me and originals.monotonic() > deadline:
+                        del self._running[ident]
+                        self._notices.once(
+                            f"busy {thread.name}",
+                            f"thread '{thread.name}' has computed, or waited for something that isn't"
+                            f" simulated time, for {PATIENCE:g} s; time goes on without it, so that what"
+                            " it does from here on isn't repeatable",
+                        )

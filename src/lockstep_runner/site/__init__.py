@@ -1,0 +1,1 @@
+"""On PYTHONPATH of what a script in lock-step starts: Python reads sitecustomize by itself."""

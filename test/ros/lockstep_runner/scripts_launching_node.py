@@ -1,0 +1,125 @@
+#!/usr/bin/env python3
+"""Scripts under lockstep.py that start their own simulator, or meet one that isn't as it should be."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import rospkg
+import rostest
+
+from ros_utils.simulation import Simulation, reserved_port
+
+ROOT = Path(rospkg.RosPack().get_path("cartpole"))
+SCRIPTS = ROOT / "test" / "data" / "scripts"
+EXISTING = ROOT.parent / "shared" / "pg_script" / "launch_robot_test.py"
+EPISODES = 20
+BOUND = 300  # [s]
+BURN = "while True: pass"
+
+
+def environment():
+    port = reserved_port()
+    return {
+        **os.environ,
+        "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
+        "ROS_IP": "127.0.0.1",
+        "PYTHONUNBUFFERED": "1",
+    }
+
+
+def start(*arguments, **options):
+    return subprocess.Popen(
+        ["rosrun", "cartpole", "lockstep.py", *map(str, arguments)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, **options,
+    )  # fmt: skip
+
+
+class Burners:
+    """Keeps both cores busy."""
+
+    def __enter__(self):
+        self.processes = [
+            subprocess.Popen([sys.executable, "-c", BURN]) for _ in range(os.cpu_count())
+        ]
+
+    def __exit__(self, *_):
+        for process in self.processes:
+            process.kill()
+            process.wait()
+
+
+class LaunchingTest(unittest.TestCase):
+    def run_own(self, seed=3):
+        process = start("--seed", seed, SCRIPTS / "publish_read.py", env=environment())
+        out, err = process.communicate(timeout=BOUND)
+        self.assertEqual(process.returncode, 0, err)
+        lines = [line for line in out.splitlines() if re.match(r"\d \d+ ", line)]
+        self.assertGreater(len(lines), 190, out)
+        return lines
+
+    def test_a_script_that_launches_everything_is_repeatable_also_on_a_busy_machine(self):
+        one = self.run_own()
+        with Burners():
+            self.assertEqual(self.run_own(), one)
+        self.assertNotEqual(self.run_own(seed=4), one)
+
+    @unittest.skipUnless(EXISTING.is_file(), "the existing script isn't here")
+    def test_the_existing_script_is_repeatable_also_on_a_busy_machine(self):
+        one = self.run_existing()
+        with Burners():
+            self.assertEqual(self.run_existing(), one)
+
+    def run_existing(self):
+        """Returns what the script prints in its first episodes, and its weights after the first one."""
+        folder = tempfile.mkdtemp(prefix="lockstep_test_")
+        process = start("--seed", 0, EXISTING, env=environment(), cwd=folder)
+        lines = []
+        try:
+            for line in process.stdout:
+                if line.startswith(f"Episode {EPISODES},"):
+                    break
+                if line.startswith("Episode"):
+                    lines.append(line)
+        finally:
+            os.killpg(process.pid, signal.SIGINT)
+            _, err = process.communicate(timeout=BOUND)
+        self.assertGreater(len(lines), EPISODES, err)
+        weights = Path(folder, "models", "policy_network_episode_0.pth").read_bytes()
+        return lines, weights
+
+    def test_a_world_in_real_time_is_refused(self):
+        with Simulation() as simulation:
+            process = start(SCRIPTS / "rate_loop.py", env=simulation.environment())
+            _, err = process.communicate(timeout=BOUND)
+        self.assertEqual(process.returncode, 2, err)
+        self.assertIn("runs in real time", err)
+        self.assertIn("lockstep:=true", err)
+
+    def test_a_simulator_that_dies_is_told_of(self):
+        text = (
+            "import os, signal, time, rospy\nfrom std_srvs.srv import Empty\nrospy.init_node('script')\n"
+            "rospy.ServiceProxy('/gazebo/unpause_physics', Empty)()\ntime.sleep(0.1)\n"
+            "from ros_calls import master, xmlrpc\n"
+            "pid = xmlrpc.call(master.call('lookupNode', '/gazebo'), 'getPid')\n"
+            "os.kill(pid, signal.SIGKILL)\ntime.sleep(0.1)\nprint('went on')\n"
+        )
+        folder = tempfile.mkdtemp(prefix="lockstep_test_")
+        path = Path(folder, "script.py")
+        path.write_text(text)
+        with Simulation(lockstep=True) as simulation:
+            process = start(path, env=simulation.environment())
+            out, err = process.communicate(timeout=BOUND)
+        self.assertEqual(process.returncode, 1, err)
+        self.assertIn("the simulator has died", err)
+        self.assertNotIn("Traceback", err)
+        self.assertNotIn("went on", out)
+
+
+if __name__ == "__main__":
+    sys.exit(rostest.rosrun("cartpole", "scripts_launching", LaunchingTest))

@@ -1,0 +1,251 @@
+#!/usr/bin/env python3
+"""Scripts under lockstep.py, in a world in lock-step that runs already (docs/lockstep.md)."""
+
+import importlib.util
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import rospkg
+import rospy
+import rostest
+from controller_manager_msgs.srv import ListControllers
+
+ROOT = Path(rospkg.RosPack().get_path("cartpole"))
+SCRIPTS = ROOT / "test" / "data" / "scripts"
+BOUND = 120  # [s]
+
+
+def lockstep(*arguments, **options):
+    command = ["rosrun", "cartpole", "lockstep.py", *map(str, arguments)]
+    return subprocess.run(
+        command, capture_output=True, text=True, timeout=BOUND, check=False, **options
+    )
+
+
+def written(text):
+    """A script of a few lines, in a folder of its own."""
+    path = Path(tempfile.mkdtemp(prefix="lockstep_test_")) / "script.py"
+    path.write_text(text)
+    return path
+
+
+HEAD = """
+import sys, time, threading, rospy
+from std_msgs.msg import Float64
+from std_srvs.srv import Empty
+rospy.init_node("script")
+rospy.ServiceProxy("/gazebo/reset_simulation", Empty)()
+pause = rospy.ServiceProxy("/gazebo/pause_physics", Empty)
+rospy.ServiceProxy("/gazebo/unpause_physics", Empty)()
+"""
+COMMANDS = """
+command = rospy.Publisher("/stand_cart_position_controller/command", Float64, queue_size=1)
+for step in range(5):
+    command.publish(0.01)
+    print(rospy.get_time())
+"""
+
+
+class LockstepTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.wait_for_service("/slides/controller_manager/list_controllers", 60)
+        ask = rospy.ServiceProxy("/slides/controller_manager/list_controllers", ListControllers)
+        while not any(each.state == "running" for each in ask().controller):
+            rospy.rostime.wallsleep(0.05)
+
+    def check(self, run, code=0):
+        self.assertEqual(run.returncode, code, run.stderr)
+        self.assertNotIn("Traceback", run.stderr)
+        return run.stdout
+
+    def twice(self, name, *arguments):
+        one = lockstep("--seed", 3, SCRIPTS / name, *arguments)
+        two = lockstep("--seed", 3, SCRIPTS / name, *arguments)
+        self.check(one)
+        self.check(two)
+        self.assertEqual(one.stdout, two.stdout)
+        return one
+
+    def check_50_hz(self, lines):
+        times = [float(line.split()[0]) for line in lines]
+        gaps = [round(later - earlier, 9) for earlier, later in itertools.pairwise(times)]
+        self.assertEqual(set(gaps), {0.02})
+
+    def test_sleep_and_read(self):
+        self.assertEqual(len(self.twice("sleep_read.py").stdout.splitlines()), 200)
+
+    def test_a_loop_at_50_hz(self):
+        lines = self.twice("rate_loop.py").stdout.splitlines()
+        self.assertEqual(len(lines), 200)
+        self.check_50_hz(lines)
+
+    def test_unpause_publish_wait_pause(self):
+        run = self.twice("pause_environment.py")
+        self.assertNotIn("no joint states", run.stdout)
+        other = lockstep("--seed", 4, SCRIPTS / "pause_environment.py")
+        self.assertNotEqual(self.check(other), run.stdout)
+
+    def test_polling_a_link(self):
+        self.assertGreater(len(self.twice("poll_link_state.py").stdout.splitlines()), 20)
+
+    def test_a_timer_a_callback_and_a_lock(self):
+        lines = self.twice("timer_class.py").stdout.splitlines()
+        self.assertEqual(len(lines), 200)
+        self.check_50_hz(lines)
+
+    def test_a_trajectory_client(self):
+        out = self.twice("trajectory_client.py").stdout
+        self.assertEqual(out.count("True 3 "), 3, out)
+
+    def test_a_thread_that_sleeps_is_told_of_once(self):
+        run = self.twice("sleeping_thread.py")
+        self.assertEqual(run.stderr.count("thread 'heart' sleeps by time.sleep"), 1, run.stderr)
+
+    @unittest.skipUnless(
+        importlib.util.find_spec("stable_baselines3"), "./ws extras isn't installed"
+    )
+    def test_an_environment_that_sleeps_trains_with_stable_baselines3(self):
+        one = self.twice("gym_sleep.py", 256).stdout.splitlines()[-1]
+        other = lockstep("--seed", 4, SCRIPTS / "gym_sleep.py", 256)
+        self.assertNotEqual(self.check(other).splitlines()[-1].split()[0], one.split()[0])
+
+    def test_a_thread_with_a_rate_is_under_the_clock(self):
+        script = HEAD + (
+            "seen = []\n"
+            "def work():\n"
+            "    rate = rospy.Rate(100)\n"
+            "    for _ in range(10):\n"
+            "        seen.append(rospy.get_time())\n"
+            "        rate.sleep()\n"
+            "thread = threading.Thread(target=work)\nthread.start()\n"
+            "for _ in range(4):\n    time.sleep(0.025)\n    seen.append(rospy.get_time())\n"
+            "thread.join()\nprint(*seen)\n"
+        )
+        seen = [float(each) for each in self.check(lockstep(written(script))).split()]
+        self.assertEqual(len(seen), 14)
+        self.assertEqual(seen, sorted(seen))
+        expected = [n / 100 for n in range(10)] + [n * 0.025 for n in range(1, 5)]
+        for one, two in zip(seen, sorted(expected), strict=True):
+            self.assertAlmostEqual(one, two, 6)
+
+    def test_the_wall_clock_may_be_simulated(self):
+        script = written(
+            HEAD + "from time import monotonic, perf_counter, sleep, time\n"
+            "before = time(), monotonic(), perf_counter()\nsleep(25.0)\n"
+            "after = time(), monotonic(), perf_counter()\n"
+            "print(*(round(two - one, 6) for one, two in zip(before, after)))\n"
+        )
+        out = self.check(lockstep("--virtual-wall-clock", script))
+        self.assertEqual(out.split(), ["25.0"] * 3)
+        self.assertNotIn("25.0", self.check(lockstep(script)))
+
+    def test_scripts_that_were_cut_off_leave_the_world_to_the_next(self):
+        endless = written(
+            HEAD
+            + "while not rospy.is_shutdown():\n    time.sleep(0.5)\n    print('on', flush=True)\n"
+        )
+        for cut_off in ("closed", "killed"):
+            process = subprocess.Popen(
+                ["rosrun", "cartpole", "lockstep.py", str(endless)],
+                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+            )  # fmt: skip
+            self.assertEqual(process.stdout.readline(), "on\n")
+            if cut_off == "killed":
+                process.kill()
+            process.stdout.close()
+            self.assertNotEqual(process.wait(BOUND), 0)
+            self.check(lockstep(SCRIPTS / "rate_loop.py"))
+
+    def test_two_scripts_at_once_share_the_time(self):
+        text = HEAD.replace("reset_simulation", "unpause_physics") + (
+            "for _ in range(50):\n    before = rospy.get_time()\n    time.sleep(0.02)\n"
+            "    assert rospy.get_time() - before > 0.0199\nprint('done')\n"
+        )
+        scripts = [written(text.replace('"script"', f'"script_{n}"')) for n in range(2)]
+        processes = [
+            subprocess.Popen(
+                ["rosrun", "cartpole", "lockstep.py", str(each)],
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            )
+            for each in scripts
+        ]  # fmt: skip
+        for process in processes:
+            out, err = process.communicate(timeout=BOUND)
+            self.assertEqual((process.returncode, out), (0, "done\n"), err)
+
+    def test_a_command_is_a_control_period_where_nobody_waits(self):
+        out = self.check(lockstep(written(HEAD + COMMANDS)))
+        self.assertEqual(out.split(), ["0.0", "0.016", "0.024", "0.032", "0.04"])
+        out = self.check(lockstep("--dt", 0.002, written(HEAD + COMMANDS)))
+        self.assertEqual(out.split(), ["0.0", "0.004", "0.006", "0.008", "0.01"])
+
+    def test_other_triggers_and_none(self):
+        script = written(HEAD + COMMANDS)
+        self.assertEqual(set(self.check(lockstep("--step-on", "none", script)).split()), {"0.0"})
+        asks = HEAD + (
+            "from gazebo_msgs.srv import GetWorldProperties\n"
+            "ask = rospy.ServiceProxy('/gazebo/get_world_properties', GetWorldProperties)\n"
+            "for step in range(3):\n    print(ask().sim_time)\n"
+        )
+        out = self.check(lockstep("--step-on", "/gazebo/get_world_properties", written(asks)))
+        self.assertEqual(out.split(), ["0.0", "0.008", "0.016"])
+
+    def test_a_paused_world_stands_still_and_holds_nobody_up(self):
+        script = (
+            HEAD + "pause()\nfor _ in range(5):\n    time.sleep(100.0)\nprint(rospy.get_time())\n"
+        )
+        self.assertEqual(self.check(lockstep(written(script))), "0.0\n")
+
+    def test_the_script_is_as_without_us(self):
+        script = written(
+            "import os, sys\nprint(__name__, sys.argv[1:], os.getcwd(), os.path.basename(__file__))\n"
+            "sys.exit(7)\n"
+        )
+        run = lockstep(script, "--seed", "5", cwd=script.parent)
+        self.assertEqual(run.returncode, 7)
+        self.assertEqual(run.stdout, f"__main__ ['--seed', '5'] {script.parent} {script.name}\n")
+        run = lockstep(written("def fails():\n    raise ValueError('why')\nfails()\n"))
+        self.assertEqual(run.returncode, 1)
+        self.assertIn("ValueError: why", run.stderr)
+        self.assertNotIn("lockstep_runner", run.stderr)
+
+    def test_ctrl_c_in_a_sleep(self):
+        script = written(
+            HEAD + "print('ready', flush=True)\n"
+            "while not rospy.is_shutdown():\n    time.sleep(0.5)\n"
+        )
+        process = subprocess.Popen(
+            ["rosrun", "cartpole", "lockstep.py", str(script)],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        self.assertEqual(process.stdout.readline(), "ready\n")
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=BOUND)
+        self.assertNotEqual(process.returncode, None)
+        self.check(lockstep(SCRIPTS / "rate_loop.py"))  # the world goes on
+
+    def test_bad_input(self):
+        run = lockstep("no_such_script.py")
+        self.assertEqual((run.returncode, run.stderr.count("\n")), (2, 1), run.stderr)
+        run = lockstep(written("print 'two'\n"))
+        self.assertEqual(run.returncode, 2)
+        self.assertIn("Python 2", run.stderr)
+        run = lockstep("--dt", 0.0085, written(HEAD))
+        self.assertEqual(run.returncode, 2, run.stderr)
+        self.assertIn("0.0085", run.stderr)
+        self.assertIn("0.001", run.stderr)
+        run = lockstep("--step-on", "/no/such/topic", written(HEAD + COMMANDS))
+        self.assertIn("/no/such/topic", run.stderr)
+        self.check(run)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("PYTHONUNBUFFERED", "1")
+    sys.exit(rostest.rosrun("cartpole", "scripts", LockstepTest))

@@ -1,0 +1,99 @@
+"""lockstep.py's command line."""
+
+import os
+
+import pytest
+
+from lockstep_runner.launcher import _parse, main
+from lockstep_runner.script.seeds import AfterImport, seed_everything
+
+
+@pytest.mark.parametrize(
+    ("given", "triggers", "script", "arguments"),
+    [
+        (["a.py", "--seed", "5"], None, "a.py", ["--seed", "5"]),
+        (["--step-on", "/t", "a.py", "x"], ["/t"], "a.py", ["x"]),
+        (
+            ["--step-on", "/t", "/s", "a.py", "--step-on", "x"],
+            ["/t", "/s"],
+            "a.py",
+            ["--step-on", "x"],
+        ),
+        (["--step-on", "none", "--seed", "3", "a.py"], ["none"], "a.py", []),
+        (["--step-on", "/t", "--step-on", "/s", "--dt", "0.002", "a.py"], ["/t", "/s"], "a.py", []),
+        (["--step-on=/t", "a.py", "__name:=x"], ["/t"], "a.py", ["__name:=x"]),
+        (["--", "a.py", "--dt"], None, "a.py", ["--dt"]),
+    ],
+)
+def test_options_end_where_the_script_begins(given, triggers, script, arguments):
+    args = _parse(given)
+    assert (args.step_on, args.script, args.arguments) == (triggers, script, arguments)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [[], ["--seed", "-1", "a.py"], ["--seed", "x", "a.py"], ["--dt", "0", "a.py"], ["--dt", "nan", "a.py"],
+     ["--dt", "inf", "a.py"], ["--step-on", "--seed", "1", "a.py"], ["--nonsense", "a.py"]],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused(given, capsys):
+    with pytest.raises(SystemExit) as ended:
+        _parse(given)
+    assert ended.value.code == 2
+    assert "lockstep.py: error:" in capsys.readouterr().err
+
+
+def test_no_such_script_is_one_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(os, "environ", {**os.environ})
+    assert main([str(tmp_path / "none.py")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_seeds_reach_every_generator(monkeypatch):
+    import random
+    import secrets
+
+    import gymnasium
+    import numpy
+    import torch
+
+    def drawn():
+        return (
+            random.random(),
+            numpy.random.random(),
+            numpy.random.default_rng().random(),
+            gymnasium.utils.seeding.np_random()[0].random(),
+            torch.rand(1).item(),
+        )
+
+    monkeypatch.setattr(numpy.random.bit_generator, "randbits", secrets.randbits)
+    states = random.getstate(), numpy.random.get_state(), torch.get_rng_state()
+    try:
+        seed_everything(5)
+        one = drawn()
+        seed_everything(5)
+        assert drawn() == one
+        seed_everything(6)
+        assert drawn() != one
+    finally:
+        random.setstate(states[0])
+        numpy.random.set_state(states[1])
+        torch.set_rng_state(states[2])
+
+
+def test_what_is_imported_later_is_seen_to_once(tmp_path, monkeypatch):
+    import sys
+
+    (tmp_path / "imported_later.py").write_text("value = 1\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    seen = []
+    monkeypatch.setattr(
+        sys, "meta_path", [AfterImport("imported_later", seen.append), *sys.meta_path]
+    )
+    import imported_later
+
+    assert seen == [imported_later]
+    sys.modules.pop("imported_later")
+    import imported_later as again
+
+    assert again is not imported_later and len(seen) == 1
+    sys.modules.pop("imported_later")

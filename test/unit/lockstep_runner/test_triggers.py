@@ -1,0 +1,104 @@
+"""When time passes for scripts that don't wait by themselves."""
+
+from lockstep_runner.triggers import Triggers
+
+
+class Script:
+    """Counts the periods that pass while a script publishes and waits."""
+
+    def __init__(self, names=None):
+        self.triggers = Triggers(names)
+        self.periods = 0
+
+    def publish(self, *topics, command=True):
+        for topic in topics:
+            for decide in (self.triggers.before, self.triggers.after):
+                if decide(topic, command):
+                    self.periods += 1
+                    self.triggers.passed()
+        return self.periods
+
+    def call(self, service):
+        if self.triggers.called(service):
+            self.periods += 1
+        return self.periods
+
+    def poll(self, what, times=1, often=3):
+        for _ in range(times):
+            if self.triggers.polled(what, often, b""):
+                self.periods += 1
+                self.triggers.passed()
+        return self.periods
+
+
+def test_one_topic_lets_a_period_pass_with_each_message_from_the_second_on():
+    script = Script()
+    # The first one's is made up for
+    assert [script.publish("/a") for _ in range(4)] == [0, 2, 3, 4]
+
+
+def test_several_joints_are_one_round():
+    script = Script()
+    assert [script.publish("/a", "/b", "/c") for _ in range(4)] == [0, 2, 3, 4]
+
+
+def test_the_period_passes_behind_the_last_of_a_round():
+    script = Script()
+    script.publish("/a", "/b", "/a", "/b")
+    before = script.periods
+    assert script.publish("/a") == before
+    assert script.publish("/b") == before + 1
+
+
+def test_a_script_that_waits_by_itself_gets_none():
+    script = Script()
+    for _ in range(5):
+        script.publish("/a")
+        script.triggers.waited()
+    assert script.periods == 0
+
+
+def test_a_script_that_waits_no_longer_gets_them():
+    script = Script()
+    for _ in range(5):
+        script.publish("/a")
+        script.triggers.waited()
+    assert [script.publish("/a") for _ in range(4)] == [0, 2, 3, 4]
+
+
+def test_what_is_no_command_lets_no_time_pass():
+    script = Script()
+    assert [script.publish("/chatter", command=False) for _ in range(3)] == [0, 0, 0]
+
+
+def test_names_that_were_given_are_the_only_ones():
+    script = Script(["/b", "/ask", "/never"])
+    assert script.publish("/a", "/a", "/a") == 0
+    assert script.publish("/b", command=False) == 1
+    assert script.call("/other") == 1
+    assert script.call("/ask") == 2
+    assert script.poll("/ask", times=100) == 2
+    assert script.triggers.unused() == ["/never"]
+
+
+def test_none_switches_them_off():
+    script = Script([])
+    assert script.publish(*["/a"] * 5) == 0
+    assert script.poll("/ask", times=100) == 0
+    assert script.triggers.unused() == []
+
+
+def test_polling_lets_time_pass_once_it_is_known_as_such():
+    script = Script()
+    assert script.poll("/ask", times=3) == 0
+    assert script.poll("/ask") == 1  # the fourth in a row
+    assert script.poll("/ask") == 1  # the state after it
+    assert script.poll("/ask") == 2  # from now on the second look is one too many
+
+
+def test_a_command_in_between_is_no_polling():
+    script = Script()
+    for _ in range(20):
+        script.poll("/ask", times=2)
+        script.publish("/chatter", command=False)
+    assert script.periods == 0
