@@ -121,22 +121,34 @@ def test_tests_that_could_not_run_are_a_failure(ci):
 # --- the workflow of the public CI ------------------------------------------------------------
 
 KEYS = {"runs-on", "container", "timeout-minutes", "steps"}
-ACTIONS = {"actions/checkout@v4": set(), "actions/setup-python@v5": {"python-version"}}
+ACTIONS = {
+    "actions/checkout@v4": set(),
+    "actions/setup-python@v5": {"python-version"},
+    "actions/upload-artifact@v4": {"name", "path", "include-hidden-files"},
+}
+
+
+WORKFLOWS = sorted((Path(__file__).resolve().parents[3] / ".github/workflows").iterdir())
+
+
+def read(path):
+    return yaml.load(path.read_text(), yaml.BaseLoader)  # `on` is no boolean there
 
 
 @pytest.fixture(scope="module")
 def workflow(root):
-    (path,) = (root / ".github/workflows").iterdir()
-    return yaml.load(path.read_text(), yaml.BaseLoader)  # `on` is no boolean there
+    return read(root / ".github/workflows/ci.yml")
 
 
 def commands(job):
     return [shlex.split(step["run"]) for step in job["steps"] if "run" in step]
 
 
-def test_the_workflow_is_one(workflow):
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_a_workflow_is_one(path):
+    workflow = read(path)
     assert set(workflow) == {"name", "on", "permissions", "jobs"}
-    assert set(workflow["on"]) == {"push", "pull_request"}
+    assert set(workflow["on"]) <= {"push", "pull_request", "schedule", "workflow_dispatch"}
     for job in workflow["jobs"].values():
         assert set(job) <= KEYS and {"runs-on", "timeout-minutes", "steps"} <= set(job)
         assert job["steps"][0] == {"uses": "actions/checkout@v4"}
@@ -144,8 +156,8 @@ def test_the_workflow_is_one(workflow):
             assert ("uses" in step) != ("run" in step)
             if "uses" in step:
                 assert set(step.get("with", {})) <= ACTIONS[step["uses"]]
-                assert set(step) <= {"uses", "with"}
-            assert set(step) <= {"uses", "with", "run", "working-directory"}
+                assert set(step) <= {"uses", "with", "if"}
+            assert set(step) <= {"uses", "with", "if", "run", "working-directory"}
 
 
 def test_the_workflow_has_the_machines_that_are_promised(workflow, root):
