@@ -65,7 +65,8 @@ plan_debian() {
 
 # From apt's own words; fails where it doesn't know one of them.
 sizes_of_debian() {  # package...
-    LC_ALL=C apt-get -o Debug::NoLocking=1 --assume-no --no-install-recommends install "$@" \
+    # It only prints: with --assume-no it would install what needs no question.
+    LC_ALL=C apt-get -o Debug::NoLocking=1 --print-uris --no-install-recommends install "$@" \
         2>/dev/null </dev/null |
         sed -nE 's/.* ([0-9]+) newly installed,.*/\1 packages/p
             s/^Need to get ([0-9.,]+ [kMG]?B).*/\1 to fetch/p
