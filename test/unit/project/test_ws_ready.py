@@ -13,7 +13,7 @@ TOOLS = {
     "dpkg-query": 'cat "$STATE_FILE"\n',
     "apt-get": """
 case $* in
-*--assume-no*)
+*--print-uris*)
     echo "0 upgraded, 12 newly installed, 0 to remove and 3 not upgraded."
     echo "Need to get 34.5 MB of archives."
     echo "After this operation, 120 MB of additional disk space will be used." ;;
