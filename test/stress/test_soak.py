@@ -80,3 +80,19 @@ def test_spawns(scenario: Scenario, engine: str) -> None:
         assert here.models() == ["ground_plane"]
         here.check_time()
         steady(row, here, before)
+
+
+@pytest.mark.stress(full=True)
+def test_robots_with_controllers(scenario: Scenario) -> None:
+    """With topics and services of their own."""
+    with world("ode") as here, here.active():
+
+        def case(number: int, dice: random.Random) -> None:
+            bring_up.bring_up(ROBOT, lambda text: None)
+            answer = here.delete(ROBOT.model)
+            assert answer.success, answer.status_message
+
+        settled(scenario, 500, case)
+        before = here.usage()
+        row = scenario.run("robots with controllers, spawned and deleted", 500, case)
+        steady(row, here, before)

@@ -39,6 +39,7 @@ from bullet_gazebo.ros.wire.rospy_patches import (
     Reception,
     bound_calls,
     bound_messages,
+    free_polls_at_once,
     hang_up_on_nonsense,
 )
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
@@ -70,6 +71,7 @@ class GazeboNode:
 
     def _advertise(self, network: bool) -> None:
         WorldControl(self.sim, self._watchdog).offer()
+        free_polls_at_once()
         bound_messages()
         bound_calls()
         Reception.open()

@@ -8,6 +8,7 @@ needed with rospy 1.15.15 (Debian 12), and are held by the test that is named.
 - `bound_messages`: whatever size a client claims is read into memory (test_connections.py)
 - `bound_calls`: the same for XML-RPC; clients that say nothing there keep a thread each for ever (the same)
 - `hang_up_on_nonsense`: a client whose request can't be read waits for ever (gazebo_clients.test)
+- `free_polls_at_once`: file descriptors of topics that are gone pile up (test_rospy_patches.py)
 - `answer_xmlrpc`: a node can't answer one XML-RPC call more (gazebo_ros.test, `gz`)
 - `stop_hearing_clock`: who makes /clock hears it over a socket to itself (gazebo_parameters.test)
 - `wait_until_sent`: what was published just before a topic is closed is thrown away (test_rospy_patches.py)
@@ -25,6 +26,7 @@ import errno
 import io
 import os
 import resource
+import select
 import socket
 import struct
 import threading
@@ -45,7 +47,7 @@ from rospy.impl.masterslave import ROSHandler
 from rospy.impl.tcpros_base import TCPROSTransport, TCPROSTransportProtocol
 from rospy.impl.tcpros_pubsub import QueuedConnection
 from rospy.impl.tcpros_service import ServiceImpl
-from rospy.topics import _PublisherImpl, _SubscriberImpl, _TopicImpl
+from rospy.topics import Poller, _PublisherImpl, _SubscriberImpl, _TopicImpl
 
 Address = tuple[str, int]
 LENGTH = struct.Struct("<I")  # in front of all that ROS sends
@@ -231,6 +233,21 @@ def hang_up_on_nonsense() -> None:
             transport.close()
 
     ServiceImpl.handle = guarded
+
+
+def free_polls_at_once() -> None:
+    """Has what a topic polls its connections with closed together with the topic.
+
+    rospy's refers to itself, so its file descriptor stays until some later collection of garbage: robots with
+    controllers that come and go leave dozens.
+    """
+
+    def make(poller: Poller) -> None:
+        poller.poller = select.epoll()
+
+    Poller.__init__ = make
+    Poller.add_fd, Poller.remove_fd = Poller.add_epoll, Poller.remove_epoll
+    Poller.error_iter = Poller.error_epoll_iter
 
 
 def answer_xmlrpc(method: str, answer: Callable[..., tuple[int, str, Any]]) -> None:

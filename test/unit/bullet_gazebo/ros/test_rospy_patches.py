@@ -1,14 +1,20 @@
-"""What is published just before a topic is closed is sent."""
+"""What is published just before a topic is closed is sent; a topic that is gone leaves no file open."""
 
 from __future__ import annotations
 
+import gc
+import os
+import socket
 import threading
 import time
+from collections.abc import Iterator
 from types import SimpleNamespace
 
+import pytest
+import rospy.topics
 from rospy.impl.tcpros_pubsub import QueuedConnection
 
-from bullet_gazebo.ros.wire.rospy_patches import wait_until_sent
+from bullet_gazebo.ros.wire.rospy_patches import free_polls_at_once, wait_until_sent
 
 
 class SlowTransport:
@@ -63,3 +69,33 @@ def test_a_client_that_does_not_read_holds_nobody_up() -> None:
 
 def test_without_clients_there_is_nothing_to_wait_for() -> None:
     wait_until_sent(publisher())
+
+
+@pytest.fixture
+def no_collection() -> Iterator[None]:
+    """What refers to itself stays, as it may for long."""
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.mark.usefixtures("no_collection")
+def test_a_topic_that_is_gone_leaves_no_file_open(monkeypatch) -> None:
+    class Poller(rospy.topics.Poller):
+        """One of its own, to be changed."""
+
+    monkeypatch.setattr("bullet_gazebo.ros.wire.rospy_patches.Poller", Poller)
+    free_polls_at_once()
+    before = os.listdir("/proc/self/fd")
+    for _ in range(20):
+        poller = Poller()
+    one, other = socket.socketpair()
+    with one:
+        poller.add_fd(one.fileno())
+        assert list(poller.error_iter()) == []
+        other.close()
+        assert list(poller.error_iter()) == [one.fileno()]
+        poller.remove_fd(one.fileno())
+        assert list(poller.error_iter()) == []
+    del poller
+    assert len(os.listdir("/proc/self/fd")) == len(before)
