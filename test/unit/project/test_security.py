@@ -22,6 +22,8 @@ DANGEROUS = {
     "eval", "exec", "compile", "os.system", "os.popen", "pickle.load", "pickle.loads", "yaml.load",
     "marshal.load", "marshal.loads", "shelve.open", "joblib.load", "cloudpickle.load", "dill.load",
 }  # fmt: skip
+# The launcher runs the script that its user names, as `python3 script.py` does.
+RUNS_A_SCRIPT = {("src/lockstep_runner/script/running.py", name) for name in ("compile", "exec")}
 MODEL = '<sdf version="1.6"><model name="m">{}</model></sdf>'
 INCLUDE = "<include><uri>{}</uri></include>"
 MESH = """<link name="l"><collision name="c"><geometry><mesh><uri>{}</uri></mesh></geometry></collision>
@@ -44,7 +46,8 @@ def test_no_file_is_run_as_code() -> None:
     for path in MODULES:
         for name, call in calls(path):
             options = {each.arg: ast.unparse(each.value) for each in call.keywords}
-            assert name not in DANGEROUS, f"{path}:{call.lineno}"
+            if (str(path.relative_to(ROOT)), name) not in RUNS_A_SCRIPT:
+                assert name not in DANGEROUS, f"{path}:{call.lineno}"
             assert options.get("shell", "False") == "False", f"{path}:{call.lineno}"
             if name == "torch.load":
                 assert options["weights_only"] == "True", f"{path}:{call.lineno}"

@@ -1,7 +1,6 @@
 """ServiceClient against services that hang, fail, end and come back, under another master."""
 
 import math
-import os
 import signal
 import threading
 import time
@@ -193,7 +192,7 @@ def test_without_a_limit_an_answer_may_come_late(offer, client):
 
 def test_ctrl_c_ends_a_call_and_the_connection(offer, client):
     def interrupt(request):
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
         service.over.wait()
 
     service = offer(interrupt)

@@ -1,7 +1,6 @@
 """Waits end: with what is waited for, in time, or with the node; Ctrl-C goes through."""
 
 import math
-import os
 import signal
 import socket
 import threading
@@ -59,7 +58,7 @@ def test_a_shutdown_ends_a_wait(monkeypatch):
 
 def test_ctrl_c_ends_a_wait():
     with pytest.raises(KeyboardInterrupt):
-        wait_until(lambda: os.kill(os.getpid(), signal.SIGINT), BOUND, "it")
+        wait_until(lambda: signal.raise_signal(signal.SIGINT), BOUND, "it")
 
 
 def test_a_service_that_comes_up_is_called(master):

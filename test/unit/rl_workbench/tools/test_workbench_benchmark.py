@@ -288,7 +288,7 @@ def test_ctrl_c_while_policies_are_played(tmp_path: Path, monkeypatch) -> None:
     assert cli.main(command) == 0
     (tmp_path / "results.md").unlink()
     monkeypatch.setattr(
-        benchmarking, "examine", lambda *_, **__: os.kill(os.getpid(), signal.SIGINT)
+        benchmarking, "examine", lambda *_, **__: signal.raise_signal(signal.SIGINT)
     )
     assert cli.main(command) == 130
     assert not (tmp_path / "results.md").exists()

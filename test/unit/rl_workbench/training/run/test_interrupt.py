@@ -1,6 +1,5 @@
 """Ctrl-C: at once while starting, at the next step while training."""
 
-import os
 import signal
 
 import pytest
@@ -15,7 +14,7 @@ def interrupt(signals) -> Interrupt:
 
 def test_while_starting_it_ends_any_wait(interrupt: Interrupt) -> None:
     with pytest.raises(KeyboardInterrupt):
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
     assert interrupt.exit_code == 130
 
 
@@ -24,7 +23,7 @@ def test_while_training_it_is_only_noted_however_often(interrupt: Interrupt) -> 
     assert not interrupt.requested()
     assert interrupt.exit_code == 0
     for _ in range(3):
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
     assert interrupt.requested()
     assert interrupt.exit_code == 130
 
@@ -33,12 +32,12 @@ def test_after_training_it_ends_any_wait_again(interrupt: Interrupt) -> None:
     interrupt.defer()
     interrupt.at_once()
     with pytest.raises(KeyboardInterrupt):
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
 
 
 def test_one_that_was_deferred_is_not_forgotten(interrupt: Interrupt) -> None:
     interrupt.defer()
-    os.kill(os.getpid(), signal.SIGINT)
+    signal.raise_signal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
         interrupt.at_once()
 
@@ -48,12 +47,12 @@ def test_other_signals_have_codes_of_their_own(
     interrupt: Interrupt, number: int, code: int
 ) -> None:
     interrupt.defer()
-    os.kill(os.getpid(), number)
+    signal.raise_signal(number)
     assert interrupt.requested() and interrupt.exit_code == code
 
 
 def test_a_closed_terminal_that_is_to_be_ignored_is_ignored(signals) -> None:
     signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
     interrupt = Interrupt().install()
-    os.kill(os.getpid(), signal.SIGHUP)
+    signal.raise_signal(signal.SIGHUP)
     assert not interrupt.requested()
