@@ -7,6 +7,7 @@ Each holds everything; `last.pt` is the newest, `best.pt` the one of the best ev
 """
 
 import contextlib
+import errno
 import os
 import pickle
 import shutil
@@ -31,7 +32,7 @@ _MISFITS = (LookupError, TypeError, ValueError, RuntimeError, AttributeError, Ar
 
 
 class Checkpoints:
-    """Writes the checkpoints of one run.
+    """Writes the checkpoints of one run, while its folder is the one in which the run began.
 
     Args:
         run: the run's folder.
@@ -41,13 +42,32 @@ class Checkpoints:
     def __init__(self, run: Path, keep: int) -> None:
         self._run = run
         self._keep = keep
+        self._place = run.stat()
+
+    def are_in_place(self) -> bool:
+        """Whether the folder is still where it was."""
+        try:
+            return os.path.samestat(self._run.stat(), self._place)
+        except FileNotFoundError:
+            return False
+
+    def check_place(self) -> None:
+        """Another run may lie there by now, which is not to be written over.
+
+        Raises:
+            OSError: if the folder isn't the one in which the training began.
+        """
+        if not self.are_in_place():
+            moved = "the folder was moved or removed"
+            raise FileNotFoundError(errno.ENOENT, moved, str(self._run))
 
     def save(self, step: int, content: dict[str, Any], best: bool = False) -> None:
         """Writes a checkpoint, and makes it the last one and, if so told, the best one.
 
         Raises:
-            OSError: if the disk refuses; the earlier checkpoints are untouched.
+            OSError: if the disk refuses, or it is another folder; the earlier checkpoints are untouched.
         """
+        self.check_place()
         path = self._run / FOLDER / f"step_{step:09d}.pt"
         path.parent.mkdir(exist_ok=True)
         save_tensors(path, {"format": FORMAT, **content})
@@ -66,6 +86,7 @@ class Checkpoints:
         """
         path = self._run / FAILURE
         with contextlib.suppress(OSError):  # a full disk may well be the failure
+            self.check_place()
             save_tensors(path, {"format": FORMAT, **content})
 
     def remove_leftovers(self) -> None:

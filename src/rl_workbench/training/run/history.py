@@ -1,11 +1,15 @@
 """What a training has seen so far, as its record and its checkpoints hold it."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
 import torch
 
 from rl_workbench.states import array, number, sequence, whole
+from rl_workbench.training.options.run_options import RunOptions
+
+WINDOW = 20  # [episodes] over which a mean length counts
 
 
 @dataclass
@@ -22,6 +26,34 @@ class History:
     def steps(self) -> int:
         """Of all finished episodes."""
         return sum(self.lengths)
+
+    @property
+    def best_return(self) -> float:
+        """The mean return of the best evaluation; minus infinity before the first."""
+        return self.best[1] if self.best else -math.inf
+
+    def was_evaluated(self, steps: int) -> bool:
+        """Whether the last evaluation was at this step."""
+        return bool(self.evaluations) and self.evaluations[-1][0] == steps
+
+    def is_complete(self, run: RunOptions, steps: int) -> bool:
+        """Whether what the user asked for is reached.
+
+        Args:
+            run: what they asked for.
+            steps: done so far, those of an unfinished episode included.
+        """
+        recent = self.lengths[-WINDOW:]
+        return (
+            bool(run.total_timesteps and steps >= run.total_timesteps)
+            or bool(run.episodes and len(self.returns) >= run.episodes)
+            or (run.stop_at_return is not None and self.best_return >= run.stop_at_return)
+            or (
+                bool(run.stop_at_length)
+                and len(recent) == WINDOW
+                and sum(recent) >= run.stop_at_length * WINDOW
+            )
+        )
 
     def state_dict(self) -> dict[str, Any]:
         """Plain numbers and tensors."""

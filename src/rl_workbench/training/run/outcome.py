@@ -17,10 +17,9 @@ from rl_workbench.training.run.environments import EnvironmentFailure
 from rl_workbench.training.run.evaluator import Evaluation
 from rl_workbench.training.run.files import as_json, write_atomically
 from rl_workbench.training.run.folder import versions
-from rl_workbench.training.run.history import History
+from rl_workbench.training.run.history import WINDOW, History
 from rl_workbench.training.run.progress import tell
 
-WINDOW = 20  # [episodes] over which a mean length counts
 TRACEBACK = "failure.txt"  # of an environment that failed
 LAST = 100  # [episodes] over which the summary reports a mean return
 

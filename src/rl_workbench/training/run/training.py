@@ -1,8 +1,6 @@
 """The frame of every training: open or resume a folder, learn, evaluate, keep the best, save, tell."""
 
 import contextlib
-import errno
-import os
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,7 +18,7 @@ from rl_workbench.training.run.checkpoints import Checkpoints, candidates, fitti
 from rl_workbench.training.run.evaluator import Evaluation, Evaluator
 from rl_workbench.training.run.history import History, evaluation_of
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.outcome import WINDOW, TrainingOutcome, write_traceback
+from rl_workbench.training.run.outcome import TrainingOutcome, write_traceback
 from rl_workbench.training.run.progress import Progress, tell
 from rl_workbench.training.run.random_states import random_states, restore_random_states, seed_all
 from rl_workbench.training.run.scalar_log import ScalarLog
@@ -59,7 +57,6 @@ class Training:
             if self._resumed:
                 self._take_over(self._resumed)
             making.pop_all()
-        self._place = folder.stat()
         self._saved_at = -1  # [steps]
         self._is_written = True  # whatever was to be
         self._evaluation: Evaluation | None = None  # the one at the end
@@ -183,18 +180,7 @@ class Training:
         return self._is_complete() or self._interrupt.requested()
 
     def _is_complete(self) -> bool:
-        run, history = self._run, self._history
-        recent = history.lengths[-WINDOW:]
-        return (
-            bool(run.total_timesteps and self._algorithm.steps >= run.total_timesteps)
-            or bool(run.episodes and len(history.returns) >= run.episodes)
-            or (run.stop_at_return is not None and self._best_return() >= run.stop_at_return)
-            or (
-                bool(run.stop_at_length)
-                and len(recent) == WINDOW
-                and sum(recent) >= run.stop_at_length * WINDOW
-            )
-        )
+        return self._history.is_complete(self._run, self._algorithm.steps)
 
     def episode_done(
         self, total_reward: float, length: int, scalars: Mapping[str, float], note: str = ""
@@ -234,15 +220,10 @@ class Training:
 
     # --- evaluations and checkpoints ------------------------------------------------------------
 
-    def _best_return(self) -> float:
-        return self._history.best[1] if self._history.best else float("-inf")
-
-    def _was_evaluated(self) -> bool:
-        evaluations = self._history.evaluations
-        return bool(evaluations) and evaluations[-1][0] == self._algorithm.steps
-
     def _evaluate_if_due(self) -> None:
-        is_due = self._is_due(self._run.eval_frequency) and not self._was_evaluated()
+        if self._history.was_evaluated(self._algorithm.steps):
+            return
+        is_due = self._is_due(self._run.eval_frequency)
         if is_due and not self._evaluator.waits_for_the_end and self._evaluate(is_last=False):
             self._save(best=True)
 
@@ -252,17 +233,17 @@ class Training:
         The last checkpoint's history doesn't know of it: a training that is prolonged goes on as if
         it had been longer from the beginning, but keeps this `best.pt` until there is a better one.
         """
-        if not self._is_complete() or self._interrupt.requested() or self._was_evaluated():
+        was_evaluated = self._history.was_evaluated(self._algorithm.steps)
+        if not self._is_complete() or self._interrupt.requested() or was_evaluated:
             return
         content = self._content()
         if self._evaluate(is_last=True):
             content[AT_THE_END] = self._history.state_dict()["best"]
-            self._check_place()
             self._checkpoints.save(self._algorithm.steps, content, best=True)
 
     def _evaluate(self, is_last: bool) -> bool:
         """Evaluates the policy and writes it down; returns whether it is the best one so far."""
-        score = self._evaluator.evaluate(self._best_return(), self._shown.say, is_last)
+        score = self._evaluator.evaluate(self._history.best_return, self._shown.say, is_last)
         if score is None:
             return False
         steps, history = self._algorithm.steps, self._history
@@ -270,7 +251,7 @@ class Training:
         mean = score.evaluation.mean_return
         self.log.add(steps, {"eval/mean_reward": mean})
         history.evaluations.append((steps, mean))
-        if score.confirmed <= self._best_return():
+        if score.confirmed <= history.best_return:
             return False
         if self._run.confirm_episodes:
             self.log.add(steps, {"eval/confirmed_reward": score.confirmed})
@@ -285,25 +266,8 @@ class Training:
         """
         steps = self._algorithm.steps
         if steps != self._saved_at or best:
-            self._check_place()
             self._checkpoints.save(steps, self._content(), best)
             self._saved_at = steps
-
-    def _check_place(self) -> None:
-        """Another run may lie there by now, which is not to be written over.
-
-        Raises:
-            OSError: if the folder isn't the one in which the training began.
-        """
-        if not self._is_in_place():
-            moved = "the folder was moved or removed"
-            raise FileNotFoundError(errno.ENOENT, moved, str(self.folder))
-
-    def _is_in_place(self) -> bool:
-        try:
-            return os.path.samestat(self.folder.stat(), self._place)
-        except FileNotFoundError:
-            return False
 
     def _content(self) -> dict[str, Any]:
         return {
@@ -322,7 +286,6 @@ class Training:
             if self._algorithm.settle():
                 self._save()
             else:
-                self._check_place()
                 self._checkpoints.save_failure(self._content())
 
     # --- the end --------------------------------------------------------------------------------
@@ -331,10 +294,10 @@ class Training:
         """Draws and tells; then passes a failure on, unless the user had stopped anyway."""
         outcome = TrainingOutcome(
             self._options, self.folder, self._history, self._algorithm.steps, self._is_complete(),
-            self._interrupt.requested(), self._evaluation, self._is_in_place(),
+            self._interrupt.requested(), self._evaluation, self._checkpoints.are_in_place(),
         )  # fmt: skip
         try:
-            self._check_place()
+            self._checkpoints.check_place()
             self._algorithm.export(self.folder)
             outcome.write(str(failure) if failure else None)
         except (OSError, MemoryError) as error:
