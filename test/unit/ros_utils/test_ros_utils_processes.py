@@ -185,6 +185,32 @@ def test_nothing_is_left_when_the_starter_ends(number):
     wait_until(lambda: not runs(pid))
 
 
+SLOW_TO_END = """
+import pathlib, signal, sys, time
+signal.signal(signal.SIGTERM, lambda *_: (time.sleep(0.5), sys.exit(0)))
+pathlib.Path(sys.argv[1]).write_text("1\\n")
+while True:
+    signal.pause()
+"""
+
+
+@pytest.mark.parametrize("stubborn", [False, True])
+def test_a_launch_whose_caller_was_killed_is_waited_for(place, monkeypatch, stubborn):
+    """Its master is about to end: what is started now must not take it for its own."""
+    program = SLOW_TO_END.replace("0.5", "1000") if stubborn else SLOW_TO_END
+    monkeypatch.setitem(_termination.PATIENCE, "launch", 0.3 if stubborn else BOUND)
+    command = [sys.executable, "-c", program, str(place / "listens")]
+    code = "from ros_utils._internal.processes import processes as p; import signal;"
+    starter = python(f"{code} p.start({command!r}, 'launch', 'slow'); signal.pause()")
+    read_number(place / "listens")
+    (entry,) = _processes.started()
+    assert _processes.end_orphans() and runs(entry.pid), "its caller lives"
+    starter.kill()
+    starter.wait(BOUND)
+    assert _processes.end_orphans() and not runs(entry.pid)
+    assert _processes.started() == []
+
+
 def test_a_program_of_ours_does_not_end_itself(place):
     code = (
         "from ros_utils import ros_node; assert ros_node.ros_kill_all_processes();"

@@ -16,6 +16,7 @@ import shutil
 import signal
 import subprocess
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from types import FrameType
 
@@ -62,10 +63,11 @@ def start(
     token = secrets.token_hex(8)
     log = log_file or (None if screen else _program.log_path(label, token))
     status_file = None
-    full = [*_program.dying_with_caller(), *_program.LISTENING, *command]
+    bound = _program.dying_with_caller()
+    full = [*bound, *_program.LISTENING, *command]
     if window and not log_file and _program.has_window():
         log, status_file = None, _program.log_path(label, token) + ".status"
-        full = _program.in_window(full, label, status_file)
+        full, bound = _program.in_window(full, label, status_file), []
     elif window and not log_file:
         _log.info(
             f"{label}: no display or no xterm, so its output goes to {log or 'this terminal'}"
@@ -73,7 +75,8 @@ def start(
     process = _program.spawn(full, {**_program.environment(token), **(env or {})}, log)
     data = _procfs.stat(process.pid)
     begun = data.start if data else 0  # already over: nothing will ever have start time 0
-    entry = _registry.Entry(process.pid, begun, token, kind, label, _procfs.boot_id(), log)
+    caller = os.getpid() if bound else 0
+    entry = _registry.Entry(process.pid, begun, token, kind, label, _procfs.boot_id(), log, caller)
     handle = _program.Handle(entry, process, status_file)
     with _lock:
         _handles.append(handle)
@@ -102,6 +105,28 @@ def end(entries: Sequence[_registry.Entry]) -> bool:
     with _lock:
         _handles[:] = [handle for handle in _handles if handle.process.poll() is None]
     return gone
+
+
+def end_orphans() -> bool:
+    """Wait until the launches and masters are gone whose caller was killed: the kernel has told them.
+
+    They take some seconds, in which their master still answers whoever starts something. What
+    doesn't end by itself is ended.
+
+    Returns:
+        True if none is left.
+    """
+    orphans = [entry for entry in started() if entry.kind != "node" and _is_orphan(entry)]
+    patience = max((_termination.PATIENCE[entry.kind] for entry in orphans), default=0.0)
+    deadline = time.monotonic() + patience
+    while any(map(_is_orphan, orphans)) and time.monotonic() < deadline:
+        time.sleep(_termination.POLL)
+    return end(orphans)
+
+
+def _is_orphan(entry: _registry.Entry) -> bool:
+    data = _procfs.stat(entry.pid) if entry.caller else None
+    return data is not None and data.start == entry.start and data.parent != entry.caller
 
 
 def _collect(tokens: set[str]) -> bool:

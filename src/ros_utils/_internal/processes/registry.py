@@ -33,6 +33,7 @@ class Entry:
     label: str  # what the user knows it by
     boot: str
     log: str | None = None
+    caller: int = 0  # the process that it is a child of, and whose end the kernel tells it; 0: none
 
 
 def path() -> str:

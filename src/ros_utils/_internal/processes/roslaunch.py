@@ -33,6 +33,7 @@ def start(
         MasterDown: there is no master and roslaunch couldn't start one there.
         CannotStart: roslaunch can't be run.
     """
+    _processes.end_orphans()  # or their master would be taken for one that stays
     _master.is_up_or_startable()
     return _processes.start(
         ["roslaunch", *arguments],
