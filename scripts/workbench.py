@@ -4,11 +4,11 @@
 import sys
 
 if __name__ == "__main__":
-    try:
+    from rl_workbench.starting import ended_by_ctrl_c
+
+    with ended_by_ctrl_c():
         from ros_calls.requirements import ALL, require
 
         require(ALL)
         from cartpole.workbench import main
-    except KeyboardInterrupt:  # Ctrl-C while it is still being read; main() sees to the rest
-        sys.exit(130)
     sys.exit(main())

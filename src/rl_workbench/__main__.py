@@ -2,9 +2,9 @@
 
 import sys
 
-try:
+from rl_workbench.starting import ended_by_ctrl_c
+
+with ended_by_ctrl_c():  # main() sees to the rest
     from rl_workbench.cli import main
-except KeyboardInterrupt:  # Ctrl-C while it is still being read; main() sees to the rest
-    sys.exit(130)
 
 sys.exit(main())

@@ -9,8 +9,10 @@ import random
 import resource
 import shlex
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from multiprocessing import connection
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,8 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "reinforce-document": {"episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
     "ppo": {"total_timesteps": 5000, "eval_frequency": 1000, "checkpoint_frequency": 250},
 }
+# Every start of a process reads the exit codes of all that have ended, and each can be read once.
+_ONE_AT_A_TIME = threading.Lock()
 _ANYWHERE = {"env_id": "CartPole-v1", "env_kwargs": None}
 IMPORTED = [
     "rl_workbench.training.cli",
@@ -58,10 +62,12 @@ class Forked:
         folder.mkdir(parents=True, exist_ok=True)
         self.log = folder / "output.txt"
         self._arguments = arguments
-        self._process = _forking().Process(
+        context = _forking()
+        self._process = context.Process(
             target=_command, args=(arguments, folder, self.log, dict(limits or {})), daemon=True
         )
-        self._process.start()
+        with _ONE_AT_A_TIME:
+            self._process.start()
 
     @property
     def pid(self) -> int:
@@ -75,20 +81,25 @@ class Forked:
         return self.log.read_text(errors="replace") if self.log.exists() else ""
 
     def is_running(self) -> bool:
-        return self._process.is_alive()
+        return self._code(0) is None
 
     def kill(self) -> bool:
         """Ends it by SIGKILL; returns whether it was under way still."""
         self._process.kill()
-        self._process.join(BOUND)
-        return self._process.exitcode == -9
+        return self._code(BOUND) == -9
 
     def code(self) -> int:
         """Waits for its end; returns the exit code."""
-        self._process.join(BOUND)
+        code = self._code(BOUND)
         told = f"{shlex.join(self._arguments)}\n{self.output[-3000:]}"
-        assert self._process.exitcode is not None, f"no end after {BOUND:.0f} s: {told}"
-        return self._process.exitcode
+        assert code is not None, f"no end after {BOUND:.0f} s: {told}"
+        return code
+
+    def _code(self, bound: float) -> int | None:
+        """The exit code, or None if it still runs after `bound` [s]."""
+        connection.wait([self._process.sentinel], bound)
+        with _ONE_AT_A_TIME:
+            return self._process.exitcode
 
     def ended(self, *codes: int) -> str:
         """Waits for an end with one of these codes and without a traceback; returns what it said."""
