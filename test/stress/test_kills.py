@@ -100,4 +100,4 @@ def test_killed_over_ros(scenario: Scenario) -> None:
                 assert_same_run(unharmed.run, here.run)
                 assert_no_doubles(here.run)
 
-        scenario.run("kill -9 over ROS, resumed", 9, case)
+        scenario.run("kill -9 over ROS, resumed", 50, case, lanes=2)
