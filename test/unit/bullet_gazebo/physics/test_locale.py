@@ -44,8 +44,8 @@ def test_a_decimal_comma_moves_no_robot_otherwise(tmp_path, engine):
     texts = {}
     for name, sign in (("C", "."), (NAME, ",")):
         done = subprocess.run(
-            [sys.executable, "-c", PROGRAM, name, engine, str(tmp_path)], check=False, cwd=tmp_path, text=True,
-            env={**os.environ, "LOCPATH": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)},
+            [sys.executable, "-c", PROGRAM, name, engine, str(tmp_path)], check=False, text=True,
+            cwd=tmp_path, env={**os.environ, "LOCPATH": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)},
             capture_output=True,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr

@@ -281,7 +281,8 @@ def test_the_manual_names_the_limits_that_there_are(root):
     told = {name.strip(" `"): float(figure) for name, figure in rows}
     assert told == {
         "MAX_BYTES": limits.MAX_BYTES, "MAX_ELEMENTS": limits.MAX_ELEMENTS, "MAX_DEPTH": MAX_DEPTH,
-        "MAX_FILES": limits.MAX_FILES, "MAX_MESH_BYTES": limits.MAX_MESH_BYTES, "MAX_MODELS": limits.MAX_MODELS, "MAX_NESTING": MAX_NESTING,
+        "MAX_FILES": limits.MAX_FILES,
+        "MAX_MESH_BYTES": limits.MAX_MESH_BYTES, "MAX_MODELS": limits.MAX_MODELS, "MAX_NESTING": MAX_NESTING,
         "MAX_LINKS": MAX_LINKS, "MAX_SECONDS": limits.MAX_SECONDS, "MAX_VALUES": yaml_text.MAX_VALUES,
     }  # fmt: skip
     text = "\n".join(lines)
