@@ -45,8 +45,8 @@ def test_a_decimal_comma_moves_no_robot_otherwise(tmp_path, engine):
     for name, sign in (("C", "."), (NAME, ",")):
         done = subprocess.run(
             [sys.executable, "-c", PROGRAM, name, engine, str(tmp_path)], check=False, text=True,
-            cwd=tmp_path, env={**os.environ, "LOCPATH": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)},
-            capture_output=True,
+            env={**os.environ, "LOCPATH": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)},
+            cwd=tmp_path, capture_output=True,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
         assert done.stderr.splitlines()[0] == sign
