@@ -31,8 +31,8 @@ if ! is_plain "$ROOT"; then
 fi
 SYSTEM_PYTHON=/usr/bin/python3  # rospy is Debian's, so is the interpreter, whatever PATH says
 
-# A port of this checkout's own for the master, so that two checkouts don't meet.
-DEFAULT_MASTER=http://127.0.0.1:$((20000 + CHECKSUM % 10000))
+# A port of this user and checkout for the master, so that neither two users nor two checkouts meet.
+DEFAULT_MASTER=http://127.0.0.1:$((20000 + (CHECKSUM + UID) % 10000))
 
 # shellcheck source=tools/ws_place.sh
 source "$ROOT/tools/ws_place.sh"
@@ -72,7 +72,7 @@ package and companions/. What is ready is not made again. Logs are in .ws/log.
 Apart from Debian's packages everything lies in $CHECKOUT/.ws.
 Where that can't be written, it lies in ~/.cache/cartpole; CARTPOLE_WS_DIR names another folder.
 
-ROS talks over loopback only, to a master on this checkout's own port: $DEFAULT_MASTER
+ROS talks over loopback only, to a master on a port of this user and checkout: $DEFAULT_MASTER
 Set ROS_MASTER_URI, ROS_IP or ROS_HOSTNAME to use another master or network.
 Packages on the caller's ROS_PACKAGE_PATH and in catkin workspaces that the caller has sourced are
 found, and go before the companions of the same name; only cartpole, gazebo_ros and

@@ -75,6 +75,17 @@ def test_missing_package_without_root_or_sudo(foreign):
 
 
 @only_root
+def test_two_users_of_one_checkout_have_masters_of_their_own(foreign):
+    """Or one's training would move the other one's robot."""
+    ours = subprocess.run(
+        [foreign / "checkout/ws", "--help"], check=True, capture_output=True, text=True
+    ).stdout
+    theirs = as_nobody(foreign / "checkout/ws", "--help", HOME=str(foreign / "own")).stdout
+    ports = [re.search(r"http://127.0.0.1:(2\d{4})\b", text)[1] for text in (ours, theirs)]
+    assert ports[0] != ports[1]
+
+
+@only_root
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("variable", "place"), [("HOME", "own/.cache/cartpole"), ("CARTPOLE_WS_DIR", "own")]

@@ -5,14 +5,16 @@ from collections.abc import Callable
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
-from bullet_gazebo.physics.elements import parse_xml, place
+from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, Mesh
+from bullet_gazebo.physics.elements import files_named_by_a_model, parse_xml, place
+from bullet_gazebo.physics.meshes.reader import read_mesh
 from file_reading.content import MAX_BYTES, read_file
 from file_reading.errors import FileError, TooLarge
 from file_reading.xml_parser import MAX_ELEMENTS
 
 # All of it together: the text itself and what it includes, each time that it includes it.
 MAX_FILES = 1000  # different ones
+MAX_MESH_BYTES = 400_000_000  # of different mesh files, which take about twice that of memory
 MAX_MODELS = 5000  # in a world, or nested in a model
 MAX_SECONDS = 60.0  # [s] of computing, however busy the machine is otherwise
 
@@ -24,16 +26,18 @@ def _never() -> bool:
 class Reading:
     """What reading one model or world has taken so far; beyond a limit it ends with LimitExceeded.
 
-    The limits: MAX_BYTES, MAX_ELEMENTS, MAX_FILES, MAX_MODELS and MAX_SECONDS. A file is parsed once,
-    however often it is included; its elements count each time.
+    The limits: MAX_BYTES, MAX_ELEMENTS, MAX_FILES, MAX_MESH_BYTES, MAX_MODELS and MAX_SECONDS. A file is
+    parsed once, however often it is included; its elements count each time. So is a mesh file, by however
+    many models it is named.
     """
 
     def __init__(self, cancelled: Callable[[], bool] = _never) -> None:
         """Made in the thread that reads; it ends as well once `cancelled` returns true."""
         self._cancelled = cancelled
         self._end = time.thread_time() + MAX_SECONDS
-        self._bytes = self._elements = self._models = 0
+        self._bytes = self._elements = self._models = self._mesh_bytes = 0
         self._files: dict[Path, tuple[Element, int]] = {}
+        self._meshes: dict[Path, Mesh] = {}
 
     def parse(self, text: str | bytes) -> Element:
         """Returns the root element of an XML text or a file's content.
@@ -71,6 +75,23 @@ class Reading:
             root = self.parse(data)
             self._files[path] = root, self._elements - before
             return root
+
+    def mesh(self, path: Path) -> Mesh:
+        """Returns what a mesh file holds, which is the same object each time.
+
+        Raises:
+            DescriptionError: if it can't be simulated; the text names it.
+            LimitExceeded: if it is too much.
+        """
+        if path not in self._meshes:
+            with files_named_by_a_model(f"mesh '{path}'"):
+                self._mesh_bytes += path.stat().st_size
+            if self._mesh_bytes > MAX_MESH_BYTES:
+                raise LimitExceeded(
+                    f"mesh '{path}': more than {MAX_MESH_BYTES} bytes of mesh files (MAX_MESH_BYTES)"
+                )
+            self._meshes[path] = read_mesh(path)
+        return self._meshes[path]
 
     def model(self) -> None:
         """Counts one model more.

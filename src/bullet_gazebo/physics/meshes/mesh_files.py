@@ -7,7 +7,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from bullet_gazebo.physics.description import DescriptionError, Mesh
-from bullet_gazebo.physics.meshes.reader import check_mesh, read_mesh
+from bullet_gazebo.physics.meshes.reader import check_mesh
 
 MeshFile = tuple[str, Mesh | None]
 """A file's path, and what it holds if it was read."""
@@ -69,12 +69,12 @@ class Resources:
 
 @dataclass
 class MeshFinder:
-    """Finds and reads the mesh files of one model; those of visuals may be missing, with a warning."""
+    """Finds the mesh files of one model; those of visuals may be missing, with a warning."""
 
     resources: Resources
+    read: Callable[[Path], Mesh]
     folder: Path | None = None
     warnings: list[str] = field(default_factory=list)
-    _read: dict[Path, Mesh] = field(default_factory=dict)
 
     def find(self, uri: str, where: str, needed: bool) -> MeshFile | None:
         """Returns the file's path and what it holds, or None for one that is left out.
@@ -91,11 +91,9 @@ class MeshFinder:
             if not needed:
                 check_mesh(path)
                 return str(path), None
-            if path not in self._read:
-                self._read[path] = read_mesh(path)
-            return str(path), self._read[path]
+            return str(path), self.read(path)
         except DescriptionError as error:
             if needed:
-                raise DescriptionError(f"{where}: {error}") from error
+                raise type(error)(f"{where}: {error}") from error
             self.warnings.append(f"{where}: {error}; it is left out")
             return None

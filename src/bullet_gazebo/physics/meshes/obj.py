@@ -20,7 +20,7 @@ def read_obj(data: bytes) -> list[Part]:
     """
     from trimesh.exchange.obj import load_obj
 
-    text = "\n".join(_shape_lines(data.decode("utf-8", "replace")))
+    text = "\n".join(_shape_lines(data.decode("utf-8-sig", "replace")))
     loaded = load_obj(
         StringIO(text), group_material=False, skip_materials=True, maintain_order=True,
         split_objects=True, split_groups=True,

@@ -28,9 +28,9 @@ def read_stl(data: bytes) -> list[Part]:
     if HEADER < size <= len(data):  # what some programs write behind it is not read
         loaded = load_stl_binary(BytesIO(data[:size]))
         return [(loaded["vertices"], loaded["faces"])]
-    if data.lstrip()[:5].lower() != b"solid":
+    text = data.decode("utf-8-sig", "replace")
+    if text.lstrip()[:5].lower() != "solid":
         raise DescriptionError("the STL file is cut short or damaged")
-    text = data.decode("utf-8", "replace")
     vertices = _corners(text)
     if vertices is None:
         vertices = _corners(_as_expected(text))

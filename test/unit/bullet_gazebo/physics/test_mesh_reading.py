@@ -35,6 +35,7 @@ WELL = {
     "name.stl": TEXT.replace("solid cube", "solid vertex of a solid facet"),
     "end.stl": TEXT.replace("endsolid cube", ""),
     "latin.stl": TEXT.replace("cube", "W\u00fcrfel").encode("latin-1"),
+    "mark.stl": "\ufeff" + TEXT,
     "solids.stl": TEXT + TEXT.replace("cube", "twin"),
     "cube.obj": OBJ,
     "tabs.obj": OBJ.replace(" ", "\t").replace("v", "  v"),
@@ -42,6 +43,7 @@ WELL = {
         "\nf 1 3 2", " 0.1 0.2 0.3\nvn 0 0 1\nvt 0 0\nusemtl m\nf 1/1/1 3//1 2/1"
     ),
     "back.obj": OBJ.replace("f 1 3 2", "f -8 -6 -7") + "v 5 5 5\nv 6 6 6\n",
+    "mark.obj": "\ufeff" + OBJ,
     "quads.obj": OBJ[: OBJ.index("f ")] + "f 1 2 4 3\nf 5 7 \\\n8 6\nf 1 5 6 2\nf 3 4 8\nf 3 8 7\n",
     "cube.dae": DAE,
     "count.dae": DAE.replace('count="12"', 'count="1000000"'),

@@ -3,6 +3,7 @@
 import os
 
 import pytest
+from mesh_files import obj
 
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
 from bullet_gazebo.physics.files import reading as limits
@@ -13,6 +14,7 @@ from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.files.world_file import load_world, parse_world
 from bullet_gazebo.physics.mechanics.tree import MAX_LINKS
 from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.physics.meshes.reader import read_mesh
 from file_reading import yaml_text
 from file_reading.xml_parser import MAX_DEPTH
 
@@ -90,6 +92,60 @@ def test_so_many_files_and_bytes_are_read_and_no_more(tmp_path, monkeypatch):
     with pytest.raises(LimitExceeded) as raised:
         parse_world(text, resources)
     assert f"{tmp_path}/c/model.sdf: more than 3000 bytes" in str(raised.value)
+
+
+CHAIR = """<link name="l{0}"><collision name="c"><geometry><mesh>{1}</mesh></geometry></collision></link>"""
+
+
+def test_a_mesh_is_read_once_however_many_models_have_it(tmp_path, monkeypatch):
+    (tmp_path / "chair.obj").write_bytes(obj())
+    chair = CHAIR.format("", "<uri>model://chair.obj</uri>")
+    write_model(tmp_path, "chair", MODEL.format("chair", chair))
+    includes = "".join(INCLUDE.format("chair", f"m{i}") for i in range(5))
+    read = []
+
+    def counted(path):
+        read.append(path)
+        return read_mesh(path)
+
+    monkeypatch.setattr(limits, "read_mesh", counted)
+    world = parse_world(f'<sdf version="1.6"><world name="w">{includes}</world></sdf>',
+                        Resources(models=(tmp_path,)))  # fmt: skip
+    assert read == [tmp_path / "chair.obj"]
+    solids = [model.links["l"].collisions[0].solid for model in world.models.values()]
+    assert len(solids) == 5
+    assert all(solid is solids[0] for solid in solids)
+
+
+@pytest.mark.parametrize("kind", ["urdf", "sdf", "world"])
+def test_so_many_bytes_of_meshes_are_read_and_no_more(tmp_path, monkeypatch, kind):
+    """The same file counts once; a world is refused as a whole."""
+    for name in ("a.obj", "b.obj"):
+        (tmp_path / name).write_bytes(obj())
+    if kind == "urdf":
+        texts = [
+            f'<collision><geometry><mesh filename="{tmp_path}/{name}"/></geometry></collision>'
+            for name in ("a.obj", "a.obj", "b.obj")
+        ]
+        inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+        text = f'<robot name="r"><link name="l">{inertial}{"".join(texts)}</link></robot>'
+    else:
+        texts = [
+            CHAIR.format(i, f"<uri>{tmp_path}/{name}</uri>")
+            for i, name in enumerate(("a.obj", "a.obj", "b.obj"))
+        ]
+        text = MODEL.format("m", f"<static>1</static>{''.join(texts)}")
+        if kind == "world":
+            text = text.replace("<model ", '<world name="w"><model ').replace(
+                "</sdf>", "</world></sdf>"
+            )
+    read = {"urdf": parse_urdf, "sdf": parse_sdf, "world": parse_world}[kind]
+    monkeypatch.setattr(limits, "MAX_MESH_BYTES", 2 * len(obj()))
+    read(text, resources=Resources())
+    monkeypatch.setattr(limits, "MAX_MESH_BYTES", 2 * len(obj()) - 1)
+    with pytest.raises(LimitExceeded, match=r"bytes of mesh files \(MAX_MESH_BYTES\)") as raised:
+        read(text, resources=Resources())
+    assert f"{tmp_path}/b.obj" in str(raised.value)
 
 
 @pytest.mark.parametrize("read", [parse_urdf, parse_sdf])
@@ -225,7 +281,8 @@ def test_the_manual_names_the_limits_that_there_are(root):
     told = {name.strip(" `"): float(figure) for name, figure in rows}
     assert told == {
         "MAX_BYTES": limits.MAX_BYTES, "MAX_ELEMENTS": limits.MAX_ELEMENTS, "MAX_DEPTH": MAX_DEPTH,
-        "MAX_FILES": limits.MAX_FILES, "MAX_MODELS": limits.MAX_MODELS, "MAX_NESTING": MAX_NESTING,
+        "MAX_FILES": limits.MAX_FILES,
+        "MAX_MESH_BYTES": limits.MAX_MESH_BYTES, "MAX_MODELS": limits.MAX_MODELS, "MAX_NESTING": MAX_NESTING,
         "MAX_LINKS": MAX_LINKS, "MAX_SECONDS": limits.MAX_SECONDS, "MAX_VALUES": yaml_text.MAX_VALUES,
     }  # fmt: skip
     text = "\n".join(lines)

@@ -4,6 +4,9 @@ PyBullet frees most of what a body has taken only together with its world: about
 the files that the body was loaded from. So the world counts what removed bodies have left.
 """
 
+import contextlib
+import locale
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -84,10 +87,11 @@ class BulletClient:
                 text = write_urdf(parents_first(engine_form), folder)
                 path.write_text(text, encoding="utf-8")
                 size = _size(folder)
-                body = pybullet.loadURDF(
-                    str(path), pose.position, pose.orientation, useFixedBase=description.fixed_base,
-                    flags=flags, physicsClientId=self._client,
-                )  # fmt: skip
+                with _decimal_points():
+                    body = pybullet.loadURDF(
+                        str(path), pose.position, pose.orientation, useFixedBase=description.fixed_base,
+                        flags=flags, physicsClientId=self._client,
+                    )  # fmt: skip
         except pybullet.error as error:
             self.waste += size
             raise DescriptionError(f"the physics engine can't load the model: {error}") from error
@@ -145,6 +149,18 @@ class BulletClient:
     def close(self) -> None:
         """Frees all of it."""
         pybullet.disconnect(self._client)
+
+
+@contextlib.contextmanager
+def _decimal_points() -> Iterator[None]:
+    """Has the C library read 0.5 as one half. Where Qt or a user's code has chosen a language that writes
+    0,5 it reads 0."""
+    before = locale.setlocale(locale.LC_NUMERIC)
+    locale.setlocale(locale.LC_NUMERIC, "C")
+    try:
+        yield
+    finally:
+        locale.setlocale(locale.LC_NUMERIC, before)
 
 
 def _size(folder: Path) -> int:

@@ -213,7 +213,7 @@ def _read_link(
 ) -> Link:
     name = named(element, "link")
     where = f"link '{name}'"
-    meshes = MeshFinder(context.resources, context.folder, parts.warnings)
+    meshes = MeshFinder(context.resources, context.reading.mesh, context.folder, parts.warnings)
     shapes = ShapeReader(meshes, frames, context.reading, parts.warnings)
     link = Link(name, read_inertia(element, where, static))
     link.collisions = list(shapes.read(element, "collision", where))

@@ -36,7 +36,7 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
     if robot.tag != "robot":
         raise DescriptionError(f"the root element is <{shown(robot.tag)}>, not <robot>")
     warnings: list[str] = []
-    reader = LinkReader(MeshFinder(resources, warnings=warnings), reading, warnings)
+    reader = LinkReader(MeshFinder(resources, reading.mesh, warnings=warnings), reading, warnings)
     reader.learn_materials(robot)
     found = robot.findall("link")
     check_count(len(found))
