@@ -35,13 +35,13 @@ from bullet_gazebo.ros.services.spawn_services import SpawnServices
 from bullet_gazebo.ros.services.stepping.advance_service import AdvanceService
 from bullet_gazebo.ros.services.stepping.step_service import StepService
 from bullet_gazebo.ros.services.world_services import advertise_world_services
-from bullet_gazebo.ros.wire.rospy_patches import (
+from bullet_gazebo.ros.wire.rospy_patches.connections import (
     Reception,
     bound_calls,
     bound_messages,
-    free_polls_at_once,
     hang_up_on_nonsense,
 )
+from bullet_gazebo.ros.wire.rospy_patches.topics import free_polls_at_once
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.ros.wire.signals import SignalHandler, end_within, init_node, wait_for_master
 from bullet_gazebo.ros.wire.thinning import Thinner
