@@ -50,6 +50,7 @@ from bullet_gazebo.simulator import Simulator
 NAME = "gazebo"
 MOST_FREQUENT = 1e9  # [Hz]; time is counted in nanoseconds
 EXIT_TIMEOUT = 10.0  # [s] for what plugins may have left to be done at the end
+HANGING_TIMEOUT = 1.0  # [s] the same where one of them never comes to its end
 MORE_ARGUMENTS = "GZSERVER_ARGS"  # variable: for a server that somebody else's program starts
 
 
@@ -106,11 +107,18 @@ class GazeboNode:
         """Simulates until the node is shut down; returns the exit code."""
         # Called before the topics close, so that no tick publishes to a closed one.
         rospy.on_shutdown(self._watchdog.stop)
-        self._watchdog.start()
+        if signals.noted():  # while all was made ready: no time passes any more
+            self._watchdog.stop()
+        else:
+            self._watchdog.start()
         signals.wait(self._watchdog.barks)
         failed = self._watchdog.barks()
         self._watchdog.stop()  # a shutdown that came before the hook was there doesn't call it
-        return 1 if failed else 0
+        hanging = self._watchdog.left_hanging()
+        if hanging is not None:
+            print(f"gzserver: ends while the world's lock is kept by {hanging}", file=sys.stderr)
+            end_within(HANGING_TIMEOUT, 1)
+        return 1 if failed or hanging is not None else 0
 
 
 def _flag(name: str) -> bool:
