@@ -18,6 +18,7 @@ from bullet_gazebo.ros.control.control_plugin import FILENAME as CONTROL_PLUGIN
 from bullet_gazebo.ros.control.control_plugin import ControlPlugin
 from bullet_gazebo.ros.node.joint_state_plugin import FILENAME as JOINT_STATE_PLUGIN
 from bullet_gazebo.ros.node.joint_state_plugin import JointStatePlugin
+from bullet_gazebo.ros.node.master_watch import MasterWatch
 from bullet_gazebo.ros.node.one_world import (
     NameLoss,
     NameTaken,
@@ -41,6 +42,7 @@ from bullet_gazebo.ros.wire.rospy_patches.connections import (
     bound_messages,
     hang_up_on_nonsense,
 )
+from bullet_gazebo.ros.wire.rospy_patches.registration import outlive_lack_of_threads
 from bullet_gazebo.ros.wire.rospy_patches.topics import free_polls_at_once
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.ros.wire.signals import SignalHandler, end_within, init_node, wait_for_master
@@ -69,6 +71,7 @@ class GazeboNode:
         if args.paused:
             self.sim.pause()
         self._advertise(_flag("~enable_ros_network"))
+        MasterWatch().start()
 
     def _advertise(self, network: bool) -> None:
         WorldControl(self.sim, self._watchdog).offer()
@@ -154,6 +157,7 @@ def main(argv: list[str] | None = None) -> int:
         with one_at_a_time(name):
             if not args.replace:
                 refuse_twin(name)
+            outlive_lack_of_threads()
             init_node(NAME, command_line, anonymous=False)
     except NameTaken as error:
         print(f"gzserver: {error}", file=sys.stderr)

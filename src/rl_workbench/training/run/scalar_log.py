@@ -49,7 +49,7 @@ class ScalarLog:
         say: Callable[[str], None] = print,
     ) -> None:
         path = folder / NAME
-        points = _cut(path, length, say)
+        points = _cut(path, length, say) if length else []
         if not points:
             path.write_text(HEADER, encoding="utf-8")
         self._file = path.open("a", encoding="utf-8")
