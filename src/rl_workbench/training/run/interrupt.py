@@ -48,5 +48,7 @@ class Interrupt:
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         self.signal = number
+        if number == signal.SIGXCPU:  # it comes once a second from now on, also while Python ends
+            signal.signal(number, signal.SIG_IGN)
         if not self._deferred:
             raise KeyboardInterrupt
