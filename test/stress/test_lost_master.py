@@ -14,6 +14,7 @@ from ros_calls import master
 from ros_calls.service import ServiceClient, ServiceFailed
 
 SERVICE = "/gazebo/get_world_properties"
+LAST = "/gazebo/pause_physics"  # clients take the world for ready once it is there
 
 
 @pytest.mark.stress(full=True)
@@ -39,7 +40,7 @@ def test_a_master_that_is_killed_and_started_again(scenario: Scenario) -> None:
             core = here.start(*start)
             assert waits(master.is_up)
             node = here.start("rosrun", "gazebo_ros", "gzserver")
-            assert waits(answers), node.output
+            assert waits(lambda: LAST in known()[2]), node.output
             before = known()
             os.kill(core.pid, signal.SIGKILL)
             os.kill(pid_of(here, "/rosmaster "), signal.SIGKILL)
@@ -47,7 +48,7 @@ def test_a_master_that_is_killed_and_started_again(scenario: Scenario) -> None:
                 node.wait_for("is gone", BOUND)
             core = here.start(*start)
             assert waits(answers), node.output
-            assert known() == before
+            assert waits(lambda: known() == before), (before, known())
             assert master.call("getParam", "/use_sim_time") is True
             node.wait_for("was started again", BOUND)
             assert node.output.count("was started again") == 1 and "Traceback" not in node.output
