@@ -60,8 +60,8 @@ class MasterWatch:
         self._misses += 1
         if self._misses == MISSES and not self._ending.is_set():
             rospy.logwarn(
-                "The master at %s is gone (%s). Who is connected stays so, but nobody else finds this simulator; "
-                "it registers again once there is one at that address", master.uri(), fault,
+                "The master at %s is gone (%s). Who is connected stays so, but nobody else finds this "
+                "simulator; it registers again once there is one at that address", master.uri(), fault,
             )  # fmt: skip
 
     def _come_back(self) -> None:
@@ -74,9 +74,9 @@ class MasterWatch:
         self._register(TIMEOUT)
         self._misses = 0
         rospy.logwarn(
-            "The master at %s was started again: this node wasn't registered there, and is now. Parameters, such "
-            "as robot descriptions and settings of controllers, went with the old one; who needs them sets them "
-            "again, or restarts the launch", master.uri(),
+            "The master at %s was started again: this node wasn't registered there, and is now. Parameters, "
+            "such as robot descriptions and settings of controllers, went with the old one; who needs them "
+            "sets them again, or restarts the launch", master.uri(),
         )  # fmt: skip
 
     def _compare(self, known: str) -> None:
@@ -84,6 +84,7 @@ class MasterWatch:
             return
         self._taken = known
         rospy.logwarn(
-            "The master at %s was started again, and another node (at %s) has the name %s there: nobody finds "
-            "this simulator (at %s). End one of the two", master.uri(), known, rospy.get_name(), self._address,
+            "The master at %s was started again, and another node (at %s) has the name %s there: nobody "
+            "finds this simulator (at %s). End one of the two",
+            master.uri(), known, rospy.get_name(), self._address,
         )  # fmt: skip
