@@ -187,8 +187,8 @@ def test_a_world_without_meshes_does_not_pay_for_them():
 
 @pytest.mark.parametrize(
     "uri",
-    ["package://std/" + "a" * 300, "model://" + "a" * 300, "file:///" + "x/" * 3000, "a" * 300, "~" + "a" * 300,
-     "file:///a%00b", "~a%00b/x", "package://std/a%00b", "model://a%00b", "~\ud800", "model://\ud800",
+    ["package://std/" + "a" * 300, "model://" + "a" * 300, "file:///" + "x/" * 3000, "a" * 300,
+     "~" + "a" * 300, "file:///a%00b", "~a%00b/x", "package://std/a%00b", "model://a%00b", "~\ud800", "model://\ud800",
      "file:///proc/self/root/proc/self/mem/x"],
 )  # fmt: skip
 def test_a_name_that_no_file_has_is_not_found(tmp_path, uri):
