@@ -22,6 +22,10 @@ is_plain() {  # path
 ROOT=$CHECKOUT
 if ! is_plain "$ROOT"; then
     ROOT=/tmp/cartpole-$UID-$CHECKSUM
+    for link in /tmp/cartpole-"$UID"-*; do
+        # Of a checkout that is gone, without `ws clean`.
+        if [[ -L $link && ! -e $link ]]; then rm -f -- "$link" 2>/dev/null || true; fi
+    done
     [[ -e $ROOT || -L $ROOT ]] || ln -s -- "$CHECKOUT" "$ROOT"
     # Whoever owns the link could lead it elsewhere later.
     if [[ ! $ROOT -ef $CHECKOUT || $(stat --format %u -- "$ROOT") -ne $UID ]]; then

@@ -55,7 +55,7 @@ def new_engine(request: pytest.FixtureRequest) -> Callable:
 @pytest.fixture
 def signals() -> Iterator[None]:
     """Gives signals back after a command that takes them over, as if in a process of its own."""
-    taken = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    taken = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
     before = {number: signal.getsignal(number) for number in taken}
     yield
     for number, handler in before.items():

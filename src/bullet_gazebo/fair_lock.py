@@ -20,6 +20,16 @@ class FairLock:
         self._waiting: deque[threading.Lock] = deque()
         self._held = False
         self._holder: int | None = None  # the thread
+        self.turns = 0  # how often it was taken
+
+    @property
+    def held(self) -> bool:
+        return self._held
+
+    @property
+    def holder(self) -> int | None:
+        """The thread that holds it; None also in the moment in which it is handed over."""
+        return self._holder
 
     def __enter__(self) -> None:
         thread = threading.get_ident()
@@ -27,6 +37,7 @@ class FairLock:
             raise RuntimeError("this thread holds the simulator's lock already")
         self._take()
         self._holder = thread
+        self.turns += 1
 
     def _take(self) -> None:
         with self._guard:

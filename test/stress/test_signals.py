@@ -15,7 +15,7 @@ from stress.scenario import Scenario
 from stress.trainings import BOUND, forked, new, wait_for_newer_checkpoint
 from training_runs import assert_no_doubles, assert_same_run, summary
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # it saves, and ends
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)  # it saves, and ends
 FATAL = (signal.SIGQUIT, signal.SIGUSR1)  # nobody listens to them: it ends, as after kill -9
 HARMLESS = (signal.SIGPIPE, signal.SIGSTOP, signal.SIGWINCH)  # it goes on
 SIGNALS = [*ENDING, *FATAL, *HARMLESS]

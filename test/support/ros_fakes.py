@@ -31,6 +31,8 @@ class FakeMaster:
             ("getParam", self.params),
         ):
             self._server.register_function(partial(self._lookup, known), method)
+        self._server.register_function(lambda caller, key: [1, "", key in self.params], "hasParam")
+        self._server.register_function(self._set_param, "setParam")
         for method in ("getName", "getMasterUri"):
             self._server.register_function(partial(self._tell, method), method)
         self._server.register_function(lambda caller, name: "nonsense", "nonsense")
@@ -41,6 +43,10 @@ class FakeMaster:
     def _lookup(self, known, caller, name):
         self.questions.append(name)
         return [1, "", known[name]] if name in known else [-1, "unknown", ""]
+
+    def _set_param(self, caller, key, value):
+        self.params[key] = value
+        return [1, "", 0]
 
     def _tell(self, method, caller):
         return [1, "", self.told[method]] if method in self.told else [-1, "unknown", ""]

@@ -33,7 +33,7 @@ ALLOWED = {
     "ros_utils": {"ros_calls", "file_reading"},
     "robot_envs": {"bullet_gazebo", "file_reading", "ros_calls", "ros_utils"},
     "lockstep_runner": {"ros_calls"},
-    "rl_workbench": set(),
+    "rl_workbench": {"file_reading"},
     "cartpole": {"rl_workbench", "robot_envs"},
 }
 # A folder, and what nothing in it may import beside that.

@@ -7,6 +7,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from bullet_gazebo.physics.description import DescriptionError, Mesh
+from bullet_gazebo.physics.elements import files_named_by_a_model, shown
 from bullet_gazebo.physics.meshes.reader import check_mesh
 
 MeshFile = tuple[str, Mesh | None]
@@ -34,12 +35,19 @@ class Resources:
         Raises:
             DescriptionError: if it isn't found; the text says where it was looked for.
         """
-        tried = list(self._candidates(unquote(uri.strip()), folder))
+        with files_named_by_a_model(
+            f"'{shown(uri)}' is not found"
+        ):  # ~ of somebody with a null character
+            tried = list(self._candidates(unquote(uri.strip()), folder))
+        reason = ""
         for path in tried:
-            if path.exists():
-                return path
+            try:
+                if path.exists():
+                    return path
+            except (OSError, ValueError) as error:  # too long for a name, or where nobody may look
+                reason = f"; {getattr(error, 'strerror', None) or error}"
         where = ", ".join(str(path) for path in tried[:5]) or "no folder to look in"
-        raise DescriptionError(f"'{uri[:200]}' is not found (looked for: {where[:1000]})")
+        raise DescriptionError(f"'{uri[:200]}' is not found (looked for: {where[:1000]}{reason})")
 
     def _candidates(self, uri: str, folder: Path | None) -> Iterable[Path]:
         scheme, colon, rest = uri.partition("://")

@@ -8,7 +8,7 @@ from actionlib.action_server import ActionServer
 from actionlib.status_tracker import StatusTracker
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 
-from bullet_gazebo.ros.wire.rospy_patches import wait_until_sent
+from bullet_gazebo.ros.wire.rospy_patches.topics import wait_until_sent
 
 QUEUE = 50
 KEPT = 5.0  # [s]; how long the status of a goal is told after its end, as by actionlib

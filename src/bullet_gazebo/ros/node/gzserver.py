@@ -18,6 +18,7 @@ from bullet_gazebo.ros.control.control_plugin import FILENAME as CONTROL_PLUGIN
 from bullet_gazebo.ros.control.control_plugin import ControlPlugin
 from bullet_gazebo.ros.node.joint_state_plugin import FILENAME as JOINT_STATE_PLUGIN
 from bullet_gazebo.ros.node.joint_state_plugin import JointStatePlugin
+from bullet_gazebo.ros.node.master_watch import MasterWatch
 from bullet_gazebo.ros.node.one_world import (
     NameLoss,
     NameTaken,
@@ -35,13 +36,14 @@ from bullet_gazebo.ros.services.spawn_services import SpawnServices
 from bullet_gazebo.ros.services.stepping.advance_service import AdvanceService
 from bullet_gazebo.ros.services.stepping.step_service import StepService
 from bullet_gazebo.ros.services.world_services import advertise_world_services
-from bullet_gazebo.ros.wire.rospy_patches import (
+from bullet_gazebo.ros.wire.rospy_patches.connections import (
     Reception,
     bound_calls,
     bound_messages,
-    free_polls_at_once,
     hang_up_on_nonsense,
 )
+from bullet_gazebo.ros.wire.rospy_patches.registration import outlive_lack_of_threads
+from bullet_gazebo.ros.wire.rospy_patches.topics import free_polls_at_once
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.ros.wire.signals import SignalHandler, end_within, init_node, wait_for_master
 from bullet_gazebo.ros.wire.thinning import Thinner
@@ -50,6 +52,7 @@ from bullet_gazebo.simulator import Simulator
 NAME = "gazebo"
 MOST_FREQUENT = 1e9  # [Hz]; time is counted in nanoseconds
 EXIT_TIMEOUT = 10.0  # [s] for what plugins may have left to be done at the end
+HANGING_TIMEOUT = 1.0  # [s] the same where one of them never comes to its end
 MORE_ARGUMENTS = "GZSERVER_ARGS"  # variable: for a server that somebody else's program starts
 
 
@@ -68,6 +71,7 @@ class GazeboNode:
         if args.paused:
             self.sim.pause()
         self._advertise(_flag("~enable_ros_network"))
+        MasterWatch().start()
 
     def _advertise(self, network: bool) -> None:
         WorldControl(self.sim, self._watchdog).offer()
@@ -106,11 +110,18 @@ class GazeboNode:
         """Simulates until the node is shut down; returns the exit code."""
         # Called before the topics close, so that no tick publishes to a closed one.
         rospy.on_shutdown(self._watchdog.stop)
-        self._watchdog.start()
+        if signals.noted():  # while all was made ready: no time passes any more
+            self._watchdog.stop()
+        else:
+            self._watchdog.start()
         signals.wait(self._watchdog.barks)
         failed = self._watchdog.barks()
         self._watchdog.stop()  # a shutdown that came before the hook was there doesn't call it
-        return 1 if failed else 0
+        hanging = self._watchdog.left_hanging()
+        if hanging is not None:
+            print(f"gzserver: ends while the world's lock is kept by {hanging}", file=sys.stderr)
+            end_within(HANGING_TIMEOUT, 1)
+        return 1 if failed or hanging is not None else 0
 
 
 def _flag(name: str) -> bool:
@@ -146,6 +157,7 @@ def main(argv: list[str] | None = None) -> int:
         with one_at_a_time(name):
             if not args.replace:
                 refuse_twin(name)
+            outlive_lack_of_threads()
             init_node(NAME, command_line, anonymous=False)
     except NameTaken as error:
         print(f"gzserver: {error}", file=sys.stderr)

@@ -9,7 +9,7 @@ from gazebo_msgs.msg import LinkStates, ModelStates
 from rosgraph_msgs.msg import Clock
 
 from bullet_gazebo.ros.wire.conversions import to_pose_msg, to_time, to_twist_msg
-from bullet_gazebo.ros.wire.rospy_patches import set_time, stop_hearing_clock
+from bullet_gazebo.ros.wire.rospy_patches.node import set_time, stop_hearing_clock
 from bullet_gazebo.ros.wire.thinning import ThinnedTopic, Thinner
 from bullet_gazebo.simulator import Simulator
 

@@ -1,14 +1,20 @@
-"""A world whose time silently stands still is worse than one that ends: a fault in it ends the node."""
+"""A world whose time silently stands still is worse than one that ends: a fault in it ends the node.
+
+Where it stands still without a fault, because somebody's code keeps its lock, that is told.
+"""
 
 import threading
+import time
 import traceback
 from types import TracebackType
 
 import rospy
 
+from bullet_gazebo.ros.node.stall import StallWatch, holder
 from bullet_gazebo.simulator import Simulator
 
-STOP_TIMEOUT = 5.0  # [s]
+STOP_TIMEOUT = 5.0  # [s] for the tick in progress
+GRACE = 0.5  # [s] the same, where it was told that it doesn't come to its end
 
 
 class Watchdog:
@@ -25,6 +31,8 @@ class Watchdog:
         self._began = self._stopped = False
         self._ended = threading.Event()
         self._fault = False
+        self._stall = StallWatch(sim, rospy.logwarn)
+        self._deadline: float | None = None  # of the end
 
     def start(self) -> None:
         """Lets time run by itself."""
@@ -40,7 +48,8 @@ class Watchdog:
             self._ended.set()
 
     def barks(self) -> bool:
-        """Whether the world has failed; to be asked once it was started."""
+        """Whether the world has failed; to be asked several times a second, once it was started."""
+        self._stall.look()
         if not (self._fault or self._stopped or self._thread.is_alive()):
             self._fault = True
             rospy.logfatal("The thread that moves the world has ended, so the node ends.")
@@ -66,8 +75,19 @@ class Watchdog:
         rospy.logfatal("The simulation failed, so the node ends:\n%s", text)
 
     def stop(self) -> None:
-        """Ends the thread after the tick in progress. May be called at any time, from any thread."""
+        """Ends the thread after the tick in progress, if that ends in time.
+
+        May be called at any time, from any thread, more than once.
+        """
         self._stopped = True
         self._sim.stop()
+        if self._deadline is None:
+            self._deadline = time.monotonic() + (GRACE if self._stall.told else STOP_TIMEOUT)
         if self._began and threading.current_thread() is not self._thread:
-            self._ended.wait(STOP_TIMEOUT)
+            self._ended.wait(max(0.0, self._deadline - time.monotonic()))
+
+    def left_hanging(self) -> str | None:
+        """Who keeps the world's lock for ever, if somebody does; to be asked once it was stopped."""
+        lock = self._sim.lock
+        ended = not self._began or self._ended.is_set()
+        return holder(lock) if self._stall.told or (lock.held and not ended) else None

@@ -9,7 +9,7 @@ must be the only ones (docs/contract/gazebo.md 7).
 from contextlib import AbstractContextManager
 
 from bullet_gazebo.ros.clients.world_client import CHUNK, METHOD
-from bullet_gazebo.ros.wire.rospy_patches import answer_xmlrpc
+from bullet_gazebo.ros.wire.rospy_patches.node import answer_xmlrpc
 from bullet_gazebo.simulator import Simulator
 
 Answer = tuple[int, str, int]

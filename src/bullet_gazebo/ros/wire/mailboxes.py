@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from bullet_gazebo_msgs.msg import TopicMessage
 
-from bullet_gazebo.ros.wire.rospy_patches import (
+from bullet_gazebo.ros.wire.rospy_patches.topics import (
     divert_connections,
     divert_messages,
     is_connected,

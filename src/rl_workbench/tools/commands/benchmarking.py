@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from file_reading.content import open_text
 from rl_workbench.curves import evaluation_curves, seed_curves
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.benchmark import tables
@@ -115,7 +116,8 @@ def _claim(folder: Path, suite: Suite) -> None:
     """Notes what the folder's runs are, or checks that they are the same."""
     path, wanted = folder / RECORD, [asdict(variant) for variant in suite.variants]
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        with open_text(path) as file:
+            found = json.load(file)
     except FileNotFoundError:
         if folder.is_dir() and any(folder.iterdir()):
             raise WorkbenchError(f"{folder} holds something else; name another folder") from None

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import gymnasium
 import numpy as np
 
+from file_reading.content import open_text
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.record import CONFIG_RECORD
 from rl_workbench.training.run.scalar_log import NAME as SCALARS
@@ -98,7 +99,8 @@ def _with_config(folder: Path, config: dict[str, Any]) -> Run:
 def _read_json(path: Path) -> Any:
     """None where there is none."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        with open_text(path) as file:
+            return json.load(file)
     except _NOT_THERE:
         return None
     except OSError as error:
@@ -208,7 +210,7 @@ def evaluation_curve(run: Run, tag: str = EVALUATION) -> Curve:
 def _scalars(run: Run, tag: str) -> Curve:
     path = run.folder / SCALARS
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with open_text(path) as file:
             points = [
                 (float(row["step"]), float(row["value"]), float(row["wall_time"]))
                 for row in csv.DictReader(file)

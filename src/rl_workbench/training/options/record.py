@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from file_reading.content import open_text
 from rl_workbench.errors import WorkbenchError
 
 CONFIG_RECORD = "config.json"
@@ -29,7 +30,8 @@ def read_record(folder: Path) -> Any:
     """
     path = folder / CONFIG_RECORD
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        with open_text(path) as file:
+            return json.load(file)
     except OSError as error:
         raise WorkbenchError(f"{folder} is no run folder: {path}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:  # the latter of brackets within brackets

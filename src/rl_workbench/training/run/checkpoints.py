@@ -19,6 +19,7 @@ from typing import Any
 
 import torch
 
+from file_reading.content import open_file
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.run.files import save_tensors
 
@@ -126,11 +127,13 @@ def read(path: Path) -> dict[str, Any]:
     """
     try:
         # torch doesn't look at the check sums of a file that it reads.
-        with zipfile.ZipFile(path) as archive:
-            bad = archive.testzip()
-        if bad:
-            raise WorkbenchError(f"{path} is damaged")
-        content = torch.load(path, map_location="cpu", weights_only=True)
+        with open_file(path) as file:
+            with zipfile.ZipFile(file) as archive:
+                bad = archive.testzip()
+            if bad:
+                raise WorkbenchError(f"{path} is damaged")
+            file.seek(0)
+            content = torch.load(file, map_location="cpu", weights_only=True)
     except OSError as error:
         raise WorkbenchError(f"can't read {path}: {error.strerror or error}") from error
     except _DAMAGED as error:

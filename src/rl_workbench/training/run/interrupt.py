@@ -1,9 +1,12 @@
-"""Ctrl-C, SIGTERM and a closed terminal: at once while things start, at the next step while training."""
+"""Ctrl-C, SIGTERM, a closed terminal and the end of the CPU time that a batch system gives.
+
+At once while things start, at the next step while training.
+"""
 
 import signal
 from types import FrameType
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
 
 class Interrupt:
@@ -45,5 +48,7 @@ class Interrupt:
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         self.signal = number
+        if number == signal.SIGXCPU:  # it comes once a second from now on, also while Python ends
+            signal.signal(number, signal.SIG_IGN)
         if not self._deferred:
             raise KeyboardInterrupt

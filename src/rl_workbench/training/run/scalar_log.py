@@ -4,6 +4,7 @@ The CSV is the record. When a training is resumed, the CSV is cut back to where 
 was written, and TensorBoard's file is written anew from it: so neither has a row twice.
 """
 
+import contextlib
 import os
 import socket
 import time
@@ -14,6 +15,8 @@ from tensorboard.compat.proto.event_pb2 import Event
 from tensorboard.compat.proto.summary_pb2 import Summary
 from tensorboard.summary.writer.record_writer import RecordWriter
 from torch.utils.tensorboard.summary import hparams, scalar, text
+
+from file_reading.content import open_file
 
 NAME = "scalars.csv"
 HEADER = "step,tag,value,wall_time\n"
@@ -131,7 +134,9 @@ class EventFile:
 
 def _cut(path: Path, length: int, say: Callable[[str], None]) -> list[Point]:
     """Cuts the CSV back to a length [bytes], or to what is whole of it; returns its points."""
-    content = path.read_bytes()[:length] if path.exists() else b""
+    content = b""
+    with contextlib.suppress(FileNotFoundError), open_file(path) as file:
+        content = file.read(length)
     header, *rows = content.splitlines(keepends=True) or [b""]
     points, whole = [], len(header)
     for row in rows:

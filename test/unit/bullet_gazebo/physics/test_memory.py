@@ -154,6 +154,27 @@ def test_a_full_disk_is_a_reason_and_leaves_the_world_as_it_was(monkeypatch, fun
     world.close()
 
 
+def test_in_a_new_world_of_the_engine_contacts_begin_anew_gently():
+    """A box on the ground; docs/differences.md has the figure."""
+    engine = bullet.BulletEngine()
+    world, client = World(engine), engine._client
+    world.spawn("ground_plane", ground_plane(), Pose())
+    shape = '<box size="1 1 1"/>'
+    box = world.spawn("box", parse_urdf(BOX.format(shape, shape)), Pose((0.0, 0.0, 0.5)))
+    speeds = []
+    for step in range(700):
+        if step == 500:
+            assert speeds[-1] < 1e-3
+            client.waste = 10**9
+            world.spawn("other", parse_urdf(chain(2)), Pose((20.0, 0.0, 9.0)))
+            assert engine._client is not client
+        world.step()
+        speeds.append(math.hypot(*box.state()[1][0]))
+    assert 1e-3 < max(speeds[500:]) < 0.02
+    assert speeds[-1] < 1e-3
+    world.close()
+
+
 def history(monkeypatch: pytest.MonkeyPatch, most_waste: int) -> list:
     """What a cart-pole with changed properties and a tumbling body do while other models come and go."""
     monkeypatch.setattr(bullet, "MOST_WASTE", most_waste)

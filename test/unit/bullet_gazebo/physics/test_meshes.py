@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from mesh_files import CORNERS, FACES, ascii_stl, binary_stl, dae, library, obj, polylist
@@ -182,3 +183,22 @@ def test_a_world_without_meshes_does_not_pay_for_them():
         check=True,
         env=os.environ | {"PYTHONPATH": SRC},
     )
+
+
+@pytest.mark.parametrize(
+    "uri",
+    ["package://std/" + "a" * 300, "model://" + "a" * 300, "file:///" + "x/" * 3000, "a" * 300,
+     "~" + "a" * 300, "file:///a%00b", "~a%00b/x", "package://std/a%00b", "model://a%00b", "~\ud800", "model://\ud800",
+     "file:///proc/self/root/proc/self/mem/x"],
+)  # fmt: skip
+def test_a_name_that_no_file_has_is_not_found(tmp_path, uri):
+    resources = Resources((tmp_path,), (tmp_path,), {"std": str(tmp_path)}.__getitem__)
+    with pytest.raises(DescriptionError, match="is not found"):
+        resources.find(uri, tmp_path)
+
+
+def test_a_name_too_long_in_one_folder_is_looked_for_in_the_next(tmp_path):
+    (tmp_path / "model").mkdir()
+    deep = tmp_path / ("x" * 250) / ("x" * 250) / ("x" * 250)
+    resources = Resources((Path(str(deep) + "/x" * 2000), tmp_path))
+    assert resources.find("model://model") == tmp_path / "model"

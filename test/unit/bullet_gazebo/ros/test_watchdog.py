@@ -5,10 +5,13 @@ from __future__ import annotations
 import subprocess
 import sys
 import threading
+from types import SimpleNamespace
 
 import pytest
 import rospy
 
+from bullet_gazebo.fair_lock import FairLock
+from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.node.watchdog import Watchdog
 
 BOUND = 60.0  # [s]
@@ -18,6 +21,7 @@ class FakeSimulator:
     """Runs until it is stopped, or does what it is told to instead."""
 
     def __init__(self, run=None) -> None:
+        self.lock, self.now = FairLock(), 0
         self.stopping = threading.Event()
         self.running = threading.Event()
         self._run = run
@@ -135,6 +139,15 @@ def test_it_may_be_stopped_before_it_was_started_and_from_its_own_thread() -> No
     own.start()
     own._thread.join(BOUND)
     assert not own.barks()
+
+
+def test_no_time_passes_once_a_signal_has_come(monkeypatch) -> None:
+    monkeypatch.setattr(rospy, "on_shutdown", lambda hook: None)
+    node, sim = object.__new__(GazeboNode), FakeSimulator()
+    node._watchdog = Watchdog(sim)
+    signals = SimpleNamespace(noted=lambda: True, wait=lambda over: over())
+    assert node.run(signals) == 0
+    assert sim.stopping.is_set() and not sim.running.is_set()
 
 
 def test_a_process_whose_threads_do_not_end_ends_all_the_same_with_its_exit_code() -> None:

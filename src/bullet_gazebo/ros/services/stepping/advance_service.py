@@ -10,7 +10,7 @@ from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldRequest, AdvanceWor
 from bullet_gazebo.ros.services.stepping.step_requests import MAX_TICKS
 from bullet_gazebo.ros.wire.conversions import to_time
 from bullet_gazebo.ros.wire.mailboxes import Mailboxes
-from bullet_gazebo.ros.wire.rospy_patches import deliver
+from bullet_gazebo.ros.wire.rospy_patches.topics import deliver
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.ros.wire.thinning import Thinner
 from bullet_gazebo.simulator import Simulator

@@ -2,6 +2,7 @@
 
 import random
 import re
+import resource
 import shlex
 import signal
 import subprocess
@@ -105,6 +106,17 @@ def test_a_signal_saves_and_tells_how_to_go_on(
     assert summary(run)["interrupted"]
     ended(start("--resume", str(run)))
     assert_same_run(whole(name), run)
+
+
+def test_the_soft_limit_of_cpu_time_is_such_a_signal(start: Start, whole, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    process = start(*new("dqn", run))
+    newer_checkpoint(run, process)
+    resource.prlimit(process.pid, resource.RLIMIT_CPU, (1, resource.RLIM_INFINITY))
+    ended(process, 128 + signal.SIGXCPU)
+    assert summary(run)["interrupted"]
+    ended(start("--resume", str(run)))
+    assert_same_run(whole("dqn"), run)
 
 
 @pytest.mark.parametrize("name", OTHERS[:1])

@@ -20,8 +20,8 @@ from rospy.exceptions import TransportTerminated
 from rospy.impl.tcpros_base import TCPROSTransportProtocol, TCPServer
 from std_msgs.msg import Float64, String
 
-from bullet_gazebo.ros.wire import rospy_patches
-from bullet_gazebo.ros.wire.rospy_patches import (
+from bullet_gazebo.ros.wire.rospy_patches import connections
+from bullet_gazebo.ros.wire.rospy_patches.connections import (
     LARGEST_CALL,
     LARGEST_HEADER,
     LARGEST_MESSAGE,
@@ -57,7 +57,7 @@ class Server:
     def __init__(self) -> None:
         bound_messages()
         self._tcp = TCPServer(Reception(self._handle).greet)
-        self._tcp.server_sock = rospy_patches._Listener(self._tcp.server_sock)
+        self._tcp.server_sock = connections._Listener(self._tcp.server_sock)
         self._tcp.start()
         self.handled = 0
 
@@ -127,7 +127,7 @@ def test_garbage_ends_its_own_connection_only(server, garbage) -> None:
 
 
 def test_silent_clients_push_each_other_out_and_nobody_else(server, monkeypatch) -> None:
-    monkeypatch.setattr(rospy_patches, "MOST_STRANGERS", 5)
+    monkeypatch.setattr(connections, "MOST_STRANGERS", 5)
     silent = [server.connect() for _ in range(20)]
     assert server.greet() == b"/any"
     pushed = [ends(client) for client in silent[:15]]
@@ -137,7 +137,7 @@ def test_silent_clients_push_each_other_out_and_nobody_else(server, monkeypatch)
 
 
 def test_a_client_that_says_nothing_for_long_is_let_go(server, monkeypatch) -> None:
-    monkeypatch.setattr(rospy_patches, "SILENCE", 0.05)
+    monkeypatch.setattr(connections, "SILENCE", 0.05)
     client = server.connect()
     client.sendall(b"\x10")
     assert ends(client)
@@ -180,7 +180,7 @@ def test_the_loop_outlives_a_lack_of_descriptors() -> None:
 
         def close(self) -> None: ...
 
-    listener = rospy_patches._Listener(Exhausted())
+    listener = connections._Listener(Exhausted())
     for _ in range(2):
         with pytest.raises(TimeoutError):
             listener.accept()
@@ -247,18 +247,18 @@ def test_a_caller_that_says_nothing_is_let_go(calls, monkeypatch) -> None:
 
 
 def test_where_few_descriptors_are_left_no_call_is_answered(calls, monkeypatch) -> None:
-    monkeypatch.setattr(rospy_patches, "_crowded", lambda: True)
+    monkeypatch.setattr(connections, "_crowded", lambda: True)
     assert ends(socket.create_connection(calls, BOUND))
-    monkeypatch.setattr(rospy_patches, "_crowded", lambda: False)
+    monkeypatch.setattr(connections, "_crowded", lambda: False)
     assert call(calls) == 4
 
 
 def test_where_no_descriptor_is_left_to_count_with_there_are_too_few() -> None:
     limits = resource.getrlimit(resource.RLIMIT_NOFILE)
-    assert not rospy_patches._crowded()
+    assert not connections._crowded()
     resource.setrlimit(resource.RLIMIT_NOFILE, (0, limits[1]))
     try:
-        crowded = rospy_patches._crowded()
+        crowded = connections._crowded()
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, limits)
     assert crowded

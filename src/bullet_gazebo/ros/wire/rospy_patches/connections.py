@@ -1,24 +1,10 @@
-"""All that is changed inside rospy, or reached by its private names: rospy offers no other way to it.
-
-Each function below is one patch, for the simulator's own node and for its process only. All were seen to be
-needed with rospy 1.15.15 (Debian 12), and are held by the test that is named.
+"""Clients that connect and then say nothing, too much or nonsense; see the package's docstring.
 
 - `Reception`: a client that says nothing keeps all others out; any number of them, or no file descriptor
   left, ends the thread that answers them (gazebo_clients.test, test_connections.py)
 - `bound_messages`: whatever size a client claims is read into memory (test_connections.py)
 - `bound_calls`: the same for XML-RPC; clients that say nothing there keep a thread each for ever (the same)
 - `hang_up_on_nonsense`: a client whose request can't be read waits for ever (gazebo_clients.test)
-- `free_polls_at_once`: file descriptors of topics that are gone pile up (test_rospy_patches.py)
-- `answer_xmlrpc`: a node can't answer one XML-RPC call more (gazebo_ros.test, `gz`)
-- `stop_hearing_clock`: who makes /clock hears it over a socket to itself (gazebo_parameters.test)
-- `wait_until_sent`: what was published just before a topic is closed is thrown away (test_rospy_patches.py)
-- `divert_messages`, `deliver`, `is_connected`: messages of a node in lock-step go with its calls
-  (advance.test)
-- `on_topics_changed`: and it has to know when there are others (advance.test)
-- `set_time`: and so has to tell rospy the time by itself (gazebo_ros.test, a plugin)
-
-Classes that merely override a method stand where they are used: `SteadyActionServer` (actionlib),
-`DynamicServer` (dynamic_reconfigure), and `model_services.py`'s response without a header.
 """
 
 import contextlib
@@ -26,28 +12,20 @@ import errno
 import io
 import os
 import resource
-import select
 import socket
 import struct
 import threading
 import time
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
-import genpy
 import rospy
-import rospy.impl.registration
-import rospy.impl.simtime
 import rospy.impl.tcpros_base
 from rosgraph.network import ROSHandshakeException, decode_ros_handshake_header
 from rosgraph.xmlrpc import SilenceableXMLRPCRequestHandler, ThreadingXMLRPCServer
 from rospy.exceptions import TransportException, TransportTerminated
-from rospy.impl.masterslave import ROSHandler
 from rospy.impl.tcpros_base import TCPROSTransport, TCPROSTransportProtocol
-from rospy.impl.tcpros_pubsub import QueuedConnection
 from rospy.impl.tcpros_service import ServiceImpl
-from rospy.topics import Poller, _PublisherImpl, _SubscriberImpl, _TopicImpl
 
 Address = tuple[str, int]
 LENGTH = struct.Struct("<I")  # in front of all that ROS sends
@@ -233,148 +211,3 @@ def hang_up_on_nonsense() -> None:
             transport.close()
 
     ServiceImpl.handle = guarded
-
-
-def free_polls_at_once() -> None:
-    """Has what a topic polls its connections with closed together with the topic.
-
-    rospy's refers to itself, so its file descriptor stays until some later collection of garbage: robots with
-    controllers that come and go leave dozens.
-    """
-
-    def make(poller: Poller) -> None:
-        poller.poller = select.epoll()
-
-    Poller.__init__ = make
-    Poller.add_fd, Poller.remove_fd = Poller.add_epoll, Poller.remove_epoll
-    Poller.error_iter = Poller.error_epoll_iter
-
-
-def answer_xmlrpc(method: str, answer: Callable[..., tuple[int, str, Any]]) -> None:
-    """Has this process's node answer one XML-RPC call more, as it does those of master and tools.
-
-    rospy looks a call up among its handler's methods, has one handler for the process, and makes it itself.
-
-    Args:
-        method: the call's name.
-        answer: called with what follows the caller's name, whatever it is; returns code (1 is success),
-            text, value.
-    """
-
-    def handle(_handler: ROSHandler, *args: Any) -> tuple[int, str, Any]:
-        return answer(*args[1:])  # the first one is the caller's name
-
-    setattr(ROSHandler, method, handle)
-
-
-def stop_hearing_clock() -> None:
-    """Ends rospy's own subscription to the topic that this node itself publishes. See `set_time`.
-
-    With /use_sim_time every node hears /clock. For the node that makes the time that is a message a
-    millisecond over a socket to itself, a good part of its CPU time.
-    """
-    subscription = getattr(rospy.impl.simtime, "_clock_sub", None)
-    if subscription is not None:
-        subscription.unregister()
-
-
-def set_time(now: genpy.Time) -> None:
-    """Tells this process's rospy the simulated time, as a message on /clock does elsewhere."""
-    rospy.rostime._set_rostime(now)
-
-
-def wait_until_sent(publisher: rospy.Publisher, bound: float = 1.0) -> None:
-    """Waits until rospy's threads have written what was published, so that closing the topic loses nothing.
-
-    Args:
-        bound: of the wait [s of wall time]; a client that doesn't read holds nobody up for longer.
-    """
-    deadline = time.monotonic() + bound
-    for connection in list(publisher.impl.connections):
-        while not _has_sent(connection) and time.monotonic() < deadline:
-            time.sleep(0.002)
-
-
-def _has_sent(connection: Any) -> bool:
-    """Whether the connection's thread waits for something to write."""
-    if not isinstance(connection, QueuedConnection):
-        return True
-    with connection._lock:
-        waits = bool(connection._cond_data_available._waiters)  # else it is still writing
-        return bool(connection.done) or (waits and not connection._queue)
-
-
-Sink = Callable[[str, bytes], None]
-"""Takes a topic and a message as it goes over the wire, its length in front."""
-
-
-def divert_messages(sink_of: Callable[[str], Sink | None]) -> None:
-    """Gives what is published for some nodes to a sink instead of to their connections, once for a process.
-
-    Args:
-        sink_of: the sink of a node by name, or None where its messages are sent as ever; asked for each
-            new connection. For those that exist already there is `divert_connections`.
-    """
-    add_connection = _TopicImpl.add_connection
-
-    def diverting(topic: _TopicImpl, connection: Any) -> bool:
-        if isinstance(topic, _PublisherImpl):
-            sink = sink_of(connection.endpoint_id)
-            if sink is not None:
-                connection.write_data = partial(sink, topic.resolved_name)
-        return bool(add_connection(topic, connection))
-
-    _TopicImpl.add_connection = diverting
-
-
-def divert_connections(node: str, sink: Sink) -> None:
-    """As `divert_messages`, for the connections that a node has already."""
-    for topic in list(_topics().pubs.values()):
-        for connection in list(topic.connections):
-            if connection.endpoint_id == node:
-                connection.write_data = partial(sink, topic.resolved_name)
-
-
-def deliver(topic: str, data: bytes, node: str) -> None:
-    """Hands a message of a node to this process's subscribers, in this thread; without any, to nobody.
-
-    Raises:
-        genpy.DeserializationError: if it can't be read.
-    """
-    subscription: _SubscriberImpl | None = _topics().get_subscriber_impl(topic)
-    if subscription is None:
-        return
-    connections = [each for each in subscription.connections if each.callerid_pub == node]
-    if connections:  # without a connection a message would have got lost, too
-        message = subscription.data_class().deserialize(data[4:])
-        message._connection_header = connections[-1].header
-        subscription.receive_callback([message], connections[-1])
-
-
-def is_connected(topic: str, node: str, publishes: bool) -> bool | None:
-    """Whether a node is connected to a topic; None if this process has no such topic.
-
-    Args:
-        publishes: this process does, and the node subscribes; else the other way round.
-    """
-    if publishes:
-        publication = _topics().get_publisher_impl(topic)
-        return publication and any(each.endpoint_id == node for each in publication.connections)
-    subscription = _topics().get_subscriber_impl(topic)
-    return subscription and any(each.callerid_pub == node for each in subscription.connections)
-
-
-def on_topics_changed(call: Callable[[], None]) -> None:
-    """Has a function called when this process publishes or subscribes to a topic more, or less."""
-
-    class Listener(rospy.impl.registration.RegistrationListener):
-        def reg_added(self, _name: str, _kind: str, _way: str) -> None:
-            call()
-
-        reg_removed = reg_added
-
-    rospy.impl.registration.get_registration_listeners().add_listener(Listener())
-
-
-def _topics() -> Any:
-    return rospy.impl.registration.get_topic_manager()
