@@ -41,6 +41,8 @@ def _wrap_init_node(rospy: Any) -> None:
 
 
 def _follow(name: str) -> None:
+    import rospy
+
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         connection.connect(os.environ[ADDRESS])
@@ -73,6 +75,8 @@ def _follow(name: str) -> None:
             if response.messages:  # they have come before the rest
                 return response
             passed = _rest(line, math.inf if ticks == sys.maxsize else ticks * self.step)
+            if rospy.core.is_shutdown():  # the simulator may have ended, too
+                return response
             response = super().advance(0)
             response.paused = False
             response.ticks = round(passed / self.step)
@@ -83,7 +87,10 @@ def _follow(name: str) -> None:
             line.send(rest=None if span == math.inf else span)
             return float(line.receive()["passed"])
         except (Ended, KeyError) as fault:
+            if rospy.core.is_shutdown():
+                return 0.0
             raise WorldFailed("the script that it followed has ended") from fault
 
+    rospy.core.add_shutdown_hook(lambda reason: line.close())  # Ctrl-C, while it rests
     options = argparse.Namespace(seed=None, dt=0.001, step_on=["none"], virtual_wall_clock=False)
     install(options, FollowedWorld())

@@ -7,7 +7,14 @@ import argparse
 import rospy
 
 from lockstep_runner.nodes.followers import Followers
-from lockstep_runner.replaced import python_threads, python_time, ros_services, ros_time, ros_topics
+from lockstep_runner.replaced import (
+    python_futures,
+    python_threads,
+    python_time,
+    ros_services,
+    ros_time,
+    ros_topics,
+)
 from lockstep_runner.runner import Runner
 from lockstep_runner.simulation.world import World
 
@@ -31,12 +38,14 @@ def install(args: argparse.Namespace, world: World | None = None) -> Runner:
         followers.passed = lambda: runner.clock.passed
         followers.forget_mail = runner.world.forget_mail
         runner.clock.others = followers
+        runner.topics.follows = followers.has
     ros_topics.install(runner)
     ros_services.install(runner)
     ros_time.install(runner)
     python_threads.install(runner)
+    python_futures.install(runner)
     python_time.install(runner, args.virtual_wall_clock)
-    rospy.core.add_client_shutdown_hook(runner.clock.release_all)
+    rospy.core.add_shutdown_hook(lambda reason: runner.clock.release_all())
     return runner
 
 

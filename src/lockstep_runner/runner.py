@@ -11,6 +11,8 @@ import threading
 from collections.abc import Callable, Collection, Sequence
 from typing import Concatenate, NoReturn, ParamSpec, TypeVar
 
+import rospy
+
 from lockstep_runner import originals
 from lockstep_runner.notices import Notices, tell
 from lockstep_runner.simulation.clock import NANOSECONDS, Clock
@@ -124,6 +126,10 @@ class Runner:
             if self.clock.waits != before:
                 self.triggers.waited()
 
+    def wait_for_event(self, seconds: float, until: Condition) -> bool:
+        """As `wait`, for what any callback may make come true."""
+        return self.wait(seconds, until, self.clock.callbacks.heard())
+
     @_ends_with_the_world(True)
     def waits_for_others(self, seconds: float) -> bool:
         """A library looks again and again for another node: messages come, but time doesn't pass at first."""
@@ -200,6 +206,11 @@ class Runner:
         if self._may_step() and self.world.there and self.triggers.polled(what, often, detail):
             self._pass_period()
 
+    @property
+    def is_over(self) -> bool:
+        """Whether the node is shut down: no time passes any more, and waits are the wall's."""
+        return bool(rospy.core.is_shutdown())
+
     def hand_over(self) -> None:
         """Gives the simulator what it hasn't got yet, at the script's end."""
         if self.world.there and self.world.has_post:
@@ -209,7 +220,7 @@ class Runner:
     def finish(self, threads: Sequence[threading.Thread]) -> None:
         """Lets time pass, at the end of the script, until its other threads have ended."""
         while any(each.is_alive() for each in threads):
-            if self.is_connected():
+            if not self.is_over and self.is_connected():
                 self.wait(math.inf, lambda: not any(each.is_alive() for each in threads))
             else:
                 originals.sleep(LOOK)

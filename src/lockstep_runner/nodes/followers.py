@@ -61,6 +61,10 @@ class Followers:
         thread = threading.Thread(target=self._accept, name="nodes under the clock", daemon=True)
         originals.start(thread)
 
+    def has(self, node: str) -> bool:
+        """Whether a node of that name follows."""
+        return node in self._nodes
+
     def settle(self) -> None:
         """Waits until all that was started is up, and rests."""
         if self.starting.is_going_on:

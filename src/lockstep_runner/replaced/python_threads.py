@@ -1,9 +1,15 @@
-"""threading.Event.wait, Condition.wait, Thread.start and join, where the script itself calls them."""
+"""threading.Event.wait, Condition.wait, Thread.start and join, where the script itself calls them.
+
+Also through Python's own queue, threading.Timer and concurrent.futures, which wait by these.
+"""
 
 from __future__ import annotations
 
+import concurrent.futures._base as futures
 import math
+import queue
 import threading
+import types
 from typing import Any
 
 from lockstep_runner import originals
@@ -15,12 +21,19 @@ def install(runner: Runner) -> None:
     """Puts the methods in place."""
 
     def covered() -> bool:
-        return is_the_script(2) and runner.clock.covers_this_thread() and runner.is_connected()
+        return (
+            is_the_script(2)
+            and not runner.is_over
+            and runner.clock.covers_this_thread()
+            and runner.is_connected()
+        )
 
     def event_wait(self: threading.Event, timeout: float | None = None) -> bool:
-        if not covered():
-            return originals.event_wait(self, timeout)
-        return runner.wait(math.inf if timeout is None else timeout, self.is_set) or self.is_set()
+        if covered():
+            came = runner.wait_for_event(_span(timeout), self.is_set)
+            if came or not runner.is_over:
+                return came or self.is_set()
+        return originals.event_wait(self, timeout)
 
     def condition_wait(self: threading.Condition, timeout: float | None = None) -> bool:
         if not covered():
@@ -29,15 +42,37 @@ def install(runner: Runner) -> None:
 
     def join(self: threading.Thread, timeout: float | None = None) -> None:
         if covered() and self is not threading.current_thread():
-            runner.wait(math.inf if timeout is None else timeout, lambda: not self.is_alive())
-        else:
-            originals.join(self, timeout)
+            ended = runner.wait(_span(timeout), lambda: not self.is_alive())
+            if not (ended or runner.is_over):
+                return
+        originals.join(self, timeout)
 
     def start(self: threading.Thread) -> None:
-        originals.start(self)
-        if is_the_script(1) and runner.world.there:
-            runner.clock.began_own(self)
+        if not (is_the_script(1) and runner.world.there):
+            originals.start(self)
+            return
+        work, gate = self.run, threading.Lock()
 
+        def run() -> None:
+            gate.acquire()  # until it is known: its first wait may come at once
+            vars(self).pop("run", None)
+            work()
+
+        gate.acquire()
+        self.run = run  # type: ignore[method-assign]
+        try:
+            originals.start(self)
+            runner.clock.began_own(self)
+        finally:
+            gate.release()
+
+    def time_limits() -> float:
+        """The clock of time limits: simulated where the wait is."""
+        return begun + runner.clock.passed / 1e9 if covered() else originals.monotonic()
+
+    begun = originals.monotonic()
+    threading._time = queue.time = time_limits  # type: ignore[attr-defined]
+    futures.time = types.SimpleNamespace(monotonic=time_limits)  # type: ignore[attr-defined]
     threading.Thread.start = start  # type: ignore[method-assign]
     threading.Event.wait = event_wait  # type: ignore[method-assign]
     threading.Condition.wait = condition_wait  # type: ignore[method-assign]
@@ -58,10 +93,16 @@ def wait_for_notice(runner: Runner, condition: Any, timeout: float | None) -> bo
     saved = condition._release_save()
     came = False
     try:
-        came = runner.wait(math.inf if timeout is None else timeout, lambda: not waiter.locked())
+        came = runner.wait_for_event(_span(timeout), lambda: not waiter.locked())
+        if not came and runner.is_over:
+            came = waiter.acquire(timeout=-1 if timeout is None else timeout)
         came = came or not waiter.locked()
     finally:
         condition._acquire_restore(saved)
         if not came and waiter in condition._waiters:
             condition._waiters.remove(waiter)
     return came
+
+
+def _span(timeout: float | None) -> float:
+    return math.inf if timeout is None else timeout

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 import sysconfig
+import threading
+import types
 
 STANDARD = sysconfig.get_path("stdlib") + "/"
 # Their waits are for processes, sockets, files and threads of their own.
@@ -12,7 +14,6 @@ LIBRARIES = frozenset(
     [
         "bullet_gazebo",
         "catkin_pkg",
-        "dynamic_reconfigure",
         "genpy",
         "joblib",
         "lockstep_runner",
@@ -50,18 +51,42 @@ LIBRARIES = frozenset(
 )
 
 
+# Of these the waits are their callers'.
+GO_BETWEENS = frozenset(
+    ["threading", "queue", "concurrent.futures._base", "concurrent.futures.thread"]
+)
+
+
 def is_the_script(depth: int) -> bool:
-    """Whether the function `depth` frames above the caller belongs to the script, or a module of its own."""
-    frame = sys._getframe(depth + 1)
+    """Whether the function `depth` frames above the caller belongs to the script, or a module of its own.
+
+    A wait in Python's own `queue`, `threading` and `concurrent.futures` counts as that of who called
+    them, and one in a `threading.Timer` as the script's.
+    """
+    frame: types.FrameType | None = sys._getframe(depth + 1)
+    while frame is not None and _module(frame) in GO_BETWEENS:
+        if _module(frame) == "threading" and frame.f_code is threading.Timer.run.__code__:
+            return True
+        frame = frame.f_back
+    if frame is None:
+        return False
     path = frame.f_code.co_filename
     if path.startswith("<frozen"):
         return False
     if path.startswith(STANDARD) and "-packages/" not in path:
         return False
-    return caller(depth + 1) not in LIBRARIES
+    return _package(frame) not in LIBRARIES
 
 
 def caller(depth: int) -> str:
     """The package or module, by its first name, of the function `depth` frames above the caller."""
-    name: str = sys._getframe(depth + 1).f_globals.get("__name__", "")
-    return name.partition(".")[0]
+    return _package(sys._getframe(depth + 1))
+
+
+def _module(frame: types.FrameType) -> str:
+    name: str = frame.f_globals.get("__name__", "")
+    return name
+
+
+def _package(frame: types.FrameType) -> str:
+    return _module(frame).partition(".")[0]

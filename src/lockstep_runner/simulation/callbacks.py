@@ -59,6 +59,10 @@ class Callbacks:
         ]
         return [*{*acting, *topics}]
 
+    def heard(self) -> list[str]:
+        """Topics with callbacks, any of which may make come true what somebody waits for."""
+        return [name for name, topic in list(_topics().subs.items()) if topic.callbacks]
+
     def hand_out(self, messages: Iterable[TopicMessage]) -> None:
         """Has the callbacks called; returns before they have been."""
         with self._guard:

@@ -53,6 +53,7 @@ class Clock:
         # Threads that the script has started by itself, and what was seen of them
         self._own: WeakKeyDictionary[threading.Thread, Seen] = WeakKeyDictionary()
         self._order = 0
+        self._released = False  # all threads, for the node is shut down
         self.callbacks = Callbacks(self.began, self.ended)
 
     def covers_this_thread(self) -> bool:
@@ -119,6 +120,7 @@ class Clock:
     def release_all(self) -> None:
         """Wakes everybody, at the shutdown of the node."""
         with self._guard:
+            self._released = True  # also those that are about to rest
             sleepers, self._sleepers = self._sleepers, []
         for sleeper in sleepers:
             sleeper.resting.release()
@@ -126,6 +128,8 @@ class Clock:
     def _rest(self, span: float, until: Condition | None) -> bool:
         """Waits in a thread that the main one will wake."""
         with self._guard:
+            if self._released:
+                return False
             self._order += 1
             ident = threading.get_ident()
             sleeper = Sleeper(ident, self.passed + span, until, self._order)
@@ -158,7 +162,11 @@ class Clock:
 
     def _advance(self, ticks: int, topics: Collection[str]) -> bool:
         """Returns whether time has passed, or none was asked for."""
-        stops = self.callbacks.stops(topics) if ticks else ()
+        stops: Collection[str] = ()
+        if ticks and any(each.until is not None for each in self._sleepers):
+            stops = self.callbacks.heard()
+        elif ticks:
+            stops = self.callbacks.stops(topics)
         response = self.world.advance(ticks, stops)
         self.take_over_time()
         if response.ticks:

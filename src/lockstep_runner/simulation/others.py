@@ -9,6 +9,9 @@ from typing import Protocol
 class Others(Protocol):
     """Other processes under the same clock."""
 
+    def has(self, node: str) -> bool:
+        """Whether a node of that name is under the clock."""
+
     def settle(self) -> None:
         """Waits until all of them rest."""
 
@@ -24,6 +27,9 @@ class Others(Protocol):
 
 class NobodyElse:
     """There are none."""
+
+    def has(self, node: str) -> bool:
+        return False
 
     def settle(self) -> None:
         pass

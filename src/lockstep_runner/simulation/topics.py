@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rospy
@@ -26,6 +26,7 @@ class Topics:
         self.commands: frozenset[str] = (
             frozenset()
         )  # that the script publishes and the simulator hears
+        self.follows: Callable[[str], bool] = lambda node: True
         self._world = world
         self._notices = notices
         self._changed = True
@@ -76,9 +77,15 @@ class Topics:
     def lets_in(self, topic: Any, connection: Any) -> bool:
         """Whether messages over a connection go to the script's callbacks."""
         name, node = topic.resolved_name, connection.callerid_pub
-        if name not in self._heard or node == NODE or name in SILENT:
+        if node == NODE or name in SILENT or getattr(connection, "socket", None) is None:
             return True
-        if getattr(connection, "socket", None) is None:
+        if name not in self._heard:
+            if not self.follows(node):
+                self._notices.once(
+                    f"from {node}",
+                    f"node {node} goes by the wall's time: when its messages on {name} come isn't"
+                    " repeatable",
+                )
             return True
         self._notices.once(
             f"others on {name}",

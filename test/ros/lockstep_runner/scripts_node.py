@@ -104,6 +104,29 @@ class LockstepTest(unittest.TestCase):
         out = self.twice("trajectory_client.py").stdout
         self.assertEqual(out.count("True 3 "), 3, out)
 
+    def test_futures_a_queue_and_a_timer_of_python_s(self):
+        self.assertEqual(len(self.twice("futures_queue.py").stdout.splitlines()), 6)
+
+    def test_callbacks_that_command_and_a_shutdown_from_a_thread(self):
+        out = self.twice("callbacks_rate.py").stdout
+        self.assertEqual(out.count("beat"), 76, out)
+        self.assertGreater(len(out.splitlines()), 200)
+
+    def test_a_node_that_follows_ends_at_ctrl_c_while_the_script_computes(self):
+        node = (
+            "import rospy, time; rospy.init_node('follower'); rospy.set_param('/follower_is_up', 1)\n"
+            "while not rospy.is_shutdown(): time.sleep(0.01)\n"
+        )
+        script = HEAD + (
+            "import signal, subprocess\n"
+            f"node = subprocess.Popen([sys.executable, '-c', {node!r}])\n"
+            "while not rospy.has_param('/follower_is_up'):\n    time.sleep(0.01)\n"
+            "time.sleep(0.1)\nrospy.delete_param('/follower_is_up')\n"
+            f"node.send_signal(signal.SIGINT)\nprint(node.wait({BOUND / 2}))\n"
+        )
+        run = lockstep(written(script))
+        self.assertEqual(self.check(run), "0\n", run.stderr)
+
     def test_a_thread_that_sleeps_is_told_of_once(self):
         run = self.twice("sleeping_thread.py")
         self.assertEqual(run.stderr.count("thread 'heart' sleeps by time.sleep"), 1, run.stderr)

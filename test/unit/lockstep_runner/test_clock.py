@@ -2,35 +2,18 @@
 
 import math
 import threading
-from types import SimpleNamespace
 
 import pytest
 import rospy
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lockstep_world import MS, Counter
 
 from lockstep_runner.notices import Notices
 from lockstep_runner.simulation import clock as module
 from lockstep_runner.simulation.clock import Clock
 
 BOUND = 30.0  # [s]
-MS = 1_000_000  # [ns]
-
-
-class Counter:
-    """A world: counts its time; `messages` come at the tick that they are kept under."""
-
-    def __init__(self):
-        self.now, self.step, self.longest, self.paused = 0, MS, 500, False
-        self.calls = []
-        self.exchanged = lambda: None
-
-    def advance(self, ticks, until=(), connect=None):
-        self.calls.append(ticks)
-        self.exchanged()
-        passed = 0 if self.paused else ticks
-        self.now += passed * self.step
-        return SimpleNamespace(ticks=passed, paused=self.paused, messages=[], others=[])
 
 
 @pytest.fixture

@@ -1,0 +1,27 @@
+"""A world for lockstep_runner that is no more than a counter."""
+
+from types import SimpleNamespace
+
+MS = 1_000_000  # [ns]
+
+
+class Counter:
+    """A world: counts its time."""
+
+    there = True
+    has_post = False
+
+    def __init__(self):
+        self.now, self.step, self.longest, self.paused = 0, MS, 500, False
+        self.calls = []
+        self.exchanged = lambda: None
+
+    def advance(self, ticks, until=(), connect=None):
+        self.calls.append(ticks)
+        self.exchanged()
+        passed = 0 if self.paused else ticks
+        self.now += passed * self.step
+        return SimpleNamespace(ticks=passed, paused=self.paused, messages=[], others=[])
+
+    def switch(self, paused):
+        self.paused = paused

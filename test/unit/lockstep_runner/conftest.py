@@ -1,0 +1,20 @@
+"""A runner on a world that is no more than a counter."""
+
+from types import SimpleNamespace
+
+import pytest
+import rospy
+from lockstep_world import Counter
+
+from lockstep_runner.runner import Runner
+
+
+@pytest.fixture
+def runner(monkeypatch):
+    """For a script whose world is a `Counter`; nothing is replaced yet."""
+    monkeypatch.setattr(rospy.rostime, "_rostime_current", None)
+    monkeypatch.setattr(rospy.rostime, "_rostime_initialized", False)
+    made = Runner(0.008, None, Counter())
+    made.topics = SimpleNamespace(are_settled=True, commands=("/command",))
+    yield made
+    made.clock.release_all()
