@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, Mesh
 from bullet_gazebo.physics.elements import files_named_by_a_model, parse_xml, place
 from bullet_gazebo.physics.meshes.reader import read_mesh
+from bullet_gazebo.physics.meshes.submesh import Submesh
 from file_reading.content import MAX_BYTES, read_file
 from file_reading.errors import FileError, TooLarge
 from file_reading.xml_parser import MAX_ELEMENTS
@@ -28,7 +29,7 @@ class Reading:
 
     The limits: MAX_BYTES, MAX_ELEMENTS, MAX_FILES, MAX_MESH_BYTES, MAX_MODELS and MAX_SECONDS. A file is
     parsed once, however often it is included; its elements count each time. So is a mesh file, by however
-    many models it is named.
+    many models it is named; each named part of it is read by itself.
     """
 
     def __init__(self, cancelled: Callable[[], bool] = _never) -> None:
@@ -37,7 +38,7 @@ class Reading:
         self._end = time.thread_time() + MAX_SECONDS
         self._bytes = self._elements = self._models = self._mesh_bytes = 0
         self._files: dict[Path, tuple[Element, int]] = {}
-        self._meshes: dict[Path, Mesh] = {}
+        self._meshes: dict[tuple[Path, Submesh | None], Mesh] = {}
 
     def parse(self, text: str | bytes) -> Element:
         """Returns the root element of an XML text or a file's content.
@@ -76,22 +77,22 @@ class Reading:
             self._files[path] = root, self._elements - before
             return root
 
-    def mesh(self, path: Path) -> Mesh:
-        """Returns what a mesh file holds, which is the same object each time.
+    def mesh(self, path: Path, submesh: Submesh | None = None) -> Mesh:
+        """Returns what a mesh file, or a named part of it, holds, which is the same object each time.
 
         Raises:
             DescriptionError: if it can't be simulated; the text names it.
             LimitExceeded: if it is too much.
         """
-        if path not in self._meshes:
+        if (path, submesh) not in self._meshes:
             with files_named_by_a_model(f"mesh '{path}'"):
                 self._mesh_bytes += path.stat().st_size
             if self._mesh_bytes > MAX_MESH_BYTES:
                 raise LimitExceeded(
                     f"mesh '{path}': more than {MAX_MESH_BYTES} bytes of mesh files (MAX_MESH_BYTES)"
                 )
-            self._meshes[path] = read_mesh(path)
-        return self._meshes[path]
+            self._meshes[path, submesh] = read_mesh(path, submesh)
+        return self._meshes[path, submesh]
 
     def model(self) -> None:
         """Counts one model more.

@@ -13,6 +13,7 @@ import numpy as np
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.elements import finite, parse_xml, place, shown
 from bullet_gazebo.physics.meshes.arrays import MOST_TRIANGLES, Part
+from bullet_gazebo.physics.meshes.submesh import leave_node
 
 SPACE = "http://www.collada.org/2005/11/COLLADASchema"
 UP_AXES = {  # turned so that z is up
@@ -28,8 +29,8 @@ NO_INDEX = re.compile(r"[^0-9\s]|[0-9]{10}", re.ASCII)
 NO_NUMBER = re.compile(r"[^0-9\s.eE+-]", re.ASCII)
 
 
-def read_collada(data: bytes) -> list[Part]:
-    """Returns all that the scene shows as one part [m], z up.
+def read_collada(data: bytes, only: str = "") -> list[Part]:
+    """Returns all that the scene shows, or its nodes named `only`, as one part [m], z up.
 
     Raises:
         DescriptionError: if it isn't COLLADA, or holds what can't be read; the text names the place.
@@ -44,6 +45,8 @@ def read_collada(data: bytes) -> list[Part]:
         raise DescriptionError("it is not COLLADA")
     axes = _unit(root) * UP_AXES.get(root.findtext("asset/up_axis", "").strip(), np.eye(3))
     _prune(root)
+    if only:
+        leave_node(root, only)
     _check_size(root)
     root.set("xmlns", SPACE)
     try:

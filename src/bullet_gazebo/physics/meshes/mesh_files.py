@@ -9,6 +9,7 @@ from urllib.parse import unquote
 from bullet_gazebo.physics.description import DescriptionError, Mesh
 from bullet_gazebo.physics.elements import files_named_by_a_model, shown
 from bullet_gazebo.physics.meshes.reader import check_mesh
+from bullet_gazebo.physics.meshes.submesh import Submesh
 
 MeshFile = tuple[str, Mesh | None]
 """A file's path, and what it holds if it was read."""
@@ -80,12 +81,14 @@ class MeshFinder:
     """Finds the mesh files of one model; those of visuals may be missing, with a warning."""
 
     resources: Resources
-    read: Callable[[Path], Mesh]
+    read: Callable[[Path, Submesh | None], Mesh]
     folder: Path | None = None
     warnings: list[str] = field(default_factory=list)
 
-    def find(self, uri: str, where: str, needed: bool) -> MeshFile | None:
-        """Returns the file's path and what it holds, or None for one that is left out.
+    def find(
+        self, uri: str, where: str, needed: bool, submesh: Submesh | None = None
+    ) -> MeshFile | None:
+        """Returns the file's path and what it holds, or its `submesh`; None for one that is left out.
 
         What isn't `needed`, that of a visual, is looked for and not read: nothing is drawn in here.
 
@@ -99,7 +102,7 @@ class MeshFinder:
             if not needed:
                 check_mesh(path)
                 return str(path), None
-            return str(path), self.read(path)
+            return str(path), self.read(path, submesh)
         except DescriptionError as error:
             if needed:
                 raise type(error)(f"{where}: {error}") from error

@@ -7,20 +7,21 @@ import numpy as np
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.elements import numbers, shown
 from bullet_gazebo.physics.meshes.arrays import Part
+from bullet_gazebo.physics.meshes.submesh import not_found
 
 READ = ("v", "f", "o", "g")
 
 
-def read_obj(data: bytes) -> list[Part]:
-    """Returns a part for each object or group of the file.
+def read_obj(data: bytes, only: str = "") -> list[Part]:
+    """Returns a part for each object or group of the file, or for those named `only`.
 
     Raises:
         DescriptionError: for a vertex that isn't three numbers, or a face that isn't made of three or more
-            of the file's vertices; the text names the line.
+            of the file's vertices; the text names the line. If there is no part named `only`.
     """
     from trimesh.exchange.obj import load_obj
 
-    text = "\n".join(_shape_lines(data.decode("utf-8-sig", "replace")))
+    text = "\n".join(_shape_lines(data.decode("utf-8-sig", "replace"), only))
     loaded = load_obj(
         StringIO(text), group_material=False, skip_materials=True, maintain_order=True,
         split_objects=True, split_groups=True,
@@ -29,13 +30,14 @@ def read_obj(data: bytes) -> list[Part]:
     return [(np.asarray(part["vertices"]), np.asarray(part["faces"])) for part in parts]
 
 
-def _shape_lines(text: str) -> list[str]:
+def _shape_lines(text: str, only: str) -> list[str]:
     """The lines that make the shape, their indices counted from 1 from the start of the file.
 
     trimesh takes an index of 0 for the first vertex, counts a negative one back from the end of the file
     instead of from its own line, and confuses corners with textures with more corners without.
     """
     lines, faces, count = [], [], 0
+    name, others, found = "", set(), False
     joined = text.replace("\\\r\n", " ").replace("\\\n", " ")
     for number, line in enumerate(joined.splitlines(), 1):
         words = line.split()
@@ -50,12 +52,20 @@ def _shape_lines(text: str) -> list[str]:
             if len(corners) < 3:
                 raise DescriptionError(f"line {number}: a face has {len(corners)} corners")
             faces.append((max(corners), number))
+            if only and name != only:
+                others.add(name)
+                continue
+            found = True
             words[1:] = map(str, corners)
+        else:
+            name = " ".join(words[1:])
         lines.append(" ".join(words))
     beyond = [(corner, number) for corner, number in faces if corner > count]
     if beyond:
         corner, number = beyond[0]
         raise DescriptionError(f"line {number}: a face names vertex {corner} of {count}")
+    if only and not found:
+        raise not_found(only, others)
     return lines
 
 

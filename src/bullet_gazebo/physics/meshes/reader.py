@@ -11,10 +11,11 @@ from bullet_gazebo.physics.meshes.arrays import Part, make_mesh
 from bullet_gazebo.physics.meshes.collada import read_collada
 from bullet_gazebo.physics.meshes.obj import read_obj
 from bullet_gazebo.physics.meshes.stl import read_stl
+from bullet_gazebo.physics.meshes.submesh import Submesh, centred
 from file_reading.content import read_file
 from file_reading.errors import FileError
 
-READERS: dict[str, Callable[[bytes], list[Part]]] = {
+READERS: dict[str, Callable[[bytes, str], list[Part]]] = {
     ".stl": read_stl,
     ".dae": read_collada,
     ".obj": read_obj,
@@ -32,15 +33,15 @@ FAULTS = (
 )
 
 
-def read_mesh(path: Path) -> Mesh:
-    """Returns the mesh of an STL, COLLADA or OBJ file.
+def read_mesh(path: Path, submesh: Submesh | None = None) -> Mesh:
+    """Returns the mesh of an STL, COLLADA or OBJ file, or of one named part of it.
 
     Raises:
         DescriptionError: if it can't be simulated: the file, the place in it and the fault, in one line.
     """
     check_mesh(path)
     with place(f"mesh '{path}'"):
-        return make_mesh(_parts(READERS[path.suffix.lower()], _content(path)))
+        return make_mesh(_parts(READERS[path.suffix.lower()], _content(path), submesh))
 
 
 def check_mesh(path: Path) -> None:
@@ -64,10 +65,13 @@ def _content(path: Path) -> bytes:
         raise DescriptionError(str(error)) from error
 
 
-def _parts(read: Callable[[bytes], list[Part]], data: bytes) -> list[Part]:
+def _parts(
+    read: Callable[[bytes, str], list[Part]], data: bytes, submesh: Submesh | None
+) -> list[Part]:
     try:
         with np.errstate(all="ignore"):  # what isn't finite is refused by make_mesh
-            return read(data)
+            parts = read(data, submesh.name if submesh else "")
+            return centred(parts) if submesh and submesh.centred else parts
     except DescriptionError as error:  # a limit of XML's, too, is that of this file alone
         raise DescriptionError(str(error)) from error
     except FAULTS as error:

@@ -9,6 +9,7 @@ import numpy as np
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.elements import numbers
 from bullet_gazebo.physics.meshes.arrays import Part
+from bullet_gazebo.physics.meshes.submesh import not_found
 
 HEADER, FACET = 84, 50  # [bytes]
 NAME = re.compile(r"(?:^[ \t]*|\bend)solid(?:(?!facet)[^\r\n])*", re.IGNORECASE | re.MULTILINE)
@@ -16,12 +17,15 @@ CORNER = re.compile(r"\s(?=vertex|endloop)", re.IGNORECASE)
 NORMAL = re.compile(r"normal[^\r\n]*", re.IGNORECASE)
 
 
-def read_stl(data: bytes) -> list[Part]:
+def read_stl(data: bytes, only: str = "") -> list[Part]:
     """Returns the facets of all solids, corner by corner: one part.
 
     Raises:
-        DescriptionError: if the file is cut short, or if a facet isn't three corners of three numbers.
+        DescriptionError: if the file is cut short, or if a facet isn't three corners of three numbers; if it
+            is to have a part named `only`.
     """
+    if only:
+        raise not_found(only, [])
     from trimesh.exchange.stl import load_stl_binary
 
     size = HEADER + FACET * _facets(data)

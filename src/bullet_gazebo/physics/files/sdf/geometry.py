@@ -16,8 +16,10 @@ from bullet_gazebo.physics.elements import files_named_by_a_model, finite, numbe
 from bullet_gazebo.physics.files.reading import Reading
 from bullet_gazebo.physics.files.sdf.frames import Frames, read_pose
 from bullet_gazebo.physics.meshes.mesh_files import MeshFile, MeshFinder
+from bullet_gazebo.physics.meshes.submesh import Submesh
 from bullet_gazebo.physics.pose import Pose, Quaternion, cross, normalized
 
+NO_NAME = "__default__"  # of a submesh: as if it weren't there
 MOMENTS = {"ixx": 1.0, "ixy": 0.0, "ixz": 0.0, "iyy": 1.0, "iyz": 0.0, "izz": 1.0}  # defaults
 
 
@@ -79,7 +81,8 @@ class ShapeReader:
         size = _size(solid, where)
         if solid.tag == "mesh":
             with files_named_by_a_model(where):
-                found = self.meshes.find(solid.findtext("uri") or "", where, collides)
+                uri = solid.findtext("uri") or ""
+                found = self.meshes.find(uri, where, collides, _submesh(solid))
             if found is None:
                 return None
             mesh = found
@@ -97,6 +100,13 @@ class ShapeReader:
             solid=mesh[1],
         )
         return replace(shape, mu=_friction(element, where)) if collides else shape
+
+
+def _submesh(mesh: Element) -> Submesh | None:
+    name = (mesh.findtext("submesh/name") or "").strip()
+    if name in ("", NO_NAME):
+        return None
+    return Submesh(name, (mesh.findtext("submesh/center") or "").strip().lower() in ("1", "true"))
 
 
 def _friction(collision: Element, where: str) -> float:
