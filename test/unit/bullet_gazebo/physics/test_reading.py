@@ -104,9 +104,9 @@ def test_a_mesh_is_read_once_however_many_models_have_it(tmp_path, monkeypatch):
     includes = "".join(INCLUDE.format("chair", f"m{i}") for i in range(5))
     read = []
 
-    def counted(path):
+    def counted(path, submesh):
         read.append(path)
-        return read_mesh(path)
+        return read_mesh(path, submesh)
 
     monkeypatch.setattr(limits, "read_mesh", counted)
     world = parse_world(f'<sdf version="1.6"><world name="w">{includes}</world></sdf>',
