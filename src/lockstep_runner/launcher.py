@@ -12,8 +12,6 @@ from collections.abc import Callable, Sequence
 
 from lockstep_runner.notices import tell
 from lockstep_runner.script import running
-from lockstep_runner.script.seeds import seed_everything
-from lockstep_runner.simulation.world import NotInLockstep, is_running
 
 USAGE = 2
 SERVER_ARGUMENTS = "GZSERVER_ARGS"  # read by every simulator that is started below us
@@ -27,14 +25,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = _parse(sys.argv[1:] if argv is None else argv)
     try:
         code = running.compiled(args.script)
-        is_running()
-    except (running.NoScript, NotInLockstep) as fault:
+    except running.NoScript as fault:
         tell(str(fault))
         return USAGE
     if args.seed is not None and os.environ.get(HASHES) != str(args.seed % MOST_SEED):
         # The order of sets is drawn when Python starts.
         os.environ[HASHES] = str(args.seed % MOST_SEED)
         os.execv(sys.executable, [sys.executable, *sys.argv])
+    # Here: what it imports takes as long as Python's start, and would be imported twice
+    from lockstep_runner.simulation.world import NotInLockstep, is_running
+
+    try:
+        is_running()
+    except NotInLockstep as fault:
+        tell(str(fault))
+        return USAGE
     server = "--lockstep" if args.seed is None else f"--lockstep --seed {args.seed}"
     os.environ[SERVER_ARGUMENTS] = f"{os.environ.get(SERVER_ARGUMENTS, '')} {server}".strip()
     return _run(args, code)
@@ -42,11 +47,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(args: argparse.Namespace, code: types.CodeType) -> int:
     from lockstep_runner.install import install
+    from lockstep_runner.silence import watch
 
     runner = install(args)
     if args.seed is not None:
+        from lockstep_runner.script.seeds import seed_everything
+
         seed_everything(args.seed)
-    runner.watch()
+    watch(runner)
     show, sys.excepthook = sys.excepthook, _hide_ourselves(sys.excepthook, args.script)
     try:
         running.run(args.script, args.arguments, code)
@@ -76,6 +84,8 @@ def _hide_ourselves(show: Hook, path: str) -> Hook:
     ) -> None:
         fault.__traceback__ = running.own_part(trace, path)  # which is what is shown
         show(kind, fault, fault.__traceback__)
+        if hint := running.hint(fault):
+            tell(hint)
 
     return shown
 

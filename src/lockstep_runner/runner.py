@@ -22,12 +22,12 @@ from lockstep_runner.simulation.world import NODE, NotInLockstep, World, WorldFa
 from lockstep_runner.triggers import Triggers
 
 USAGE, FAILED = 2, 1  # exit codes
-SILENCE = 30.0  # [s of wall time] without simulated time, after which the user is told
 OTHERS = 2.0  # [s of wall time] in which another node may come up without time passing
 LOOK = 0.05  # [s of wall time]
 PAUSE = f"{NODE}/pause_physics"
 SWITCHES = (PAUSE, f"{NODE}/unpause_physics")
 POLLED = 10  # equal questions to a service in a row
+POLLED_TIME = 1000  # readings of the time in a row, with nothing in between
 QUIET = ("get_", "list_", "pause_physics", "unpause_physics")  # services that publish nothing
 
 
@@ -52,7 +52,8 @@ def _ends_with_the_world(
             try:
                 return method(self, *args, **kwds)
             except WorldGone as gone:
-                self.notices.once("gone", f"{gone}: without another one, sleeps are wall time")
+                if not self.is_over:  # Ctrl-C ends both
+                    self.notices.once("gone", f"{gone}: without another one, sleeps are wall time")
                 return instead
             except BadPeriod as fault:
                 self.fail(fault, USAGE)
@@ -201,6 +202,13 @@ class Runner:
                 self.polls(service, POLLED, request())
 
     @_ends_with_the_world(None)
+    def reads_time(self) -> None:
+        """The script reads the time."""
+        if self.clock.behind and self.world.there and self._may_step():
+            self.clock.exchange()
+        self.polls("the time", POLLED_TIME)
+
+    @_ends_with_the_world(None)
     def polls(self, what: str, often: int, detail: bytes = b"") -> None:
         """Something was looked at; done often enough, with nothing in between, it is waited for."""
         if self._may_step() and self.world.there and self.triggers.polled(what, often, detail):
@@ -224,26 +232,6 @@ class Runner:
                 self.wait(math.inf, lambda: not any(each.is_alive() for each in threads))
             else:
                 originals.sleep(LOOK)
-
-    def watch(self) -> None:
-        """Tells, from a thread of its own, of a script that lets no time pass."""
-        thread = threading.Thread(target=self._watch, name="lock-step's watchdog", daemon=True)
-        originals.start(thread)
-
-    def _watch(self) -> None:
-        passed, since = -1, originals.monotonic()
-        while True:
-            originals.sleep(1.0)
-            rests = self.clock.driving or self.world.paused or not self.world.there
-            if rests or self.clock.passed != passed:
-                passed, since = self.clock.passed, originals.monotonic()
-            elif originals.monotonic() - since > SILENCE:
-                self.notices.once(
-                    "silence",
-                    f"no simulated time has passed for {SILENCE:g} s: the script neither sleeps nor waits"
-                    " nor commands a controller. If it isn't busy with itself, name what time is to pass"
-                    f" with: --step-on {' or '.join(self.triggers.seen) or 'TOPIC-OR-SERVICE'}",
-                )
 
     def _may_step(self) -> bool:
         """While the main thread waits, time passes anyway."""

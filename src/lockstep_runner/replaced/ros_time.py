@@ -14,10 +14,6 @@ import rospy.timer
 from lockstep_runner import originals
 from lockstep_runner.runner import Runner
 
-POLLED = (
-    1000  # readings of the time in a row, with nothing in between: the script waits for it to pass
-)
-
 
 def install(runner: Runner) -> None:
     """Puts the functions in place."""
@@ -58,7 +54,7 @@ def _counted(runner: Runner, read: Callable[[], Any]) -> Callable[[], Any]:
     """A script that only looks at the clock waits for it."""
 
     def look() -> Any:
-        runner.polls("the time", POLLED)
+        runner.reads_time()
         return read()
 
     look.__doc__ = read.__doc__

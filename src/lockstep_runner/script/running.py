@@ -12,6 +12,12 @@ import types
 from collections.abc import Sequence
 
 PYTHON_2 = re.compile(r"<>|^\s*raise [\w.]+,|\bur['\"]|`")
+MODULES_OF_PYTHON_2 = frozenset(
+    ["ConfigParser", "Queue", "StringIO", "Tkinter", "__builtin__", "cPickle", "thread", "urllib2"]
+)
+NAMES_OF_PYTHON_2 = frozenset(
+    ["basestring", "execfile", "long", "raw_input", "reduce", "unichr", "unicode", "xrange"]
+)
 OURS = __name__.partition(".")[0]
 
 
@@ -51,6 +57,14 @@ def _is_for_python_2(fault: str, line: str) -> bool:
         "inconsistent use of tabs",
     )
     return any(sign in fault for sign in signs) or PYTHON_2.search(line) is not None
+
+
+def hint(fault: BaseException) -> str:
+    """What a script that reads as Python 3 means by a name of Python 2; empty for other faults."""
+    missing = fault.name if isinstance(fault, ImportError | NameError) else None
+    if missing in MODULES_OF_PYTHON_2 | NAMES_OF_PYTHON_2:
+        return f"{missing} is Python 2's: the script is for Python 2, this is Python 3; 2to3 mends most of it"
+    return ""
 
 
 def run(path: str, arguments: Sequence[str], code: types.CodeType) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
@@ -27,14 +27,9 @@ from lockstep_runner.simulation.world import World
 
 NANOSECONDS = 1_000_000_000
 LOOK = 0.002  # [s of wall time] between two looks whether a thread that computes has ended
-PATIENCE = (
-    10.0  # [s of wall time] with a thread that computes, or waits for something that isn't time
-)
+PATIENCE = 10.0  # [s of wall time] with a thread that computes, or waits for what isn't time
 OWN_QUIET = 30  # looks in a row at a thread of the script's that does nothing; 1 s
-PAUSED_LOOKS = (
-    0.001,
-    0.05,
-)  # [s of wall time] between two looks at a paused world, at first and at most
+PAUSED_LOOKS = 0.001, 0.05  # [s of wall time] between two looks at a paused world: first, most
 
 
 class Clock:
@@ -53,6 +48,8 @@ class Clock:
         # Threads that the script has started by itself, and what was seen of them
         self._own: WeakKeyDictionary[threading.Thread, Seen] = WeakKeyDictionary()
         self._order = 0
+        self._now = 0  # [ns] the simulator's time, as of its last answer
+        self.behind = False  # the simulator's time: a call was left in the middle
         self._released = False  # all threads, for the node is shut down
         self.callbacks = Callbacks(self.began, self.ended)
 
@@ -162,13 +159,19 @@ class Clock:
 
     def _advance(self, ticks: int, topics: Collection[str]) -> bool:
         """Returns whether time has passed, or none was asked for."""
-        stops: Collection[str] = ()
+        stops: Sequence[str] = ()
         if ticks and any(each.until is not None for each in self._sleepers):
             stops = self.callbacks.heard()
         elif ticks:
             stops = self.callbacks.stops(topics)
-        response = self.world.advance(ticks, stops)
+        before, caught_up, self.behind = self._now, not self.behind, True
+        response = self.world.advance(ticks, stops)  # which a signal's handler may leave by raising
+        self.behind = False
+        self._now = self.world.now
         self.take_over_time()
+        if not caught_up:
+            missed = self.world.now - before - response.ticks * self.world.step
+            self.passed += max(0, missed)
         if response.ticks:
             self.passed += response.ticks * self.world.step
             self.waits += 1

@@ -17,7 +17,9 @@ from ros_utils.simulation import Simulation, reserved_port
 
 ROOT = Path(rospkg.RosPack().get_path("cartpole"))
 SCRIPTS = ROOT / "test" / "data" / "scripts"
-EXISTING = ROOT.parent / "shared" / "pg_script" / "launch_robot_test.py"
+EXISTING = (
+    Path(__file__).resolve().parents[3].parent / "shared" / "pg_script" / "launch_robot_test.py"
+)
 EPISODES = 20
 BOUND = 300  # [s]
 BURN = "while True: pass"
@@ -55,8 +57,8 @@ class Burners:
 
 
 class LaunchingTest(unittest.TestCase):
-    def run_own(self, seed=3):
-        process = start("--seed", seed, SCRIPTS / "publish_read.py", env=environment())
+    def run_own(self):
+        process = start("--seed", 3, SCRIPTS / "publish_read.py", env=environment())
         out, err = process.communicate(timeout=BOUND)
         self.assertEqual(process.returncode, 0, err)
         lines = [line for line in out.splitlines() if re.match(r"\d \d+ ", line)]
@@ -67,7 +69,6 @@ class LaunchingTest(unittest.TestCase):
         one = self.run_own()
         with Burners():
             self.assertEqual(self.run_own(), one)
-        self.assertNotEqual(self.run_own(seed=4), one)
 
     @unittest.skipUnless(EXISTING.is_file(), "the existing script isn't here")
     def test_the_existing_script_is_repeatable_also_on_a_busy_machine(self):
@@ -90,6 +91,8 @@ class LaunchingTest(unittest.TestCase):
             os.killpg(process.pid, signal.SIGINT)
             _, err = process.communicate(timeout=BOUND)
         self.assertGreater(len(lines), EPISODES, err)
+        self.assertEqual(process.returncode, 0, err)  # as it ends without us
+        self.assertNotIn("the simulator has", err)
         weights = Path(folder, "models", "policy_network_episode_0.pth").read_bytes()
         return lines, weights
 

@@ -22,7 +22,7 @@ BOUND = 120  # [s]
 
 
 def lockstep(*arguments, **options):
-    command = ["rosrun", "cartpole", "lockstep.py", *map(str, arguments)]
+    command = [sys.executable, str(ROOT / "scripts" / "lockstep.py"), *map(str, arguments)]
     return subprocess.run(
         command, capture_output=True, text=True, timeout=BOUND, check=False, **options
     )
@@ -242,17 +242,35 @@ class LockstepTest(unittest.TestCase):
     def test_ctrl_c_in_a_sleep(self):
         script = written(
             HEAD + "print('ready', flush=True)\n"
-            "while not rospy.is_shutdown():\n    time.sleep(0.5)\n"
+            "while not rospy.is_shutdown():\n    time.sleep(0.5)\nprint('done')\n"
         )
         process = subprocess.Popen(
             ["rosrun", "cartpole", "lockstep.py", str(script)],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
         )  # fmt: skip
         self.assertEqual(process.stdout.readline(), "ready\n")
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=BOUND)
-        self.assertNotEqual(process.returncode, None)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+        out, err = process.communicate(timeout=BOUND)
+        self.assertEqual((process.returncode, out, err), (0, "done\n", ""))
         self.check(lockstep(SCRIPTS / "rate_loop.py"))  # the world goes on
+
+    def test_what_is_raised_in_the_middle_of_a_step(self):
+        interrupted = HEAD + (
+            "import signal\n"
+            "def bell(*_):\n    {}\n"
+            "signal.signal(signal.SIGALRM, bell)\n"
+            "signal.setitimer(signal.ITIMER_REAL, 0.2)\n"
+            "try:\n    while True:\n        time.sleep(0.5)\n"
+            "except RuntimeError:\n    pass\n"
+            "before = rospy.get_time()\ntime.sleep(1.0)\nprint(round(rospy.get_time() - before, 6))\n"
+            "raise KeyError('the end')\n"
+        )
+        run = lockstep(written(interrupted.format("raise RuntimeError")))
+        self.assertEqual((run.returncode, run.stdout), (1, "1.0\n"), run.stderr)
+        self.assertIn("KeyError: 'the end'", run.stderr)
+        run = lockstep(written(interrupted.format("sys.exit(5)")))
+        self.assertEqual((run.returncode, run.stdout, run.stderr), (5, "", ""))
+        self.check(lockstep(SCRIPTS / "rate_loop.py"))
 
     def test_bad_input(self):
         run = lockstep("no_such_script.py")

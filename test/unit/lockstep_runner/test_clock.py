@@ -41,6 +41,23 @@ def test_a_wait_is_as_long_as_it_was_asked_for_in_whole_ticks(clock):
     assert max(clock.world.calls) <= clock.world.longest
 
 
+def test_a_call_that_is_left_in_the_middle_has_taken_its_time(clock):
+    """A signal's handler raises."""
+
+    def bell():
+        clock.world.now += 500 * MS  # the simulator goes on
+        clock.world.exchanged = lambda: None
+        raise RuntimeError
+
+    clock.wait(0.1)
+    clock.world.exchanged = bell
+    with pytest.raises(RuntimeError):
+        clock.wait(0.5)
+    assert clock.behind
+    clock.exchange()
+    assert (clock.passed, clock.behind) == (600 * MS, False)
+
+
 def test_rospy_has_the_time(clock):
     clock.wait(0.25)
     assert rospy.get_rostime().to_sec() == 0.25

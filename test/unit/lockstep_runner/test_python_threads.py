@@ -3,6 +3,7 @@
 import concurrent.futures
 import queue
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures import _base as futures
 from concurrent.futures import thread as pools
 
@@ -21,8 +22,7 @@ def replaced(runner, monkeypatch):
     for owner, name in (
         (threading.Thread, "start"), (threading.Thread, "join"), (threading.Event, "wait"),
         (threading.Condition, "wait"), (threading, "_time"), (queue, "time"), (futures, "time"),
-        (concurrent.futures.ThreadPoolExecutor, "submit"), (concurrent.futures.ThreadPoolExecutor, "shutdown"),
-        (pools._WorkItem, "run"),
+        (ThreadPoolExecutor, "submit"), (ThreadPoolExecutor, "shutdown"), (pools._WorkItem, "run"),
     ):  # fmt: skip
         monkeypatch.setattr(owner, name, getattr(owner, name))  # so that it is put back
     python_threads.install(runner)
@@ -100,7 +100,7 @@ def test_tasks_of_an_executor_take_the_time_that_they_sleep(replaced, workers):
         replaced.wait(0.01 * (number + 1))
         return number, passed(replaced)
 
-    with concurrent.futures.ThreadPoolExecutor(workers) as executor:
+    with ThreadPoolExecutor(workers) as executor:
         results = list(executor.map(work, range(3)))
         task = executor.submit(work, 4)
         with pytest.raises(concurrent.futures.TimeoutError):
@@ -119,7 +119,7 @@ def test_no_time_passes_while_a_task_computes(replaced):
         assert go.acquire(timeout=BOUND)
         seen.append(passed(replaced))
 
-    with concurrent.futures.ThreadPoolExecutor(1) as executor:
+    with ThreadPoolExecutor(1) as executor:
         executor.submit(work)
         waker = threading.Thread(target=lambda: (originals.sleep(0.2), go.release()))
         originals.start(waker)

@@ -61,6 +61,24 @@ def test_scripts_for_python_2_are_told_so(run, text):
         run(text)
 
 
+@pytest.mark.parametrize(
+    ("text", "missing"),
+    [("import Queue\n", "Queue"), ("for n in xrange(3):\n    pass\n", "xrange"),
+     ("raw_input()\n", "raw_input"), ("from Tkinter import Tk\n", "Tkinter")],
+)  # fmt: skip
+def test_names_of_python_2_are_told_where_the_script_ends_at_them(run, text, missing):
+    with pytest.raises((ImportError, NameError)) as fault:
+        run(text)
+    assert missing in running.hint(fault.value) and "Python 2" in running.hint(fault.value)
+
+
+@pytest.mark.parametrize("text", ["import no_such_module\n", "no_such_name\n", "{}['xrange']\n"])
+def test_other_faults_have_no_hint(run, text):
+    with pytest.raises((ImportError, NameError, KeyError)) as fault:
+        run(text)
+    assert running.hint(fault.value) == ""
+
+
 @pytest.mark.parametrize("text", [b"x = (\n", b"\xff\xfe\x00", b"x = 1\0\n"])
 def test_what_is_no_python_is_one_line(run, text):
     with pytest.raises(running.NoScript) as fault:

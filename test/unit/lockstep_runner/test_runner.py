@@ -1,0 +1,146 @@
+"""What the replaced functions share: when it speaks, when it ends the script, and whom it waits for."""
+
+import os
+import threading
+import time
+
+import pytest
+import rospy
+from lockstep_world import MS
+
+from lockstep_runner import originals
+from lockstep_runner.silence import watch
+from lockstep_runner.simulation.world import WorldFailed, WorldGone
+from lockstep_runner.triggers import Triggers
+
+BOUND = 30.0  # [s of wall time]
+
+
+def until_told(capsys, text):
+    said, deadline = "", time.monotonic() + BOUND
+    while text not in said and time.monotonic() < deadline:
+        originals.sleep(0.01)
+        said += capsys.readouterr().err
+    return said
+
+
+def test_a_busy_loop_is_told_of_once_with_what_may_be_named(runner, capsys):
+    runner.triggers.called("/gazebo/get_world_properties")
+    runner.triggers.after("/chatter", is_command=False)
+    thread = watch(runner, 0.1)
+    said = until_told(capsys, "--step-on")
+    originals.join(thread, BOUND)
+    assert said.count("\n") == 1
+    assert "no simulated time has passed for 0.1 s" in said
+    assert "--step-on /gazebo/get_world_properties or /chatter" in said
+
+
+def test_a_trigger_that_isn_t_there_is_told_with_it(runner, capsys):
+    runner.triggers = Triggers(["/nope"])
+    watch(runner, 0.1)
+    assert "It uses nothing of the name /nope." in until_told(capsys, "--step-on")
+
+
+@pytest.mark.parametrize("state", ["paused", "waiting", "alone"])
+def test_nothing_is_told_where_time_needn_t_pass(runner, capsys, monkeypatch, state):
+    if state == "paused":
+        runner.world.paused = True
+    elif state == "waiting":
+        runner.clock.driving = True
+    else:
+        runner.world.there = False
+    thread = watch(runner, 0.05)
+    originals.sleep(0.3)  # several times the bound
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(rospy.core, "_shutdown_flag", True)
+    originals.join(thread, BOUND)
+    assert not thread.is_alive()
+
+
+def test_a_world_that_ends_leaves_waits_to_the_wall_and_is_told_once(runner, capsys):
+    def gone():
+        raise WorldGone("the simulator has been ended")
+
+    runner.world.exchanged = gone
+    assert not runner.wait(1.0)
+    assert not runner.wait(1.0)
+    assert capsys.readouterr().err.count("sleeps are wall time") == 1
+
+
+def test_a_world_that_ends_at_ctrl_c_isn_t_worth_a_line(runner, capsys, monkeypatch):
+    def gone():
+        monkeypatch.setattr(rospy.core, "_shutdown_flag", True)
+        raise WorldGone("the simulator has been ended")
+
+    runner.world.exchanged = gone
+    assert not runner.wait(1.0)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_world_that_dies_ends_the_script_also_where_it_catches_everything(
+    runner, capsys, monkeypatch
+):
+    def died():
+        raise WorldFailed("the simulator has died")
+
+    ended = []
+
+    def leave(code):
+        ended.append(code)
+        raise SystemExit(code)
+
+    monkeypatch.setattr(os, "_exit", leave)
+    runner.world.exchanged = died
+    with pytest.raises(SystemExit):
+        runner.wait(1.0)
+    assert ended == []
+    with pytest.raises(SystemExit):  # the script has caught the first one
+        runner.wait(1.0)
+    assert ended == [1]
+    assert capsys.readouterr().err == "lockstep: the simulator has died\n"
+
+
+def test_a_period_that_is_no_multiple_names_both_numbers(runner, capsys):
+    runner.world.step = 3 * MS
+    runner.world.there = False
+
+    def look():
+        runner.world.there = True
+        return True
+
+    runner.world.look = look
+    runner.topics.changed = lambda: None
+    with pytest.raises(SystemExit) as ended:
+        runner.is_connected()
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert "--dt 0.008" in said and "0.003 s" in said
+
+
+def test_who_looks_for_another_node_in_vain_gets_messages_and_then_time(runner):
+    looks = 0
+    while runner.waits_for_others(0.5):
+        looks += 1
+        assert runner.clock.passed == 0
+        assert looks < 10
+    assert looks == 4  # 2 s of looking
+    assert set(runner.world.calls) == {0}
+
+
+def test_the_end_waits_for_threads_that_still_want_time(runner):
+    thread = threading.Thread(target=lambda: runner.wait(0.05))
+    go = threading.Lock()
+    with go:
+        thread.run = lambda: (go.acquire(), runner.wait(0.05))
+        originals.start(thread)
+        runner.clock.began(thread)
+    runner.finish([thread])
+    assert runner.clock.passed >= 50 * MS and not thread.is_alive()
+
+
+@pytest.mark.parametrize("passes", [True, False])
+def test_pauses_go_with_the_next_call(runner, passes):
+    name = "unpause_physics" if passes else "pause_physics"
+    assert runner.switches(f"/gazebo/{name}")
+    assert runner.world.paused is not passes
+    assert not runner.switches("/other/pause_physics")
