@@ -3,11 +3,15 @@
 
 PERIOD=15  # [s] between two lines about a step that runs
 
-hash_of() { sha256sum | cut -d ' ' -f 1; }
+# Of what a step depends on, in the order of files that is the same in every language.
+hash_of() (  # step
+    export LC_ALL=C
+    "key_$1" | sha256sum | cut -d ' ' -f 1
+)
 
 is_ready() {  # step
     local stamp=$WS/stamp/$1
-    [[ -f $stamp && $(<"$stamp") == "$("key_$1" | hash_of)" ]]
+    [[ -f $stamp && $(<"$stamp") == "$(hash_of "$1")" ]]
 }
 
 are_ready() {  # step...
@@ -63,7 +67,7 @@ make_step() {  # step, title
     kill "$watcher" 2>/dev/null
     wait "$watcher" 2>/dev/null
     trap - EXIT
-    [[ $status -ne 0 ]] || { "key_$1" | hash_of >"$WS/stamp/$1"; } 2>/dev/null || status=$?
+    [[ $status -ne 0 ]] || { hash_of "$1" >"$WS/stamp/$1"; } 2>/dev/null || status=$?
     set -e
     [[ $status -eq 0 ]] || tell_failure "$1" "$2" "$status" "$((SECONDS - begin))"
     say "$2: done in $(duration $((SECONDS - begin)))"

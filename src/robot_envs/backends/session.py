@@ -121,9 +121,18 @@ class RosSession(Generic[State]):
             seed=self._seed,
             timeout=START_TIMEOUT,
         )
-        if not started:
+        if isinstance(started, bool):
             raise RobotEnvError("the simulator didn't start; see the messages above")
-        self._undo.callback(ros_gazebo.close_Gazebo)
+        simulator = OwnSimulator()
+
+        def end() -> None:
+            """One that has taken its place meanwhile is somebody else's."""
+            if started.pid is not None and simulator.is_there():
+                ros_gazebo.close_Gazebo()
+            else:
+                started.close()
+
+        self._undo.callback(end)
 
     def _join(self) -> None:
         """Becomes a node, unless the process is one; the training handles signals itself."""

@@ -94,6 +94,22 @@ class PgTrainFaults(unittest.TestCase):
         place.send_to_simulator(signal.SIGKILL)
         self.assert_failed(place, training)
 
+    def test_the_simulator_that_takes_its_own_ones_place_lives_on(self):
+        place = self.place()
+        core = place.start("roscore", "-p", place.environment["ROS_MASTER_URI"].rpartition(":")[2])
+        core.wait_for("started core service")
+        training = self.training(place)
+        other = place.start("rosrun", "gazebo_ros", "gzserver", "--replace", "--lockstep")
+        self.assertEqual(training.end(), 1, training.output)
+        self.assertIn("another one runs as /gazebo", training.output)
+        self.assert_saved(place)
+        question = place.start("rosservice", "call", "/gazebo/get_world_properties")
+        self.assertEqual(question.end(), 0, question.output + other.output)
+        other.interrupt()
+        self.assertEqual(other.end(), 0, other.output)
+        core.interrupt()
+        self.assertEqual(place.left_after(), {})
+
     def test_a_master_that_does_not_answer(self):
         with socket.create_server(("127.0.0.1", 0)) as deaf:
             self.assert_refused(f"http://127.0.0.1:{deaf.getsockname()[1]}", "no answer within")

@@ -42,6 +42,26 @@ def test_clean_removes_what_ws_made(ws, checkout):
     assert (checkout / "requirements/base.txt").exists()
 
 
+KEYS = """source tools/ws_steps.sh; source tools/ws_ready.sh
+for step in companions build; do hash_of "$step"; done"""
+
+
+def test_what_is_ready_is_ready_in_every_language(root, tmp_path):
+    """Languages sort names differently: by this one Z goes before a."""
+    tool = tmp_path / "sort"
+    tool.write_text('#!/bin/bash\n[[ ${LC_ALL-} == C ]] || set -- -r "$@"\nexec /usr/bin/sort "$@"\n')
+    tool.chmod(0o755)
+    found = {
+        subprocess.run(
+            ["bash", "-c", KEYS], check=True, cwd=root, capture_output=True, text=True,
+            env={"PATH": f"{tmp_path}:/usr/bin:/bin", "ROOT": str(root)} | language,
+        ).stdout
+        for language in ({"LC_ALL": "C"}, {"LC_ALL": "C.UTF-8"}, {"LANG": "C.UTF-8"})
+    }  # fmt: skip
+    assert len(found) == 1
+    assert re.fullmatch(r"([0-9a-f]{64}\n){2}", found.pop())
+
+
 # --- what it says ------------------------------------------------------------------------------
 
 
