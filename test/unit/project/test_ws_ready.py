@@ -49,7 +49,9 @@ for step in companions build; do hash_of "$step"; done"""
 def test_what_is_ready_is_ready_in_every_language(root, tmp_path):
     """Languages sort names differently: by this one Z goes before a."""
     tool = tmp_path / "sort"
-    tool.write_text('#!/bin/bash\n[[ ${LC_ALL-} == C ]] || set -- -r "$@"\nexec /usr/bin/sort "$@"\n')
+    tool.write_text(
+        '#!/bin/bash\n[[ ${LC_ALL-} == C ]] || set -- -r "$@"\nexec /usr/bin/sort "$@"\n'
+    )
     tool.chmod(0o755)
     found = {
         subprocess.run(
