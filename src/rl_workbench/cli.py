@@ -59,9 +59,11 @@ def main(
         return training.main(argv[1:], prog=f"{prog} {TRAIN}")
     interrupt = Interrupt().install()
     try:
-        arguments = parse(argv, prog)
+        with interrupt.reading():
+            arguments = parse(argv, prog)
+            command = _module(arguments.command)
         arguments.program = program
-        _module(arguments.command).run(arguments, interrupt)
+        command.run(arguments, interrupt)
         return interrupt.exit_code
     except WorkbenchError as error:
         print(f"{prog}: {error}", file=sys.stderr, flush=True)

@@ -3,6 +3,7 @@
 import argparse
 import sys
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -96,7 +97,10 @@ def train(options: TrainingOptions, interrupt: Interrupt) -> Path:
     Raises:
         WorkbenchError: if something fails that the user can mend; what was learned is saved.
     """
-    from rl_workbench.training.run.training import Training  # slow to import; --help needs none
+    with interrupt.reading():  # both are slow to import; --help needs none
+        from rl_workbench.training.run.training import Training
+
+        import_module(options.kind.implementation)
 
     run = options.run
     try:

@@ -1,6 +1,7 @@
 """The command line as a whole: who is asked, by which name, and what --help and wrong words come to."""
 
 import json
+import signal
 import re
 import subprocess
 from pathlib import Path
@@ -30,11 +31,12 @@ def test_a_training_its_resumption_and_its_policy(
 
 
 def test_ctrl_c_while_it_is_still_being_read(tmp_path: Path) -> None:
-    (tmp_path / "torch.py").write_text("raise KeyboardInterrupt\n")
+    swallowed = "try:\n    signal.raise_signal(signal.SIGINT)\nexcept BaseException:\n    pass\n"
+    (tmp_path / "torch.py").write_text(f"import signal\n{swallowed}")
     done = subprocess.run(
         [*PROGRAM, "train", "--algo=dqn"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
 
 
 @pytest.mark.parametrize("prog", ["rl-workbench", "workbench.py"])

@@ -3,7 +3,9 @@
 At once while things start, at the next step while training.
 """
 
+import contextlib
 import signal
+from collections.abc import Iterator
 from types import FrameType
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
@@ -37,6 +39,15 @@ class Interrupt:
         self._deferred = False
         if self.requested():
             raise KeyboardInterrupt
+
+    @contextlib.contextmanager
+    def reading(self) -> Iterator[None]:
+        """While modules are imported signals wait: what is interrupted there may be left half done."""
+        self.defer()
+        try:
+            yield
+        finally:
+            self.at_once()
 
     def requested(self) -> bool:
         return self.signal is not None

@@ -28,6 +28,16 @@ def test_while_training_it_is_only_noted_however_often(interrupt: Interrupt) -> 
     assert interrupt.exit_code == 130
 
 
+def test_while_modules_are_read_it_waits(interrupt: Interrupt) -> None:
+    read = []
+    with pytest.raises(KeyboardInterrupt), interrupt.reading():
+        signal.raise_signal(signal.SIGINT)
+        read.append("all")
+    assert read == ["all"]
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
 def test_after_training_it_ends_any_wait_again(interrupt: Interrupt) -> None:
     interrupt.defer()
     interrupt.at_once()
