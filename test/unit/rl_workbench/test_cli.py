@@ -1,8 +1,8 @@
 """The command line as a whole: who is asked, by which name, and what --help and wrong words come to."""
 
 import json
-import signal
 import re
+import signal
 import subprocess
 from pathlib import Path
 
