@@ -11,6 +11,7 @@ from bullet_gazebo.ros.wire.rospy_patches.topics import (
     divert_messages,
     is_connected,
     on_topics_changed,
+    publish_without_yielding,
 )
 
 CONNECTING = 2.0  # [s of wall time] for a node that has just said what it publishes and hears
@@ -58,6 +59,7 @@ class Mailboxes:
         self.changes = 0  # of the topics that this process publishes or subscribes to
         self._boxes: dict[str, Mailbox] = {}
         divert_messages(self._sink)
+        publish_without_yielding()
         on_topics_changed(self._count_change)
 
     def of(self, node: str) -> Mailbox:

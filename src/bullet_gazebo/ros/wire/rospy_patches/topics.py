@@ -3,18 +3,21 @@
 - `free_polls_at_once`: file descriptors of topics that are gone pile up (test_topics.py)
 - `wait_until_sent`: what was published just before a topic is closed is thrown away (test_topics.py)
 - `divert_messages`, `divert_connections`, `deliver`, `is_connected`: messages of a node in lock-step go with
-  its calls (advance.test)
-- `on_topics_changed`: and it has to know when there are others (advance.test)
+  its calls (scripts.test)
+- `publish_without_yielding`: a step in lock-step spends most of its time on it (test_mailboxes.py)
+- `on_topics_changed`: and it has to know when there are others (scripts.test)
 """
 
 import select
 import time
+import types
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import rospy
 import rospy.impl.registration
+from rospy.impl import tcpros_pubsub
 from rospy.impl.tcpros_pubsub import QueuedConnection
 from rospy.topics import Poller, _PublisherImpl, _SubscriberImpl, _TopicImpl
 
@@ -76,6 +79,21 @@ def divert_messages(sink_of: Callable[[str], Sink | None]) -> None:
         return bool(add_connection(topic, connection))
 
     _TopicImpl.add_connection = diverting
+
+
+def publish_without_yielding() -> None:
+    """Has who publishes go on at once: rospy gives the processor away after each message to each connection.
+
+    For a world that only moves at a request: between two requests the threads that send have their turn.
+    """
+    module = types.ModuleType("time")
+    vars(module).update(vars(time), sleep=_sleep_unless_zero)
+    tcpros_pubsub.time = module
+
+
+def _sleep_unless_zero(seconds: float) -> None:
+    if seconds > 0:
+        time.sleep(seconds)
 
 
 def divert_connections(node: str, sink: Sink) -> None:
