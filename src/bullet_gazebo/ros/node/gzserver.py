@@ -48,6 +48,7 @@ from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.ros.wire.signals import SignalHandler, end_within, init_node, wait_for_master
 from bullet_gazebo.ros.wire.thinning import Thinner
 from bullet_gazebo.simulator import Simulator
+from ros_calls import master
 
 NAME = "gazebo"
 MOST_FREQUENT = 1e9  # [Hz]; time is counted in nanoseconds
@@ -145,6 +146,20 @@ def _clock_frequency() -> float:
     return 0.0
 
 
+def simulate(args: argparse.Namespace, engine: Engine, signals: SignalHandler) -> int:
+    """Simulates until the end; returns the exit code."""
+    try:
+        return GazeboNode(args, engine, signals.noted).run(signals)
+    except Exception:
+        if rospy.is_shutdown():
+            return 0  # ended before it was ready: topics and services can't be opened any more
+        if master.is_up():
+            raise
+        text = f"the master at {master.uri()} went while the simulator started"
+        print(f"gzserver: {text}", file=sys.stderr)
+        return 1
+
+
 def main(argv: list[str] | None = None) -> int:
     """Runs the node; returns its exit code."""
     use_one_arena()
@@ -175,12 +190,7 @@ def main(argv: list[str] | None = None) -> int:
     except EngineError as error:
         rospy.logfatal("%s", error)
         return 1
-    try:
-        code = GazeboNode(args, engine, signals.noted).run(signals)
-    except Exception:
-        if not rospy.is_shutdown():
-            raise
-        code = 0  # ended before it was ready: topics and services can't be opened any more
+    code = simulate(args, engine, signals)
     if loss.happened:
         print(f"gzserver: {loss.text(name)}", file=sys.stderr)
         code = code or 1
