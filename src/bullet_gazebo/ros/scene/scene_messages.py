@@ -1,0 +1,57 @@
+"""Descriptions and lights as the messages of a scene."""
+
+from bullet_gazebo_msgs.msg import SceneJoint, SceneLight, SceneLink, SceneModel, SceneShape
+from geometry_msgs.msg import Vector3
+from std_msgs.msg import ColorRGBA
+
+from bullet_gazebo.physics.description import Light, Shape
+from bullet_gazebo.physics.model import Model
+from bullet_gazebo.ros.wire.conversions import to_pose_msg
+
+
+def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
+    """Returns all that the model consists of, its `collisions` where they are asked for."""
+    description = model.description
+    links = [
+        SceneLink(
+            name=name,
+            visuals=[_to_shape(shape) for shape in description.links[name].visuals],
+            collisions=[_to_shape(shape) for shape in description.links[name].collisions if collisions],
+        )
+        for name in model.link_names
+    ]  # fmt: skip
+    joints = [
+        SceneJoint(
+            name=joint.name,
+            kind=joint.kind,
+            child=joint.child,
+            frame=to_pose_msg(joint.anchor),
+            axis=Vector3(*joint.axis),
+            lower=joint.lower if joint.bounded else 1.0,
+            upper=joint.upper if joint.bounded else 0.0,
+        )
+        for joint in description.movable_joints
+    ]
+    return SceneModel(number, model.name, description.static, False, links, joints)
+
+
+def to_light(light: Light) -> SceneLight:
+    return SceneLight(
+        name=light.name,
+        kind=light.kind,
+        diffuse=ColorRGBA(*light.diffuse),
+        pose=to_pose_msg(light.pose),
+        direction=Vector3(*light.direction),
+    )
+
+
+def _to_shape(shape: Shape) -> SceneShape:
+    return SceneShape(
+        name=shape.name,
+        kind=shape.kind,
+        size=shape.size,
+        pose=to_pose_msg(shape.pose),
+        mesh=shape.mesh,
+        has_color=shape.rgba is not None,
+        color=ColorRGBA(*(shape.rgba or (0.0, 0.0, 0.0, 0.0))),
+    )
