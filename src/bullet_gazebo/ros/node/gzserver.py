@@ -32,8 +32,7 @@ from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.node.world_control import WorldControl
 from bullet_gazebo.ros.node.world_loader import fill_world, load_plugins, read_world
 from bullet_gazebo.ros.plugins import PluginRegistry
-from bullet_gazebo.ros.scene.scene_service import SceneNumbers, SceneService
-from bullet_gazebo.ros.scene.scene_topics import SceneTopics
+from bullet_gazebo.ros.scene.scene_offer import SceneOffer
 from bullet_gazebo.ros.services.spawn_services import SpawnServices
 from bullet_gazebo.ros.services.stepping.advance_service import AdvanceService
 from bullet_gazebo.ros.services.stepping.step_service import StepService
@@ -76,7 +75,8 @@ class GazeboNode:
         MasterWatch().start()
 
     def _advertise(self, network: bool) -> None:
-        WorldControl(self.sim, self._watchdog).offer()
+        scene = SceneOffer(self.sim)
+        WorldControl(self.sim, self._watchdog, scene.show if network else None).offer()
         free_polls_at_once()
         bound_messages()
         bound_calls()
@@ -102,11 +102,8 @@ class GazeboNode:
                 StepService(self.sim, self._watchdog, one_at_a_time),
                 AdvanceService(self.sim, self._watchdog, thinner, one_at_a_time),
             ]
-        numbers = SceneNumbers(self.sim)
         self._services = [
             *stepping,
-            SceneService(self.sim, numbers),
-            SceneTopics(self.sim, numbers),
             SpawnServices(self.sim, plugins),
             *advertise_world_services(self.sim),
         ]

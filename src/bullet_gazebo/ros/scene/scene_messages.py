@@ -12,14 +12,20 @@ from bullet_gazebo.ros.wire.conversions import to_pose_msg
 def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
     """Returns all that the model consists of, its `collisions` where they are asked for."""
     description = model.description
-    links = [
-        SceneLink(
-            name=name,
-            visuals=[_to_shape(shape) for shape in description.links[name].visuals],
-            collisions=[_to_shape(shape) for shape in description.links[name].collisions if collisions],
+    names = model.link_names
+    links = []
+    for name in names:
+        link = description.links[name]
+        # A plane is read as a collision only, and the ground is to be seen.
+        planes = [shape for shape in link.collisions if shape.kind == "plane"]
+        others = [shape for shape in link.collisions if shape.kind != "plane"]
+        links.append(
+            SceneLink(
+                name,
+                [_to_shape(shape) for shape in (*link.visuals, *planes)],
+                [_to_shape(shape) for shape in others if collisions],
+            )
         )
-        for name in model.link_names
-    ]  # fmt: skip
     joints = [
         SceneJoint(
             name=joint.name,
@@ -32,7 +38,15 @@ def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
         )
         for joint in description.movable_joints
     ]
-    return SceneModel(number, model.name, description.static, False, links, joints)
+    return SceneModel(
+        number=number,
+        name=model.name,
+        is_static=description.static,
+        links=links,
+        joints=joints,
+        root=names.index(description.root) if description.root in names else 0,
+        frame=to_pose_msg(description.root_pose.inverse()),
+    )
 
 
 def to_light(light: Light) -> SceneLight:

@@ -4,7 +4,9 @@
 import threading
 import unittest
 
+import rosgraph
 import rospy
+import rosservice
 import rostest
 from bullet_gazebo_msgs.msg import SceneContacts, ScenePoses
 from bullet_gazebo_msgs.srv import GetScene, StepWorld, StepWorldRequest
@@ -17,6 +19,8 @@ from gazebo_msgs.srv import (
     SpawnModel,
     SpawnModelRequest,
 )
+
+from bullet_gazebo.ros.clients.world_client import RemoteWorld
 
 BOUND = 60.0  # [s of wall time]
 BALL = """<robot name="ball"><link name="ball">
@@ -59,6 +63,10 @@ class SceneTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.spawn = staticmethod(proxy("/gazebo/spawn_urdf_model", SpawnModel))
+        assert "/gazebo/get_scene" not in rosservice.get_service_list()
+        world = RemoteWorld("/gazebo", rosgraph.get_master_uri())
+        for _ in range(2):
+            world.command("show")
         cls.delete = staticmethod(proxy("/gazebo/delete_model", DeleteModel))
         cls.scene = staticmethod(proxy("/gazebo/get_scene", GetScene))
         cls.step = staticmethod(proxy("/gazebo/step_world", StepWorld))
@@ -85,9 +93,11 @@ class SceneTest(unittest.TestCase):
         self.assertEqual(joints, {"stand_cart": "prismatic", "cart_pole": "continuous"})
         self.assertTrue(any(link.visuals for link in found["cartpole"].links))
         self.assertFalse(any(link.collisions for link in found["cartpole"].links))
+        full = self.scene([], True).models[1]
+        self.assertTrue(any(link.collisions for link in full.links))
         again = self.scene([found["cartpole"].number], True)
         self.assertEqual([model.known for model in again.models], [False, True])
-        self.assertEqual(again.models[0].links[0].collisions[0].kind, "plane")
+        self.assertEqual(again.models[0].links[0].visuals[0].kind, "plane")
         self.assertEqual(again.models[1].links, [])
 
     def test_the_version_changes_with_what_is_to_be_seen(self):
@@ -121,7 +131,9 @@ class SceneTest(unittest.TestCase):
         pole = names.index(("cartpole", next(name for _, name in names if "pole" in name)))
         get = proxy("/gazebo/get_link_state", GetLinkState)
         found = get("::".join(names[pole]), "world").link_state.pose.position
-        for got, wanted in zip(message.poses[7 * pole :], (found.x, found.y, found.z)):
+        for got, wanted in zip(
+            message.poses[7 * pole : 7 * pole + 3], (found.x, found.y, found.z), strict=True
+        ):
             self.assertAlmostEqual(got, wanted, places=5)
 
     def test_they_come_in_the_middle_of_a_long_request(self):
