@@ -36,7 +36,7 @@ def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
             lower=joint.lower if joint.bounded else 1.0,
             upper=joint.upper if joint.bounded else 0.0,
         )
-        for joint in description.movable_joints
+        for joint in (description.joints[name] for name in model.joint_names)
     ]
     return SceneModel(
         number=number,

@@ -1,10 +1,11 @@
-"""/gazebo/scene_poses and /gazebo/scene_contacts: thirty times a second of wall time, while somebody looks."""
+"""/gazebo/scene_poses and /gazebo/scene_contacts: thirty times a second of wall time, for who looks."""
 
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import rospy
@@ -21,6 +22,15 @@ PERIOD = 1.0 / 30.0  # [s of wall time]
 PATIENCE = PERIOD / 4  # [s] for a tick, after which a world that rests is looked at without one
 STOP_TIMEOUT = 1.0  # [s]
 REPEAT = 1.0  # [s]; how often the same complaint is logged
+
+
+class Copy(NamedTuple):
+    """What is to be published of a moment of the world."""
+
+    version: int
+    paused: bool
+    poses: list[Pose]
+    joints: list[list[tuple[float, float]]]  # position and velocity of each joint, by model
 
 
 class SceneTopics:
@@ -98,15 +108,21 @@ class SceneTopics:
         self._copies = copies
         self._copied.set()
 
-    def _copy_poses(self) -> tuple[int, bool, list[Pose]]:
+    def _copy_poses(self) -> Copy:
         models = self._sim.world.models.values()
         poses = [model.link_state(link)[0] for model in models for link in model.link_names]
-        return self._numbers.version, self._sim.paused, poses
+        joints = [model.joint_states() for model in models if model.joint_names]
+        return Copy(self._numbers.version, self._sim.paused, poses, joints)
 
-    def _publish_poses(self, now: int, copied: tuple[int, bool, list[Pose]]) -> None:
-        version, paused, poses = copied
-        numbers = _singles((*pose.position, *pose.orientation) for pose in poses)
-        self._poses[0].publish(ScenePoses(version, to_time(now), paused, numbers))
+    def _publish_poses(self, now: int, copy: Copy) -> None:
+        message = ScenePoses(
+            version=copy.version,
+            now=to_time(now),
+            paused=copy.paused,
+            poses=_singles((*pose.position, *pose.orientation) for pose in copy.poses),
+            positions=_singles([state[0] for state in states] for states in copy.joints),
+        )
+        self._poses[0].publish(message)
 
     def _publish_contacts(self, contacts: list[Contact]) -> None:
         points = _singles(each.point for each in contacts)
@@ -119,7 +135,7 @@ class SceneTopics:
         self._thread.join(STOP_TIMEOUT)
 
 
-def _singles(rows: Iterable[tuple[float, ...]]) -> np.ndarray:
+def _singles(rows: Iterable[Sequence[float]]) -> np.ndarray:
     """All numbers in a row, as 32-bit floats; what is too large for them is infinite."""
     with np.errstate(over="ignore"):
         return np.array([number for row in rows for number in row]).astype(np.float32)

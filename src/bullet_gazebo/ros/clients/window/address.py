@@ -42,10 +42,9 @@ class Address:
                 "over the network, and moves the simulation"
             )
         elif not has_display():
-            lines.append(
-                f"no display here; on a machine with a browser:  ssh -N -L {self.port}:{LOOPBACK}:{self.port} "
-                f"{getpass.getuser()}@{socket.gethostname()}  and open the page there"
-            )
+            here = f"{getpass.getuser()}@{socket.gethostname()}"
+            tunnel = f"ssh -N -L {self.port}:{LOOPBACK}:{self.port} {here}"
+            lines.append(f"no display here; where a browser is:  {tunnel}  and open the page there")
         return lines
 
 
