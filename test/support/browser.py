@@ -83,7 +83,9 @@ class Browser:
 
     def run(self, script):
         """Returns the value of a JavaScript expression."""
-        answer = self._do("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        answer = self._do(
+            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
+        )
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 

@@ -12,8 +12,8 @@ from bullet_gazebo.ros.clients.window.address import Address, PortInUse, has_dis
 from bullet_gazebo.ros.clients.window.gate import Gate
 
 TITLE = "gzclient"
-CAMERA = (3.5, -3.5, 2.2)  # [m]
-LOOK_AT = (0.0, 0.0, 0.6)  # [m]
+CAMERA = (1.4, -1.9, 1.1)  # [m]
+LOOK_AT = (0.0, 0.0, 0.35)  # [m]
 
 
 def serve(address: Address) -> viser.ViserServer:
