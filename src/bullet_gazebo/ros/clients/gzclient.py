@@ -14,10 +14,9 @@ import rospy
 from bullet_gazebo.ros.clients.window.address import LOOPBACK, PortInUse, find_address
 from bullet_gazebo.ros.wire.rospy_patches.node import stop_hearing_clock
 from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
+from ros_calls.requirements import WINDOW, lack
 
 NAME = "gazebo_gui"
-MISSING = "gazebo_gui: no window: %s. The simulation goes on without it; to have it: pip install %s"
-NEEDED = "'viser==1.1.1' 'websockets==16.1.1'"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -28,11 +27,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     def work() -> int:
         init_node(NAME, command_line, anonymous=False)
         stop_hearing_clock()  # the scene has the time, thirty times a second instead of thousands
-        try:
-            opened = importlib.import_module("bullet_gazebo.ros.clients.window.opened")
-        except ImportError as error:
-            rospy.logwarn(MISSING, error, NEEDED)
+        missing = lack(WINDOW)
+        if missing:
+            rospy.logwarn("gazebo_gui: no window; the simulation goes on without one. %s", missing)
             return 0
+        opened = importlib.import_module("bullet_gazebo.ros.clients.window.opened")
         try:
             address = find_address(options.host, options.port)
             opened.show(address, browser=not options.no_browser)

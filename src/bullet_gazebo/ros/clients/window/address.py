@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 LOOPBACK = "127.0.0.1"
 FIRST_PORT = 8080
+LAST_PORT = 65535
 MOST_TRIES = 100  # ports from FIRST_PORT on
 TOKEN_BYTES = 16
 
@@ -92,6 +93,8 @@ def find_address(host: str, port: int | None) -> Address:
 
 def _bound(host: str, port: int) -> int:
     """Tries a port; returns it, or the one that the system chose instead of 0."""
+    if not 0 <= port <= LAST_PORT:
+        raise OverflowError(f"no port is beyond {LAST_PORT}, or below 0")
     family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     with socket.socket(family, kind, protocol) as trial:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
