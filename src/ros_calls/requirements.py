@@ -15,9 +15,11 @@ from pathlib import Path
 FILE = "requirements/base.txt"
 PAGE = "docs/catkin.md"
 
-# What the simulator runs on, PyBullet's engine with meshes of all kinds, and what all programs run on.
+# What the simulator runs on, PyBullet's engine with meshes of all kinds; what its window runs on; and what all
+# programs run on.
 SIMULATOR = ("collada", "numpy", "pybullet", "scipy", "trimesh", "xacro", "yaml")
-ALL = (*SIMULATOR, "PIL", "gymnasium", "matplotlib", "pygame", "tensorboard", "torch", "tqdm")
+WINDOW = (*SIMULATOR, "PIL", "viser", "websockets")
+ALL = (*WINDOW, "gymnasium", "matplotlib", "pygame", "tensorboard", "torch", "tqdm")
 
 
 def require(modules: tuple[str, ...]) -> None:
@@ -26,12 +28,16 @@ def require(modules: tuple[str, ...]) -> None:
     Raises:
         SystemExit: if one of the modules isn't there.
     """
+    text = lack(modules)
+    if text:
+        sys.exit(f"{Path(sys.argv[0]).name}: {text}")
+
+
+def lack(modules: tuple[str, ...]) -> str:
+    """Returns one line that names the modules that are missing, and what installs them; empty if none is."""
     missing = [name for name in modules if importlib.util.find_spec(name) is None]
-    if missing:
-        sys.exit(f"{Path(sys.argv[0]).name}: {_advice(missing)}")
-
-
-def _advice(missing: list[str]) -> str:
+    if not missing:
+        return ""
     command = [sys.executable, "-m", "pip", "install", "--requirement", str(_file())]
     if _is_managed():
         command.insert(4, "--break-system-packages")

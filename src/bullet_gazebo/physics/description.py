@@ -132,7 +132,7 @@ Color = tuple[float, float, float, float]
 
 @dataclass
 class Light:
-    """A light. Nothing is lit in here: it is kept so that clients find it and read back what they set."""
+    """A light, for clients that read back what they set and for a window: nothing is lit in here."""
 
     name: str
     diffuse: Color = (1.0, 1.0, 1.0, 1.0)

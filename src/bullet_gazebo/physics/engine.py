@@ -3,13 +3,21 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from bullet_gazebo.physics.description import Inertia, ModelDescription
 from bullet_gazebo.physics.pose import Pose, Vector
 
 Twist = tuple[Vector, Vector]
 """Linear [m/s] and angular [rad/s] velocity in world axes."""
+
+
+class Contact(NamedTuple):
+    """A point [m] at which two bodies touch, and the force [N] along its normal, in world axes."""
+
+    point: Vector
+    force: Vector
+
 
 FURTHEST = math.pi
 """The way [rad, m] that a joint, or a free base that carries joints, goes in a step at most. Beyond half a
@@ -125,6 +133,10 @@ class Engine(ABC):
     @abstractmethod
     def step(self) -> None:
         """Integrates the world by one time step."""
+
+    @abstractmethod
+    def contacts(self) -> list[Contact]:
+        """Returns where bodies touched in the last step."""
 
     @abstractmethod
     def close(self) -> None:

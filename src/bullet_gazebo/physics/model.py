@@ -20,6 +20,7 @@ class Model:
 
     def __init__(self, name: str, description: ModelDescription, body: Body, pose: Pose) -> None:
         self.name = name
+        self.number = 0  # the world's, of this very model: another one of its name has another
         self.description = description
         self.body = body
         self.initial_pose = pose

@@ -45,6 +45,7 @@ class World:
         self.engine = engine
         self.models: dict[str, Model] = {}
         self.lights: dict[str, Light] = {}
+        self.version = 0  # counts what changes the look of the world: models and lights
         self._entities: dict[str, Entity] = {}
         self._joints: dict[str, Entity] = {}
         self.time_step = time_step
@@ -72,6 +73,7 @@ class World:
             raise
         self.models[name] = model
         self._index()
+        model.number = self.version
         return model
 
     def delete(self, name: str) -> None:
@@ -175,7 +177,9 @@ class World:
                 model.go_on_in(body)
 
     def _index(self) -> None:
-        """Maps plain and scoped names to what a depth-first walk from the world's root finds first."""
+        """After a model came or went: maps plain and scoped names to what a depth-first walk from the world's
+        root finds first."""
+        self.version += 1
         self._entities, self._joints = {}, {}
         for model in self.models.values():
             self._entities.setdefault(model.name, Entity("model", model, model.name))

@@ -43,7 +43,7 @@ def read_collada(data: bytes, only: str = "") -> list[Part]:
         element.tag = element.tag.rpartition("}")[2]
     if root.tag != "COLLADA":
         raise DescriptionError("it is not COLLADA")
-    axes = _unit(root) * UP_AXES.get(root.findtext("asset/up_axis", "").strip(), np.eye(3))
+    axes = axes_of(root)
     _prune(root)
     if only:
         leave_node(root, only)
@@ -61,6 +61,11 @@ def read_collada(data: bytes, only: str = "") -> list[Part]:
         faces.append(part["faces"] + count)
         count += len(points)
     return [(np.concatenate(vertices), np.concatenate(faces))]
+
+
+def axes_of(root: Element) -> np.ndarray:
+    """Returns the matrix (3, 3) that takes the file's coordinates to [m], z up."""
+    return _unit(root) * UP_AXES.get(root.findtext("asset/up_axis", "").strip(), np.eye(3))
 
 
 def _unit(root: Element) -> float:

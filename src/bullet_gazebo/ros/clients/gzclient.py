@@ -1,32 +1,64 @@
-"""Node `gazebo_gui`: the simulator's window, as far as there is one.
+"""Node `gazebo_gui`: the simulator's window, a page in the browser (docs/watching.md).
 
-The simulation never depends on it: without a display it says so and ends, and Gazebo's `gui:=true`,
-which is the default, does no harm on a server.
+The simulation never depends on it: where the window can't be opened it says why and ends, and Gazebo's
+`gui:=true`, which is the default, does no harm on a server.
 """
 
-import os
+import argparse
+import importlib
 import sys
 from collections.abc import Sequence
 
 import rospy
 
+from bullet_gazebo.ros.clients.window.address import LOOPBACK, PortInUse, find_address
+from bullet_gazebo.ros.wire.rospy_patches.node import stop_hearing_clock
 from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
+from ros_calls.requirements import WINDOW, lack
+
+NAME = "gazebo_gui"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Registers as a node, says what there is to see, and ends.
-
-    Args:
-        argv: the command line; rospy reads its remappings, the rest is Gazebo's and not used.
-    """
+    """Serves the page until it is ended; returns the exit code."""
     command_line = list(sys.argv if argv is None else argv)
+    options = _parse(rospy.myargv(command_line)[1:])
 
     def work() -> int:
-        init_node("gazebo_gui", command_line, anonymous=False)
-        why = "there is no window yet"
-        if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-            why = "no display, so no window"
-        rospy.logwarn("gazebo_gui: %s; the simulation goes on without one.", why)
+        init_node(NAME, command_line, anonymous=False)
+        stop_hearing_clock()  # the scene has the time, thirty times a second instead of thousands
+        missing = lack(WINDOW)
+        if missing:
+            rospy.logwarn("gazebo_gui: no window; the simulation goes on without one. %s", missing)
+            return 0
+        opened = importlib.import_module("bullet_gazebo.ros.clients.window.opened")
+        try:
+            address = find_address(options.host, options.port)
+            opened.show(address, browser=not options.no_browser)
+        except PortInUse as error:
+            rospy.logerr("gazebo_gui: %s", error)
+            return 1
         return 0
 
     return SignalHandler().run(work, interrupted=0)
+
+
+def _parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """The options; what is Gazebo's own is accepted and not used."""
+    parser = argparse.ArgumentParser(
+        prog="gzclient", description="The simulator's window: a page in the browser."
+    )
+    parser.add_argument(
+        "--port", type=int, help="of the page (default: the first free one from 8080 on)"
+    )
+    parser.add_argument(
+        "--host", default=LOOPBACK,
+        help="the address to serve on (default: %(default)s, this machine only); on any other one the page's "
+        "address holds a token, without which nobody gets in",
+    )  # fmt: skip
+    parser.add_argument(
+        "--no-browser",
+        action="store_true",
+        help="don't open the page here, where there is a display",
+    )
+    return parser.parse_known_args(list(arguments))[0]

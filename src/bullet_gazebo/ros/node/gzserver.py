@@ -32,6 +32,7 @@ from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.node.world_control import WorldControl
 from bullet_gazebo.ros.node.world_loader import fill_world, load_plugins, read_world
 from bullet_gazebo.ros.plugins import PluginRegistry
+from bullet_gazebo.ros.scene.scene_offer import SceneOffer
 from bullet_gazebo.ros.services.spawn_services import SpawnServices
 from bullet_gazebo.ros.services.stepping.advance_service import AdvanceService
 from bullet_gazebo.ros.services.stepping.step_service import StepService
@@ -75,7 +76,8 @@ class GazeboNode:
         MasterWatch().start()
 
     def _advertise(self, network: bool) -> None:
-        WorldControl(self.sim, self._watchdog).offer()
+        scene = SceneOffer(self.sim)
+        WorldControl(self.sim, self._watchdog, scene.show if network else None).offer()
         free_polls_at_once()
         bound_messages()
         bound_calls()

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import rospy
 from gazebo_msgs.msg import LinkStates, ModelStates
@@ -10,29 +9,11 @@ from rosgraph_msgs.msg import Clock
 
 from bullet_gazebo.ros.wire.conversions import to_pose_msg, to_time, to_twist_msg
 from bullet_gazebo.ros.wire.rospy_patches.node import set_time, stop_hearing_clock
+from bullet_gazebo.ros.wire.subscribers import SubscriberCount
 from bullet_gazebo.ros.wire.thinning import ThinnedTopic, Thinner
 from bullet_gazebo.simulator import Simulator
 
 QUEUE = 10
-
-
-Publish = Callable[[Any], None]
-
-
-class SubscriberCount(rospy.SubscribeListener):
-    """Counts a topic's subscribers, so that nothing is made up for nobody."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.size = 0
-
-    def peer_subscribe(
-        self, topic_name: str, topic_publish: Publish, peer_publish: Publish
-    ) -> None:
-        self.size += 1
-
-    def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
-        self.size = num_peers
 
 
 class StateTopic(ThinnedTopic):

@@ -6,6 +6,7 @@ through its node's name, from any machine, and neither a topic nor a service, of
 must be the only ones (docs/contract/gazebo.md 7).
 """
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 
 from bullet_gazebo.ros.clients.world_client import CHUNK, METHOD
@@ -19,8 +20,13 @@ LONGEST = 80  # of an unknown command that is told back
 class WorldControl:
     """The side of the simulator; the clients' is world_client.py."""
 
-    def __init__(self, sim: Simulator, watchdog: AbstractContextManager[object]) -> None:
-        """A fault in a block of `watchdog` ends the node."""
+    def __init__(
+        self,
+        sim: Simulator,
+        watchdog: AbstractContextManager[object],
+        show: Callable[[], None] | None = None,
+    ) -> None:
+        """A fault in a block of `watchdog` ends the node. `show` offers the scene to a window."""
         self._sim = sim
         self._watchdog = watchdog
         self._commands = {
@@ -30,6 +36,8 @@ class WorldControl:
             "reset_models": sim.reset_world,
             "reset_time": sim.reset_time,
         }
+        if show is not None:
+            self._commands["show"] = show
 
     def offer(self) -> None:
         """Has this process's node answer."""

@@ -21,7 +21,7 @@ from bullet_gazebo.simulator import Simulator
 
 
 class LightServices:
-    """Lights light nothing here; what a client sets is what it reads back."""
+    """What a client sets is what it reads back, and what a window shows."""
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
@@ -63,12 +63,14 @@ class LightServices:
             light.attenuation_quadratic = request.attenuation_quadratic
             light.direction = to_vector(request.direction)
             light.pose = from_pose_msg(request.pose)
+            self._sim.world.version += 1
         return SetLightPropertiesResponse(True, "")
 
     def _delete(self, request: DeleteLightRequest) -> DeleteLightResponse:
         name = request.light_name
         with self._sim.lock:
             light = self._sim.world.lights.pop(name, None)
+            self._sim.world.version += 1
         if light is None:  # Gazebo's text for a light that doesn't exist, after 10 s
             text = f'DeleteLight: Timeout reached while removing light "{name}"'
             return DeleteLightResponse(False, text)

@@ -115,6 +115,7 @@ class SpawnServices:
                     raise NameTaken(name)
                 entity.name, entity.pose = name, pose
                 world.lights[name] = entity
+                world.version += 1
             return
         with self._plugins.time_held(f"model '{shown(name)}'"):
             with self._sim.lock:

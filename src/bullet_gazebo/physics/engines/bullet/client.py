@@ -12,8 +12,9 @@ from functools import partial
 from pathlib import Path
 
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
+from bullet_gazebo.physics.engine import Contact
 from bullet_gazebo.physics.engines.bullet.body import BASE, BulletBody, is_plane
-from bullet_gazebo.physics.engines.bullet.contacts import collides_with_itself
+from bullet_gazebo.physics.engines.bullet.contacts import collides_with_itself, contacts
 from bullet_gazebo.physics.engines.bullet.library import pybullet
 from bullet_gazebo.physics.engines.bullet.urdf_writer import write_urdf
 from bullet_gazebo.physics.mechanics.engine_form import at_joints, parents_first
@@ -133,6 +134,10 @@ class BulletClient:
         if self._weightless:
             self._hold_up()
         self._step()
+
+    def contacts(self) -> list[Contact]:
+        """See `Engine.contacts`."""
+        return contacts(self._client)
 
     def _hold_up(self) -> None:
         """PyBullet's gravity acts on everything: a weightless link is held by a force against it."""

@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from itertools import combinations
 
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription, Shape
+from bullet_gazebo.physics.engine import Contact
 from bullet_gazebo.physics.engines.bullet.library import pybullet
+from bullet_gazebo.physics.pose import scale
 
 
 def set_friction(
@@ -67,3 +69,10 @@ def _friction(shape: Shape, static: bool) -> float:
     What stands still counts as 1 at most, so that a box on a ground of 100 keeps its own coefficient.
     """
     return min(shape.mu, 1.0) if static else shape.mu
+
+
+def contacts(client: int) -> list[Contact]:
+    """Returns where bodies touched in the last step; not where they only are near."""
+    found = pybullet.getContactPoints(physicsClientId=client)
+    # 6: the point on the second body, 7: the normal towards the first one, 9: the force along it.
+    return [Contact(each[6], scale(each[7], each[9])) for each in found if each[9] > 0.0]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from bullet_gazebo.heap import give_back
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
-from bullet_gazebo.physics.engine import Body, Engine
+from bullet_gazebo.physics.engine import Body, Contact, Engine
 from bullet_gazebo.physics.engines.bullet.body import BulletBody
 from bullet_gazebo.physics.engines.bullet.client import BulletClient, BulletSettings
 from bullet_gazebo.physics.pose import Pose, Vector
@@ -56,6 +56,9 @@ class BulletEngine(Engine):
 
     def step(self) -> None:
         self._client.step()
+
+    def contacts(self) -> list[Contact]:
+        return self._client.contacts()
 
     def close(self) -> None:
         self._client.close()

@@ -6,7 +6,7 @@ from itertools import count
 import mujoco
 
 from bullet_gazebo.physics.description import ModelDescription
-from bullet_gazebo.physics.engine import Body, Engine
+from bullet_gazebo.physics.engine import Body, Contact, Engine
 from bullet_gazebo.physics.engines.mujoco.body import MujocoBody
 from bullet_gazebo.physics.engines.mujoco.model import Elements, ModelWriter, compile_spec
 from bullet_gazebo.physics.engines.mujoco.state import MujocoState
@@ -64,6 +64,9 @@ class MujocoEngine(Engine):
 
     def step(self) -> None:
         self._state.step()
+
+    def contacts(self) -> list[Contact]:
+        return self._state.contacts()
 
     def close(self) -> None:
         self._bodies.clear()

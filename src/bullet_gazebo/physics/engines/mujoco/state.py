@@ -7,9 +7,9 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Twist
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Contact, Twist
 from bullet_gazebo.physics.engines.mujoco.model import xyzw
-from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.pose import Pose, scale
 
 FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
@@ -108,3 +108,14 @@ class MujocoState:
         x, y, z = data.xpos[index].tolist()
         ax, ay, az, vx, vy, vz = speed.tolist()
         return Pose((x, y, z), xyzw(data.xquat[index])), ((vx, vy, vz), (ax, ay, az))
+
+    def contacts(self) -> list[Contact]:
+        """Returns where bodies touched in the last step; not where they only are near."""
+        found, force = [], np.empty(6)
+        for index in range(self.data.ncon):
+            mujoco.mj_contactForce(self.model, self.data, index, force)
+            if force[0] > 0.0:
+                contact = self.data.contact[index]
+                x, y, z, nx, ny, nz = (*contact.pos.tolist(), *contact.frame[:3].tolist())
+                found.append(Contact((x, y, z), scale((nx, ny, nz), float(force[0]))))
+        return found

@@ -1,0 +1,149 @@
+"""The page's list of models, and what one of them is chosen for: to be followed, to move its joints."""
+
+import html
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import viser
+from bullet_gazebo_msgs.msg import SceneJoint
+
+from bullet_gazebo.physics.elements import shown
+from bullet_gazebo.ros.clients.window.commands import Commands
+from bullet_gazebo.ros.clients.window.controllers import Controllers
+from bullet_gazebo.ros.clients.window.picture import DrawnModel
+from bullet_gazebo.ros.clients.window.time_panel import Attempt
+from ros_calls.service import ServiceFailed
+
+NONE = "(none)"
+MOST_SHOWN = 50  # models in the list
+MOST_SLIDERS = 64
+REACH = {"revolute": math.pi, "continuous": math.pi, "prismatic": 2.0}  # [rad, m] without stops
+NO_STOP = 1e15
+PARTS = 500  # of a slider's way
+
+
+class ModelPanel:
+    """Shows models, follows the chosen one with the cameras, and has a slider for each of its joints."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        commands: Commands,
+        controllers: Controllers,
+        attempt: Attempt,
+        paused: Callable[[], bool],
+    ) -> None:
+        self._server = server
+        self._commands = commands
+        self._controllers = controllers
+        self._attempt = attempt
+        self._paused = paused
+        self._models: dict[str, DrawnModel] = {}
+        self._positions: dict[str, list[float]] = {}  # of joints, by model
+        self._before: np.ndarray | None = None  # where the followed model was
+        self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
+        self._choice = server.gui.add_dropdown("Model", [NONE], initial_value=NONE)
+        self._follow = server.gui.add_checkbox("Follow it", False)
+        self._joints = server.gui.add_folder("Joints", visible=False)
+        self._list = server.gui.add_html("")
+        self._choice.on_update(lambda _: self._choose())
+
+    def set_models(self, models: Sequence[DrawnModel]) -> None:
+        """Shows other models than before."""
+        self._models = {each.message.name: each for each in models}
+        names = [NONE, *self._models]
+        if list(self._choice.options) != names:
+            kept = self._choice.value
+            self._choice.options = names
+            if kept in self._models:
+                self._choice.value = kept
+        self._choose()
+
+    def _choose(self) -> None:
+        """Makes sliders for the chosen model, where they aren't there already."""
+        self._before = None
+        model = self._models.get(self._choice.value)
+        joints = list(model.message.joints)[:MOST_SLIDERS] if model is not None else []
+        self._joints.visible = bool(joints)
+        for slider in self._sliders.values():
+            slider.remove()
+        self._sliders = {}
+        with self._joints:
+            for joint in joints:
+                self._sliders[joint.name] = self._slider(joint)
+
+    def _slider(self, joint: SceneJoint) -> viser.GuiSliderHandle[float]:
+        low, high = _range(joint)
+        slider = self._server.gui.add_slider(
+            shown(joint.name), low, high, (high - low) / PARTS, min(max(0.0, low), high),
+            hint="commands the running controller; while paused it places the joint",
+        )  # fmt: skip
+
+        @slider.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:  # somebody moved it
+                position = float(slider.value)
+                self._attempt(lambda: self._move(joint.name, position))
+
+        return slider
+
+    def _move(self, joint: str, position: float) -> None:
+        model = self._choice.value
+        if self._paused():
+            self._commands.place_joint(model, joint, position)
+            return
+        holder = self._controllers.holder(joint)
+        if holder is None:
+            raise ServiceFailed(
+                f"no running controller takes positions of {joint}; pause the world to place it"
+            )
+        names = [each.name for each in self._models[model].message.joints]
+        positions = dict(zip(names, self._positions.get(model, []), strict=False))
+        self._controllers.command(holder, joint, positions | {joint: position})
+
+    def show(self, links: dict[str, np.ndarray], positions: dict[str, list[float]]) -> None:
+        """Shows poses (n, 7) of links and positions [rad, m] of joints, both by model."""
+        self._positions = positions
+        rows = []
+        for name, model in list(self._models.items())[:MOST_SHOWN]:
+            if name in links:
+                x, y, z = model.pose(links[name]).position
+                rows.append(
+                    f"<tr><td>{html.escape(shown(name))}</td>"
+                    + "".join(f"<td align='right'>{each:.3f}</td>" for each in (x, y, z))
+                    + "</tr>"
+                )
+        rest = len(self._models) - MOST_SHOWN
+        more = f"<tr><td colspan='4'>and {rest} more</td></tr>" if rest > 0 else ""
+        head = "<tr><th align='left'>model</th><th>x [m]</th><th>y [m]</th><th>z [m]</th></tr>"
+        text = f"<table style='width: 100%; padding: 0 0.8em'>{head}{''.join(rows)}{more}</table>"
+        if self._list.content != text:
+            self._list.content = text
+
+    def follow(self, links: dict[str, np.ndarray]) -> None:
+        """Moves all cameras along with the chosen model."""
+        model = self._models.get(self._choice.value)
+        if not self._follow.value or model is None or model.message.name not in links:
+            self._before = None
+            return
+        place = np.array(model.pose(links[model.message.name]).position)
+        if self._before is not None and np.isfinite(place).all():
+            way = place - self._before
+            if np.abs(way).max() > 1e-6:
+                for client in self._server.get_clients().values():
+                    with client.atomic():
+                        client.camera.look_at = client.camera.look_at + way
+                        client.camera.position = client.camera.position + way
+        self._before = place
+
+
+def _range(joint: SceneJoint) -> tuple[float, float]:
+    """The slider's ends [rad, m]: the joint's stops, or what suits its kind."""
+    reach = REACH.get(joint.kind, 1.0)
+    if joint.lower >= joint.upper:
+        return -reach, reach
+    low = joint.lower if joint.lower > -NO_STOP else -reach
+    high = joint.upper if joint.upper < NO_STOP else reach
+    return (low, high) if low < high else (-reach, reach)

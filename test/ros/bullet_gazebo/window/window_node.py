@@ -1,0 +1,153 @@
+#!/usr/bin/env python3
+"""The window in a real browser: the page shows what happens, and what is clicked there happens."""
+
+import io
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+import numpy as np
+import rospy
+import rostest
+from gazebo_msgs.srv import (
+    DeleteModel,
+    GetPhysicsProperties,
+    GetWorldProperties,
+    SpawnModel,
+    SpawnModelRequest,
+)
+from PIL import Image
+from std_srvs.srv import Empty
+
+sys.path.append(str(Path(__file__).resolve().parents[3] / "support"))
+
+from browser import BOUND, Browser, find_browser, wait_for
+
+BALL = """<robot name="ball"><link name="ball">
+<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+<visual><geometry><sphere radius="0.2"/></geometry>
+  <material name="r"><color rgba="1 0 0 1"/></material></visual>
+<visual><geometry><mesh filename="file://{mesh}"/></geometry></visual></link></robot>"""
+ODD = "<b>ö\t\"&'/x"
+
+
+def proxy(name, kind):
+    rospy.wait_for_service(name, BOUND)
+    return rospy.ServiceProxy(name, kind)
+
+
+class Output:
+    """What a program writes, line by line."""
+
+    def __init__(self, *command):
+        self._process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
+        )
+        self.lines = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self):
+        for line in self._process.stdout:
+            self.lines.append(line.rstrip())
+
+    def line(self, text):
+        """Returns the first line with `text` in it, once it is there."""
+        found = wait_for(
+            lambda: (
+                [each for each in self.lines if text in each] or self._process.poll() is not None
+            ),
+            f"line {text!r}",
+        )
+        assert found is not True, self.lines
+        return found[0]
+
+    def close(self):
+        self._process.terminate()
+        code = self._process.wait(BOUND)
+        self._reader.join(BOUND)
+        self._process.stdout.close()
+        return code
+
+
+@unittest.skipUnless(find_browser(), "there is no Chromium here: apt-get install chromium")
+class WindowTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.spawn = staticmethod(proxy("/gazebo/spawn_urdf_model", SpawnModel))
+        cls.delete = staticmethod(proxy("/gazebo/delete_model", DeleteModel))
+        cls.physics = staticmethod(proxy("/gazebo/get_physics_properties", GetPhysicsProperties))
+        cls.world = staticmethod(proxy("/gazebo/get_world_properties", GetWorldProperties))
+        xml = rospy.get_param("/robot_description")
+        request = SpawnModelRequest(model_name="cartpole", model_xml=xml, robot_namespace="/")
+        assert cls.spawn(request).success
+        cls.window = Output("rosrun", "gazebo_ros", "gzclient", "--no-browser")
+        url = cls.window.line("is the page").rpartition(" ")[2]
+        cls.page = Browser(url)
+        cls.page.__enter__()
+        cls.page.wait_for_text("One step")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.page.__exit__()
+        assert cls.window.close() == 0, cls.window.lines
+
+    def red(self):
+        """How many pixels of the picture are red."""
+        pixels = np.asarray(Image.open(io.BytesIO(self.page.screenshot())).convert("RGB")).astype(
+            int
+        )
+        view = pixels[:, : pixels.shape[1] * 2 // 3]
+        return int(((view[..., 0] > 120) & (view[..., 1:].max(axis=2) < view[..., 0] / 3)).sum())
+
+    def test_models_come_and_go(self):
+        self.page.click("Models")
+        self.page.wait_for_text("cartpole")
+        self.assertLess(self.red(), 50)
+        with tempfile.TemporaryDirectory() as folder:
+            mesh = Path(folder, "broken.stl")
+            mesh.write_bytes(b"solid nothing of the kind")
+            for name in ("ball", ODD):
+                self.comes_and_goes(name, mesh)
+
+    def comes_and_goes(self, name, mesh):
+        told = " ".join(name.split())
+        request = SpawnModelRequest(model_name=name, model_xml=BALL.format(mesh=mesh))
+        request.initial_pose.position.z = 0.6
+        answer = self.spawn(request)
+        self.assertTrue(answer.success, answer.status_message)
+        self.page.wait_for_text(told)
+        wait_for(lambda: self.red() > 1000, "ball in the picture")
+        self.assertIn("broken.stl", self.window.line(f"'{told}', link 'ball', visual"))
+        self.assertTrue(self.delete(name).success)
+        wait_for(lambda: told not in self.page.text, "deletion")
+        wait_for(lambda: self.red() < 50, "picture without the ball")
+
+    def test_time_is_moved_by_clicks(self):
+        self.page.click("World")
+        self.page.click("Go on")
+        wait_for(lambda: not self.physics().pause, "time that runs")
+        self.page.click("Pause")
+        wait_for(lambda: self.physics().pause, "pause")
+        self.page.click("Reset simulation")
+        wait_for(lambda: self.world().sim_time == 0.0, "time zero")
+        self.page.click("One step")
+        wait_for(lambda: round(self.world().sim_time, 6) == 0.001, "step")
+        self.page.click("Do these steps")
+        wait_for(lambda: round(self.world().sim_time, 6) == 0.101, "hundred steps")
+        self.page.wait_for_text("0.101 s")
+
+    def test_what_somebody_else_does_is_shown(self):
+        self.page.click("World")
+        proxy("/gazebo/unpause_physics", Empty)()
+        self.page.wait_for_text("real-time factor")
+        proxy("/gazebo/pause_physics", Empty)()
+        self.page.wait_for_text("paused")
+
+
+if __name__ == "__main__":
+    rospy.init_node("window_test")
+    rostest.rosrun("cartpole", "window", WindowTest)

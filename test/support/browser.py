@@ -1,0 +1,123 @@
+"""A headless Chromium, driven by its DevTools protocol: opens a page, clicks, reads and takes pictures."""
+
+import base64
+import itertools
+import json
+import shutil
+import subprocess
+import tempfile
+import time
+import urllib.request
+from pathlib import Path
+
+from websockets.sync.client import connect
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+BOUND = 60.0  # [s] for anything of the browser's
+POLL = 0.05  # [s]
+OPTIONS = (
+    "--headless=new", "--no-sandbox", "--disable-gpu-sandbox", "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader", "--remote-debugging-port=0", "--no-first-run", "--disable-extensions",
+    "--disable-dev-shm-usage", "--disable-background-networking", "--window-size=1280,800",
+)  # fmt: skip
+
+
+def find_browser():
+    """Returns the path of a Chromium, or None."""
+    return next(filter(None, map(shutil.which, NAMES)), None)
+
+
+def wait_for(look, what):
+    """Returns the first true value of `look`."""
+    deadline = time.monotonic() + BOUND
+    while not (found := look()):
+        assert time.monotonic() < deadline, f"no {what} in {BOUND:g} s"
+        time.sleep(POLL)
+    return found
+
+
+class Browser:
+    """One page. A context manager."""
+
+    def __init__(self, url):
+        self._url = url
+        self._ids = itertools.count(1)
+        self.log = []  # what the page wrote to its console
+
+    def __enter__(self):
+        self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        self._process = subprocess.Popen(
+            [find_browser(), *OPTIONS, f"--user-data-dir={self._folder.name}", "about:blank"],
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        try:
+            told = Path(self._folder.name, "DevToolsActivePort")
+            wait_for(lambda: told.is_file() and told.read_text().count("\n"), "browser")
+            port = told.read_text().split()[0]
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=BOUND) as answer:
+                (page,) = [each for each in json.load(answer) if each["type"] == "page"]
+            self._socket = connect(page["webSocketDebuggerUrl"], max_size=None)
+            self._do("Runtime.enable")
+            self._do("Page.enable")
+            self._do("Page.navigate", url=self._url)
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_fault):
+        self._process.kill()
+        self._process.wait()
+        self._folder.cleanup()
+
+    def _do(self, method, **parameters):
+        number = next(self._ids)
+        self._socket.send(json.dumps({"id": number, "method": method, "params": parameters}))
+        while True:
+            answer = json.loads(self._socket.recv(timeout=BOUND))
+            if answer.get("method") in ("Runtime.consoleAPICalled", "Runtime.exceptionThrown"):
+                self.log.append(answer["params"])
+            if answer.get("id") == number:
+                assert "error" not in answer, answer
+                return answer["result"]
+
+    def run(self, script):
+        """Returns the value of a JavaScript expression."""
+        answer = self._do(
+            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
+        )
+        assert "exceptionDetails" not in answer, answer
+        return answer["result"].get("value")
+
+    @property
+    def text(self):
+        """All text that the page shows."""
+        return self.run("document.body ? document.body.innerText : ''")
+
+    def wait_for_text(self, text):
+        wait_for(lambda: text in self.text, f"text {text!r}")
+
+    def click(self, text):
+        """Clicks the element with that text, in the middle, as a mouse does."""
+        place = wait_for(lambda: self._place(text), f"element {text!r}")
+        for kind in ("mousePressed", "mouseReleased"):
+            self._do("Input.dispatchMouseEvent", type=kind, button="left", clickCount=1, **place)
+
+    def _place(self, text):
+        return self.run(
+            f"""(() => {{
+              const found = [...document.querySelectorAll("button, label, [role=tab], [role=option], p")]
+                .filter(e => e.innerText && e.innerText.trim() === {json.dumps(text)} && e.offsetParent);
+              if (!found.length) return null;
+              found[0].scrollIntoView({{block: "center"}});
+              const box = found[0].getBoundingClientRect();
+              return {{x: box.x + box.width / 2, y: box.y + box.height / 2}};
+            }})()"""
+        )
+
+    def screenshot(self, path=None):
+        """Returns a PNG of the page as it is shown, and writes it to `path`."""
+        content = base64.b64decode(self._do("Page.captureScreenshot", format="png")["data"])
+        if path is not None:
+            Path(path).write_bytes(content)
+        return content
