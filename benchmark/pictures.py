@@ -8,7 +8,6 @@ One process, one core. Prints a table and writes pictures.json.
 
 import math
 import statistics
-import sys
 import time
 
 import reporting
@@ -44,4 +43,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
