@@ -1,6 +1,5 @@
 """MP4 by ffmpeg: whole files, or one line."""
 
-import shutil
 import sys
 from pathlib import Path
 
@@ -31,12 +30,14 @@ def test_what_was_written_can_be_read(tmp_path: Path):
 
 
 def test_a_frame_of_another_size_is_refused(tmp_path: Path):
-    writer = Mp4Writer(tmp_path / "a.mp4", 10.0, shutil.which("cat") or "cat")
+    program = tmp_path / "ffmpeg"
+    program.write_text(f"#!{sys.executable}\nimport sys; sys.stdin.buffer.read()\n")
+    program.chmod(0o755)
+    writer = Mp4Writer(tmp_path / "a.mp4", 10.0, str(program))
     with pytest.raises(ValueError, match="5 x 4"):
         for frame in (FRAMES[0], np.zeros((4, 5, 3), np.uint8)):
             writer.add(frame)
-    with pytest.raises(EncoderFailed):
-        writer.close()  # cat knows none of ffmpeg's options
+    writer.close()
 
 
 def test_an_encoder_that_fails_says_why(tmp_path: Path):
