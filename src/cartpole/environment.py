@@ -1,14 +1,15 @@
 """The cart-pole's environments and their manual page, the docstring of `CartPoleEnv`."""
 
-from cartpole.drawing import draw
 from cartpole.robot import CONTROL_PERIOD, ROBOT
 from cartpole.tasks import BalanceTask, CartPoleState, CartPoleTask
 from cartpole.variation import Randomisation
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.environment import RobotEnv, Viewer
+from robot_envs.picture import HEIGHT, WIDTH, Camera
 from robot_envs.sensing import Sensor
 
-CAMERA = (1.3, 0.0, -5.0, (0.0, 0.0, 0.2))  # [m], yaw and pitch [degrees], what it looks at [m]
+CAMERA = Camera(target=(0.0, 0.0, 0.19), distance=1.65, yaw=14.0, pitch=-9.0)
+WINDOW_CAMERA = (1.3, 0.0, -5.0, (0.0, 0.0, 0.2))  # [m], yaw and pitch [degrees], looks at [m]
 
 
 class CartPoleEnv(RobotEnv[CartPoleState]):
@@ -70,7 +71,8 @@ class CartPoleEnv(RobotEnv[CartPoleState]):
     | `randomisation`  | none       | a dict of `mass`, `length`, `cart_friction`, `pole_friction`, see |
     |                  |            | `cartpole.variation.Randomisation`; each episode gets its own |
     |                  |            | robot, which stands in the reset's `info["variation"]`   |
-    | `render_mode`    | none       | `"rgb_array"`: pictures, (320, 640, 3) of uint8; `"human"`: a window |
+    | `render_mode`    | none       | `"rgb_array"`: pictures, (height, width, 3); `"human"`: a window |
+    | `width`, `height` | 640, 320  | of the pictures [pixels]                                  |
 
     Args:
         backend: moves the robot (see `robot_envs.backends`); the environment closes it.
@@ -78,11 +80,13 @@ class CartPoleEnv(RobotEnv[CartPoleState]):
         sensor: how the state is measured; exactly and at once by default.
         randomisation: what differs from episode to episode; nothing by default.
         render_mode: see above.
+        width: of pictures [pixels].
+        height: of pictures [pixels].
         control_period: the backend's [s]; tells how fast pictures follow each other.
 
     Raises:
         RobotEnvError: for a window where there is no display.
-        ValueError: for a render mode that doesn't exist.
+        ValueError: for a render mode that doesn't exist, or pictures of no possible size.
     """
 
     def __init__(
@@ -93,6 +97,8 @@ class CartPoleEnv(RobotEnv[CartPoleState]):
         sensor: Sensor[CartPoleState] | None = None,
         randomisation: Randomisation | None = None,
         render_mode: str | None = None,
+        width: int = WIDTH,
+        height: int = HEIGHT,
         control_period: float = CONTROL_PERIOD,
     ) -> None:
         super().__init__(
@@ -101,7 +107,9 @@ class CartPoleEnv(RobotEnv[CartPoleState]):
             control_period=control_period,
             sensor=sensor,
             randomisation=randomisation,
-            picture=draw,
+            camera=CAMERA,
+            width=width,
+            height=height,
             window=_open_window,
             render_mode=render_mode,
         )
@@ -110,4 +118,4 @@ class CartPoleEnv(RobotEnv[CartPoleState]):
 def _open_window(period: float) -> Viewer[CartPoleState]:
     from robot_envs.window import Window  # loads PyBullet, which nothing over ROS needs
 
-    return Window(ROBOT, period, CAMERA)
+    return Window(ROBOT, period, WINDOW_CAMERA)

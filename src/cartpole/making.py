@@ -11,6 +11,7 @@ from cartpole.tasks import TASKS, CartPoleTask
 from cartpole.variation import Randomisation
 from robot_envs.backends.backend import DEFAULT_ENGINE
 from robot_envs.backends.choice import IN_PROCESS, make_backend
+from robot_envs.picture import HEIGHT, WIDTH
 from robot_envs.sensing import Sensor
 
 
@@ -26,6 +27,8 @@ def make_environment(
     sensor_delay: int = 0,
     randomisation: Mapping[str, float] | None = None,
     render_mode: str | None = None,
+    width: int = WIDTH,
+    height: int = HEIGHT,
 ) -> CartPoleEnv:
     """Makes an environment; the options are explained in `CartPoleEnv`.
 
@@ -44,6 +47,8 @@ def make_environment(
             sensor=None if sensor.is_exact else sensor,
             randomisation=drawn,
             render_mode=render_mode,
+            width=width,
+            height=height,
             control_period=CONTROL_PERIOD if control_period is None else control_period,
         )
     except BaseException:

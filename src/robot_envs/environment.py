@@ -7,8 +7,10 @@ import gymnasium
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
+from bullet_gazebo.pictures.camera import Camera
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.display import hindrance
+from robot_envs.picture import HEIGHT, WIDTH, RobotPicture
 from robot_envs.robot import State
 from robot_envs.sensing import Sensor
 from robot_envs.task import Task
@@ -45,14 +47,16 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
         task: what is to be learned.
         sensor: how the state is measured; exactly and at once by default.
         randomisation: what differs from episode to episode; nothing by default.
-        picture: draws a state, for the render mode "rgb_array".
+        camera: where pictures are taken from, see `robot_envs.picture`.
+        width: of the pictures [pixels].
+        height: of the pictures [pixels].
         window: opens a window that shows a state every so many [s], for the render mode "human".
-        render_mode: one of these two, or none.
+        render_mode: "rgb_array": pictures; "human": a window, where there is one; or none.
         control_period: of an action [s]; tells how fast pictures follow each other.
 
     Raises:
         RobotEnvError: for a window where there is no display.
-        ValueError: for a render mode that doesn't exist.
+        ValueError: for a render mode that doesn't exist, or pictures of no possible size.
     """
 
     def __init__(
@@ -63,7 +67,9 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
         control_period: float,
         sensor: Sensor[State] | None = None,
         randomisation: Randomisation | None = None,
-        picture: Callable[[State], np.ndarray] | None = None,
+        camera: Camera | None = None,
+        width: int = WIDTH,
+        height: int = HEIGHT,
         window: Callable[[float], Viewer[State]] | None = None,
         render_mode: str | None = None,
     ) -> None:
@@ -73,14 +79,19 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
         self.action_space = task.action_space()
         self.observation_space = task.observation_space()
         self.metadata = {
-            "render_modes": _modes(picture, window),
+            "render_modes": ["human", "rgb_array"] if window and not hindrance() else ["rgb_array"],
             "render_fps": max(1, round(1.0 / control_period)),
         }
-        _check_mode(render_mode, picture, window)
+        known = ("human", "rgb_array") if window else ("rgb_array",)
+        if render_mode is not None and render_mode not in known:
+            names = " or ".join(f'"{name}"' for name in known)
+            raise ValueError(f"render_mode is {names}, not {render_mode!r}")
         self.render_mode = render_mode
         self._sensor = sensor
         self._randomisation = randomisation
-        self._picture = picture
+        self._picture = RobotPicture(
+            backend.robot, width, height, camera=camera, raised=task.height, base=backend.base
+        )
         self._window = window(control_period) if window and render_mode == "human" else None
         self._state = task.start
         self._command = task.initial_command(task.start)
@@ -161,10 +172,13 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
         return task.observation(seen), task.reward(state), terminated, truncated, {}
 
     def render(self) -> np.ndarray | None:
-        """A picture of the robot as it is. A window shows it at every step by itself."""
-        if self._picture is None or self.render_mode != "rgb_array":
-            return None
-        return self._picture(self._state)
+        """A picture of the robot as it is, (height, width, 3). A window shows it by itself.
+
+        Raises:
+            RobotEnvError: if the robot's file can't be read.
+            SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
+        """
+        return self._picture(self._state) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
         """Closes the backend and the window; may be called twice."""
@@ -172,6 +186,7 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
         self._steps = None
         if self._window is not None:
             self._window.close()
+        self._picture.close()
         self.backend.close()
 
     def _check_open(self) -> None:
@@ -179,16 +194,3 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
             raise gymnasium.error.ClosedEnvironmentError(
                 "this environment is closed; make another one"
             )
-
-
-def _modes(picture: object | None, window: object | None) -> list[str]:
-    """Gymnasium's checker tries all modes that are listed, so only those that this machine has."""
-    modes = ["human"] if window and not hindrance() else []
-    return [*modes, "rgb_array"] if picture else modes
-
-
-def _check_mode(mode: str | None, picture: object | None, window: object | None) -> None:
-    known = [name for name, way in (("human", window), ("rgb_array", picture)) if way]
-    if mode is not None and mode not in known:
-        names = " or ".join(f'"{name}"' for name in known) or "none"
-        raise ValueError(f"render_mode is {names}, not {mode!r}")

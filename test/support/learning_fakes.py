@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import torch
 
+from bullet_gazebo.physics.pose import Pose
+from cartpole.robot import ROBOT
 from cartpole.tasks import CartPoleState
 from rl_workbench.agents.pg.document import PolicyGradientAgent
 from rl_workbench.agents.pg.reinforce import ReinforceAgent
@@ -156,7 +158,7 @@ class FakePlant:
         fail_after: number of actions after which the simulator "dies"; None: never.
     """
 
-    deterministic, shared = True, False
+    robot, deterministic, shared = ROBOT, True, False
 
     def __init__(self, fail_after: int | None = None) -> None:
         self.closed = 0
@@ -182,6 +184,9 @@ class FakePlant:
         angle += rate * DT
         self._state = CartPoleState(x, v, angle, rate)
         return self._state
+
+    def base(self) -> Pose:
+        return Pose()
 
     def vary(self, variation: Variation) -> None:
         self.variations.append(variation)

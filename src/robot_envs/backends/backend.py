@@ -2,7 +2,8 @@
 
 from typing import Protocol
 
-from robot_envs.robot import State
+from bullet_gazebo.physics.pose import Pose
+from robot_envs.robot import Robot, State
 from robot_envs.task import Command
 from robot_envs.variation import Variation
 
@@ -13,6 +14,7 @@ DEFAULT_ENGINE = "bullet"
 class RobotBackend(Protocol[State]):
     """Moves a robot whose controllers follow commands."""
 
+    robot: Robot[State]
     deterministic: bool  # whether the same commands give the same states
     shared: bool  # whether all backends of its kind in a process move the same robot
 
@@ -29,6 +31,10 @@ class RobotBackend(Protocol[State]):
 
     def vary(self, variation: Variation) -> None:
         """Gives the robot other masses, lengths and friction; to be called before a reset."""
+        ...
+
+    def base(self) -> Pose:
+        """Where the frame of the robot's root link is, in the world."""
         ...
 
     def close(self) -> None:

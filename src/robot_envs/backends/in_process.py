@@ -61,7 +61,7 @@ class InProcessRobot(Generic[State]):
         height: float = 0.0,
         engine: str = DEFAULT_ENGINE,
     ) -> None:
-        self._robot, self._state_of = robot, robot.state_of
+        self.robot, self._state_of = robot, robot.state_of
         self._ticks = ticks_per_action(control_period, PHYSICS_STEP)
         urdf = robot.urdf()
         self._sim = Simulator(World(make_engine(engine), time_step=PHYSICS_STEP), lockstep=True)
@@ -83,7 +83,7 @@ class InProcessRobot(Generic[State]):
 
     def _start(self, hardware: RobotHardware) -> list[tuple[int, Callable[[float], None]]]:
         """Starts the robot's controllers in the world; returns what takes each number of a command."""
-        robot, manager = self._robot, ControllerManager(hardware)
+        robot, manager = self.robot, ControllerManager(hardware)
         self._sim.add_robot(ControlledRobot(self._model, hardware, manager))
         loaded = {name: manager.load(name, robot.parameters(name)) for name in robot.controllers}
         manager.switch(loaded, [], STRICT)
@@ -91,7 +91,7 @@ class InProcessRobot(Generic[State]):
 
     def reset(self, state: State) -> State:
         """See `RobotBackend.reset`; the state asked for is the state reached, within the joints' stops."""
-        joints = self._robot.joints
+        joints = self.robot.joints
         self._sim.reset(everything=False)
         self._sim.set_joint_states(
             self._model,
@@ -144,6 +144,10 @@ class InProcessRobot(Generic[State]):
         com = old.com._replace(position=figures.com)
         inertia = replace(old, mass=figures.mass, com=com, **figures.tensor)
         set_link_properties(self._sim.world, self._model, link, inertia, gravity=True)
+
+    def base(self) -> Pose:
+        """See `RobotBackend.base`."""
+        return self._model.root_state()[0]
 
     def close(self) -> None:
         """Frees the world; may be called twice."""

@@ -5,6 +5,8 @@ from typing import Generic
 import genpy
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 
+from bullet_gazebo.physics.pose import Pose
+from robot_envs.backends.base_pose import base_pose
 from robot_envs.backends.bring_up import STEP_SERVICE
 from robot_envs.backends.joint_states import read_state
 from robot_envs.backends.own_simulator import OwnSimulator
@@ -28,7 +30,7 @@ class LockstepRobot(Generic[State]):
     deterministic = shared = True
 
     def __init__(self, robot: Robot[State], ticks: int) -> None:
-        self._robot = robot
+        self.robot = robot
         self._simulator = OwnSimulator()
         self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True)
         self._begin = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=list(robot.joints))
@@ -55,11 +57,20 @@ class LockstepRobot(Generic[State]):
             answer = self._step(request)
             if not answer.success:
                 raise SimulatorError(f"{STEP_SERVICE}: {answer.status_message}")
-            return read_state(self._robot, answer.joint_states)
+            return read_state(self.robot, answer.joint_states)
 
     def vary(self, variation: Variation) -> None:
         """See `RobotBackend.vary`."""
         self._variation(variation)
+
+    def base(self) -> Pose:
+        """See `RobotBackend.base`.
+
+        Raises:
+            SimulatorError: if the simulator doesn't answer.
+        """
+        with self._simulator:
+            return base_pose(self.robot)
 
     def close(self) -> None:
         """Closes the connection to the simulator; the robot is as it was found."""

@@ -11,6 +11,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
 
+from bullet_gazebo.physics.pose import Pose
+from robot_envs.backends.base_pose import base_pose
 from robot_envs.backends.joint_states import read_state
 from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.ros_variation import RosVariation
@@ -107,7 +109,7 @@ class RealtimeRobot(Generic[State]):
     deterministic, shared = False, True
 
     def __init__(self, robot: Robot[State], control_period: float | None = None) -> None:
-        self._robot = robot
+        self.robot = robot
         self._period = control_period
         self._simulator = OwnSimulator()
         self._variation = RosVariation(robot)
@@ -141,7 +143,7 @@ class RealtimeRobot(Generic[State]):
             self._pause()
             self._reset(positions)
         self._wait_for(positions)
-        return self._robot.state_of(number for place in positions for number in (place, 0.0))
+        return self.robot.state_of(number for place in positions for number in (place, 0.0))
 
     def _wait_for(self, positions: Sequence[float]) -> None:
         with self._arrived:
@@ -151,7 +153,7 @@ class RealtimeRobot(Generic[State]):
     def _is_at(self, positions: Sequence[float]) -> bool:
         if self._newest is None:
             return False
-        found = read_state(self._robot, self._newest[0])[::2]
+        found = read_state(self.robot, self._newest[0])[::2]
         return all(abs(a - b) < _SAME for a, b in zip(found, positions, strict=True))
 
     def act(self, command: Command) -> State:
@@ -167,7 +169,7 @@ class RealtimeRobot(Generic[State]):
             for topic, value in zip(self._topics, command, strict=True):
                 topic.publish(value)
             with self._arrived:
-                return read_state(self._robot, self._wait_until(due))
+                return read_state(self.robot, self._wait_until(due))
 
     def _wait_until(self, due: float | None) -> JointState:
         """A long control period takes its time, as long as joint states come."""
@@ -177,7 +179,7 @@ class RealtimeRobot(Generic[State]):
             if newest is None or time.monotonic() - newest[1] > STATE_TIMEOUT:
                 raise SimulatorError(
                     f"no joint state on /joint_states for {STATE_TIMEOUT:g} s; is the world running "
-                    f"and {self._robot.over_ros.publisher} started?"
+                    f"and {self.robot.over_ros.publisher} started?"
                 )
             if there:
                 return newest[0]
@@ -196,6 +198,15 @@ class RealtimeRobot(Generic[State]):
     def vary(self, variation: Variation) -> None:
         """See `RobotBackend.vary`."""
         self._variation(variation)
+
+    def base(self) -> Pose:
+        """See `RobotBackend.base`.
+
+        Raises:
+            SimulatorError: if the simulator doesn't answer.
+        """
+        with self._simulator:
+            return base_pose(self.robot)
 
     def close(self) -> None:
         """Leaves the topics; the world stays as it is, the robot as it was found."""

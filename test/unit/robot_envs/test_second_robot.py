@@ -169,9 +169,9 @@ def test_a_robot_for_this_process_only_says_so_over_ros():
         _ = dataclasses.replace(PENDULUM, ros=None).over_ros
 
 
-def test_pictures_that_nobody_can_draw_are_refused():
+def test_there_is_no_window_that_nobody_has_described():
     env = make_pendulum()
-    assert env.metadata == {"render_modes": [], "render_fps": 100}
-    with pytest.raises(ValueError, match="render_mode is none, not 'rgb_array'"):
-        type(env)(env.backend, env.task, control_period=0.01, render_mode="rgb_array")
+    assert env.metadata == {"render_modes": ["rgb_array"], "render_fps": 100}
+    with pytest.raises(ValueError, match="render_mode is \"rgb_array\", not 'human'"):
+        type(env)(env.backend, env.task, control_period=0.01, render_mode="human")
     env.close()

@@ -14,11 +14,16 @@ from rl_workbench.training.options.run_options import RunOptions
 from rl_workbench.training.run.files import write_file
 
 
-def add_policy_flags(parser: argparse.ArgumentParser) -> None:
-    """Which policy of which run, and where it acts."""
+def add_policy_flags(parser: argparse.ArgumentParser, several: tuple[str, ...] = ()) -> None:
+    """Which policy of which run, and where it acts; or which of `several`."""
     parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
-    parser.add_argument("--checkpoint", choices=WHICH, default="best",
-                        help="by evaluation, or the newest (default best)")  # fmt: skip
+    if several:
+        parser.add_argument("--checkpoint", choices=several, nargs="+", default=["best"],
+                            help="by evaluation, the newest, or random actions; several: side by "
+                            "side (default best)")  # fmt: skip
+    else:
+        parser.add_argument("--checkpoint", choices=WHICH, default="best",
+                            help="by evaluation, or the newest (default best)")  # fmt: skip
     parser.add_argument("--seed", type=number(0), default=0, metavar="N",
                         help="of the episodes (default 0)")  # fmt: skip
     parser.add_argument("--env-kwargs", nargs="+", default=[], metavar="KEY=VALUE",

@@ -10,19 +10,29 @@ from typing import Any
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.commands.shared import add_policy_flags, env_options, number
 from rl_workbench.tools.pictures import videos
+from rl_workbench.tools.pictures.filming import (
+    Act,
+    Film,
+    SideBySide,
+    Size,
+    film_episode,
+    size_options,
+)
 from rl_workbench.tools.runs import episodes
-from rl_workbench.tools.runs.policies import LearnedPolicy, load_learned
+from rl_workbench.tools.runs.policies import WHICH, LearnedPolicy, load_learned
 from rl_workbench.tools.runs.runs import Run, open_run, threshold
+from rl_workbench.training.run.environments import make_environment
 from rl_workbench.training.run.files import as_json, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell
 
+RANDOM = "random"  # a policy that every environment has
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")  # any of them names one
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
     """Flags of one of the three."""
-    add_policy_flags(parser)
+    add_policy_flags(parser, (*WHICH, RANDOM) if command == "record" else ())
     add = parser.add_argument
     if command == "eval":
         add("--episodes", type=number(1), default=100, metavar="N", help="default 100")
@@ -34,14 +44,24 @@ def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
     add("--out", type=Path, required=True, metavar="FILE", help="ends in .gif or .mp4")
     add("--max-steps", type=number(0), default=0, metavar="N",
         help="cuts the episode off; 0: never (default)")  # fmt: skip
-    add("--scale", type=_scale, default=1.0, metavar="X",
-        help="of width and height (default 1)")  # fmt: skip
+    add("--size", type=_size, metavar="WIDTHxHEIGHT",
+        help="of an episode's pictures [pixels]; by default the environment's")  # fmt: skip
+    add("--fps", type=_rate, metavar="HZ",
+        help="frames per second of simulated time (default 50, of a GIF 25)")  # fmt: skip
+    add("--no-captions", action="store_true", help="no line with step, return and action")
 
 
-def _scale(text: str) -> float:
+def _size(text: str) -> Size:
+    words = text.lower().split("x")
+    if len(words) != 2 or not all(word.isdecimal() and 16 <= int(word) <= 4096 for word in words):
+        raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT, 16x16 to 4096x4096: {text}")
+    return int(words[0]), int(words[1])
+
+
+def _rate(text: str) -> float:
     value = float(text)
-    if not 0.05 <= value <= 4.0:
-        raise argparse.ArgumentTypeError(f"must lie between 0.05 and 4: {text}")
+    if not 0.1 <= value <= 240.0:
+        raise argparse.ArgumentTypeError(f"must lie between 0.1 and 240: {text}")
     return value
 
 
@@ -55,8 +75,11 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     commands[arguments.command](arguments, open_run(arguments.run))
 
 
-def _policy(arguments: argparse.Namespace, run: Run, **options: Any) -> LearnedPolicy:
-    return load_learned(run, arguments.checkpoint, {**env_options(arguments), **options})
+def _policy(
+    arguments: argparse.Namespace, run: Run, which: str | None = None, **options: Any
+) -> LearnedPolicy:
+    chosen = which or arguments.checkpoint
+    return load_learned(run, chosen, {**env_options(arguments), **options})
 
 
 def _eval(arguments: argparse.Namespace, run: Run) -> None:
@@ -94,19 +117,37 @@ def _enjoy(arguments: argparse.Namespace, run: Run) -> None:
 
 
 def _record(arguments: argparse.Namespace, run: Run) -> None:
-    videos.check_format(arguments.out)
-    check_writable(arguments.out)
+    out = arguments.out
+    videos.check_format(out)
+    fastest = arguments.fps or videos.default_rate(out)
+    if out.suffix.lower() == ".gif" and fastest > videos.FASTEST:
+        raise WorkbenchError(f"--fps: a GIF has {videos.FASTEST:g} frames a second at most")
+    check_writable(out)
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # or pygame would look for a screen
-    policy = _policy(arguments, run, render_mode="rgb_array")
-    fastest = videos.GIF_RATE if arguments.out.suffix.lower() == ".gif" else videos.MP4_RATE
+    several = len(arguments.checkpoint) > 1
+    films = []
+    for which in arguments.checkpoint:
+        films.append(_film(arguments, run, which, fastest, which if several else ""))
+        told = f"{which}: " if several else ""
+        tell(f"{told}return {films[-1].total_reward:.2f} in {films[-1].length} steps")
+    frames = SideBySide(films)
+    videos.write_video(out, frames, films[0].rate)
+    tell(f"{out}: {len(frames)} frames, {len(frames) / films[0].rate:.1f} s")
+
+
+def _film(arguments: argparse.Namespace, run: Run, which: str, fastest: float, title: str) -> Film:
+    options = {"render_mode": "rgb_array", **size_options(run.env_id, arguments.size)}
+    if which == RANDOM:
+        env = make_environment(run.env_id, {**run.env_kwargs, **env_options(arguments), **options})
+        env.action_space.seed(arguments.seed)
+        act: Act = lambda _: env.action_space.sample()  # noqa: E731
+    else:
+        policy = _policy(arguments, run, which, **options)
+        env, act = policy.env, policy.act
     try:
-        video = videos.record_episode(
-            policy, episodes.TEST_SEED + arguments.seed, fastest, arguments.max_steps
-        )
+        return film_episode(
+            env, act, episodes.TEST_SEED + arguments.seed, fastest, longest=arguments.max_steps,
+            size=arguments.size, title=title, captions=not arguments.no_captions,
+        )  # fmt: skip
     finally:
-        policy.env.close()
-    videos.write_video(arguments.out, video, arguments.scale)
-    tell(
-        f"{arguments.out}: return {video.total_reward:.2f} in {video.length} steps, "
-        f"{len(video.frames)} frames, {len(video.frames) / video.rate:.1f} s"
-    )
+        env.close()

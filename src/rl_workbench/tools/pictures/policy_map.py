@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.figure import new_figure
-from rl_workbench.tools.runs.episodes import greedy_steps
+from rl_workbench.tools.runs.episodes import episode_steps
 from rl_workbench.tools.runs.policies import LearnedPolicy
 
 POINTS = 161  # of each axis
@@ -116,8 +116,8 @@ def _draw_preferences(
 
 def _trajectory(plane: StatePlane, policy: LearnedPolicy, seed: int) -> np.ndarray:
     """Angle [°] and velocity [rad/s] along one greedy episode, (T, 2)."""
-    steps = greedy_steps(policy, seed, LONGEST)
-    places = [plane.locate(observation) for observation, _, _ in steps]
+    steps = episode_steps(policy.env, policy.act, seed, LONGEST)
+    places = [plane.locate(observation) for observation, *_ in steps]
     return np.array(places) * (180.0 / math.pi, 1.0)
 
 

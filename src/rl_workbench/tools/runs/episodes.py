@@ -1,10 +1,11 @@
 """Greedy episodes of a run's policy, and their figures."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import gymnasium
 import numpy as np
 
 from rl_workbench.errors import WorkbenchError
@@ -28,21 +29,31 @@ def play(policy: LearnedPolicy, episodes: int, seed: int) -> Evaluation:
     return result
 
 
-def greedy_steps(
-    policy: LearnedPolicy, seed: int, longest: int = 0
-) -> Iterator[tuple[np.ndarray, float, bool]]:
-    """One greedy episode: observation, reward and whether it is over, from the reset on.
+class Step(NamedTuple):
+    """What a step has brought; the first one is the reset, which has no action."""
+
+    observation: np.ndarray
+    action: Any
+    reward: float
+    finished: bool
+
+
+def episode_steps(
+    env: gymnasium.Env[Any, Any], act: Callable[[np.ndarray], Any], seed: int, longest: int = 0
+) -> Iterator[Step]:
+    """One episode, from the reset on.
 
     Args:
+        act: chooses the action for an observation.
         longest: number of steps after which it is cut off; 0: never.
     """
-    observation, _ = policy.env.reset(seed=seed)
-    yield observation, 0.0, False
+    observation, _ = env.reset(seed=seed)
+    yield Step(observation, None, 0.0, False)
     for length in count(1):
-        action = policy.act(np.asarray(observation, np.float32))
-        observation, reward, terminated, truncated, _ = policy.env.step(action)
+        action = act(np.asarray(observation, np.float32))
+        observation, reward, terminated, truncated, _ = env.step(action)
         finished = terminated or truncated or length == longest
-        yield observation, float(reward), finished
+        yield Step(observation, action, float(reward), finished)
         if finished:
             return
 

@@ -87,7 +87,7 @@ def test_options_of_the_environment_reach_it(runs: Path, given: list[str], capsy
 @pytest.mark.parametrize("name", ["dqn_0", "robot", "reinforce"])
 def test_record_writes_a_gif_without_a_display(runs: Path, tmp_path: Path, name: str) -> None:
     out = tmp_path / "video.gif"
-    assert work("record", runs / name, "--out", out, "--max-steps", 40, "--scale", 0.5) == 0
+    assert work("record", runs / name, "--out", out, "--max-steps", 40, "--size", "160x80") == 0
     with Image.open(out) as video:
         assert video.format == "GIF" and video.n_frames > 1
         seen = []
@@ -351,6 +351,7 @@ def test_a_place_where_nothing_can_be_written(runs: Path, tmp_path: Path, capsys
 
 def test_an_extra_that_is_missing(runs: Path, tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setattr("shutil.which", lambda name: None)
     for arguments in (
         ["record", runs / "dqn_0", "--out", tmp_path / "a.mp4"],
         ["sweep", "--out", tmp_path / "sweep"],

@@ -1,0 +1,1 @@
+"""Writes videos: a leaf that knows nothing of what they show."""

@@ -1,0 +1,49 @@
+"""Where the camera sees what."""
+
+import numpy as np
+import pytest
+from pictures import pixel
+
+from bullet_gazebo.pictures.camera import Camera, overview
+from bullet_gazebo.pictures.ground import SKY, background
+
+CORNERS = np.array([(x, y, z) for x in (-1.0, 2.0) for y in (0.0, 0.5) for z in (0.0, 3.0)])
+
+
+def test_x_goes_to_the_right_and_z_upwards():
+    camera = Camera(target=(0.0, 0.0, 1.0), distance=2.0, yaw=0.0, pitch=0.0)
+    assert pixel(camera, (0.0, 0.0, 1.0), 200, 100) == pytest.approx((100.0, 50.0))
+    assert pixel(camera, (0.1, 0.0, 1.0), 200, 100)[0] > 100.0
+    assert pixel(camera, (0.0, 0.0, 1.1), 200, 100)[1] < 50.0
+    edge = 2.0 * camera.slope
+    assert pixel(camera, (0.0, 0.0, 1.0 + edge), 200, 100) == pytest.approx((100.0, 0.0))
+
+
+def test_the_matrices_say_the_same():
+    camera = Camera((0.3, -0.2, 0.5), 1.7, 33.0, -21.0)
+    point = (0.1, 0.2, 0.4)
+    clip = camera.projection_matrix(2.0) @ camera.view_matrix() @ np.array([*point, 1.0])
+    x, y, _ = clip[:3] / clip[3]
+    seen = (100.0 * (1.0 + x), 50.0 * (1.0 - y))
+    assert pixel(camera, point, 200, 100) == pytest.approx(seen)
+
+
+@pytest.mark.parametrize("aspect", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("looking", [None, Camera(yaw=200.0, pitch=-80.0)])
+def test_an_overview_has_everything_in_it(aspect, looking):
+    camera = overview(CORNERS, aspect, looking)
+    width, height = 400 * aspect, 400
+    seen = np.array([pixel(camera, tuple(corner), width, height) for corner in CORNERS])
+    assert (seen > 0.0).all() and (seen < (width, height)).all()
+    assert np.abs(seen / (width, height) - 0.5).max() > 0.3  # and isn't far away
+
+
+def test_the_ground_ends_at_the_horizon():
+    behind = background(Camera(pitch=0.0, target=(0.0, 0.0, 1.0)), 40, 30)
+    assert (behind.colours[:15] == SKY).all() and (behind.depth[:15] == 1.0).all()
+    assert (behind.colours[-1] != SKY).any() and (np.diff(behind.depth[16:, 0]) < 0.0).all()
+
+
+def test_from_below_the_ground_is_above():
+    behind = background(Camera(pitch=10.0), 40, 30)
+    assert (behind.depth[0] < 1.0).all() and (behind.depth[-1] == 1.0).all()

@@ -1,0 +1,93 @@
+"""The cart-pole's pictures: where the state says, the same whatever moves it, and never in the way."""
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+from pictures import pixel
+
+import cartpole  # noqa: F401 - registers the environments
+from cartpole.environment import CAMERA
+from cartpole.robot import ROBOT
+from cartpole.tasks import CartPoleState
+from robot_envs.picture import RobotPicture
+
+WIDTH, HEIGHT = 320, 160
+HINGE = 0.18  # [m] above the ground
+BLUE, ORANGE = (lambda r, g, b: b > r + 60), (lambda r, g, b: r > b + 90)
+
+
+@pytest.fixture(scope="module")
+def draw():
+    picture = RobotPicture(ROBOT, WIDTH, HEIGHT, camera=CAMERA)
+    yield lambda *numbers: picture(CartPoleState(*numbers))
+    picture.close()
+
+
+def middle(picture, colour):
+    """Mean place of a colour: column and row [pixels]."""
+    rows, columns = np.nonzero(colour(*np.moveaxis(picture.astype(int), -1, 0)))
+    return columns.mean() + 0.5, rows.mean() + 0.5
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.2, -0.2, math.pi / 2, -1.2])
+@pytest.mark.parametrize("position", [-0.4, 0.0, 0.3])
+def test_cart_and_pole_are_where_the_state_says(draw, position, angle):
+    picture = draw(position, 0.0, angle, 0.0)
+    x = position - 0.25 * math.sin(angle)  # a positive angle leans towards -x
+    expected = pixel(CAMERA, (x, 0.0, HINGE + 0.25 * math.cos(angle)), WIDTH, HEIGHT)
+    assert middle(picture, ORANGE) == pytest.approx(expected, abs=4.0)
+    cart = pixel(CAMERA, (position, 0.0, 0.155), WIDTH, HEIGHT)
+    assert middle(picture, BLUE) == pytest.approx(cart, abs=2.5)
+
+
+def test_a_cart_that_left_the_picture_does_no_harm(draw):
+    assert draw(1e9, 0.0, 0.0, 0.0).shape == (HEIGHT, WIDTH, 3)
+
+
+def episode(render_mode, **options):
+    env = gymnasium.make("cartpole/SwingUp-v0", render_mode=render_mode, **options)
+    env.action_space.seed(0)
+    seen, pictures = [env.reset(seed=1)[0]], []
+    for _ in range(15):
+        if render_mode:
+            pictures.append(env.render())
+        seen.append(env.step(env.action_space.sample())[0])
+    env.close()
+    return np.array(seen), pictures
+
+
+def test_rendering_between_steps_changes_no_bit():
+    assert np.array_equal(episode(None)[0], episode("rgb_array", width=40, height=30)[0])
+
+
+def test_the_engine_makes_no_difference_to_the_picture():
+    pytest.importorskip("mujoco")
+    pictures = []
+    for engine in ("bullet", "mujoco"):
+        env = gymnasium.make(
+            "cartpole/Classic-v0", render_mode="rgb_array", engine=engine, width=64, height=48
+        )
+        env.reset(seed=2)
+        pictures.append(env.render())
+        env.close()
+    assert np.array_equal(*pictures) and pictures[0].shape == (48, 64, 3)
+
+
+def test_a_size_that_is_none_is_refused():
+    with pytest.raises(ValueError, match="width and height"):
+        gymnasium.make("cartpole/Classic-v0", width=0)
+
+
+def test_gymnasiums_recorder_writes_an_episode(tmp_path):
+    """moviepy asks for an older Pillow than ours, so it isn't installed: docs/watching.md."""
+    pytest.importorskip("moviepy", reason="moviepy isn't installed")
+    env = gymnasium.make("cartpole/Classic-v0", render_mode="rgb_array", max_steps=5)
+    env = gymnasium.wrappers.RecordVideo(env, str(tmp_path), episode_trigger=lambda _: True)
+    env.reset(seed=0)
+    while not any(env.step(0)[2:4]):
+        pass
+    env.close()
+    (video,) = tmp_path.glob("*.mp4")
+    assert video.stat().st_size > 1000

@@ -1,0 +1,100 @@
+"""Pictures of robots by their state."""
+
+import dataclasses
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from pendulum import PENDULUM, PendulumState
+
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.pictures.camera import Camera
+from robot_envs.errors import RobotEnvError
+from robot_envs.picture import RobotPicture
+from robot_envs.robot import Robot
+
+ROVER = """<robot name="rover"><link name="hull">
+  <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+  <visual><geometry><box size="0.4 0.2 0.1"/></geometry>
+    <material name="red"><color rgba="1 0 0 1"/></material></visual></link>
+  <link name="mast">
+  <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+  <visual><origin xyz="0 0 0.2"/><geometry><box size="0.05 0.05 0.4"/></geometry>
+    <material name="green"><color rgba="0 1 0 1"/></material></visual></link>
+  <joint name="neck" type="revolute"><parent link="hull"/><child link="mast"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+class RoverState(NamedTuple):
+    """One joint."""
+
+    neck: float  # [rad]
+    rate: float  # [rad/s]
+
+
+@pytest.fixture
+def rover(tmp_path: Path) -> Robot[RoverState]:
+    path = tmp_path / "rover.urdf"
+    path.write_text(ROVER)
+    return Robot("rover", RoverState, ("neck",), (), (), lambda: path, lambda: path)
+
+
+def where(picture: np.ndarray, channel: int) -> np.ndarray:
+    """Mean column and row [pixels] of what has one of the three colours."""
+    others = [each for each in range(3) if each != channel]
+    strong = picture[..., channel].astype(int) > 60 + picture[..., others].max(axis=-1).astype(int)
+    assert strong.any()
+    return np.argwhere(strong)[:, ::-1].mean(axis=0) + 0.5
+
+
+def test_a_robot_is_drawn_as_its_state_says():
+    """To the left and to the right of its hinge; whole, wherever it points."""
+    picture = RobotPicture(PENDULUM, 200, 200)
+    drawn = [picture(PendulumState(angle, 0.0)).astype(int) for angle in (-1.57, 1.57, 0.0, 3.14)]
+    picture.close()
+    assert all(each.shape == (200, 200, 3) for each in drawn)
+    left, right, up, down = (np.abs(each - np.minimum.reduce(drawn)).sum(axis=-1) for each in drawn)
+    assert not np.array_equal(left, right) and not np.array_equal(up, down)
+    for each in drawn:
+        border = np.concatenate([each[0], each[:, 0], each[:, -1]])
+        assert (border.min(axis=-1) > 180).all()  # sky and ground: nothing is cut off
+
+
+def test_the_camera_follows_what_drives_away(rover):
+    place = [Pose((0.0, 0.0, 0.1))]
+    picture = RobotPicture(rover, 160, 120, base=lambda: place[0])
+    here = picture(RoverState(0.0, 0.0))
+    place[0] = Pose((7.23, -2.98, 0.1))
+    there = picture(RoverState(0.0, 0.0))
+    assert where(there, 0) == pytest.approx(where(here, 0), abs=0.5)
+    assert not np.array_equal(here, there)  # the ground goes by
+    leaning = picture(RoverState(0.5, 0.0))
+    assert where(leaning, 1)[0] > where(there, 1)[0] + 2
+    assert where(leaning, 0) == pytest.approx(where(here, 0), abs=1.0)
+    picture.close()
+
+
+def test_a_camera_of_ones_own_looks_where_it_should(rover):
+    camera = Camera(target=(0.0, 0.0, 0.0), distance=2.0, yaw=0.0, pitch=0.0)
+    low, high = (RobotPicture(rover, 160, 120, camera=camera, raised=z) for z in (0.0, 0.7))
+    assert where(low(RoverState(0.0, 0.0)), 0) == pytest.approx((80.0, 60.0), abs=4)
+    assert where(high(RoverState(0.0, 0.0)), 0) == pytest.approx((80.0, 60.0), abs=4)
+    low.close()
+    high.close()
+
+
+@pytest.mark.parametrize("size", [(0, 10), (10, 5000), (10.5, 10), (-1, 10)])
+def test_sizes_that_no_picture_has_are_refused_at_once(size):
+    with pytest.raises(ValueError, match="width and height lie in"):
+        RobotPicture(PENDULUM, *size)
+
+
+def test_a_file_that_cannot_be_read_is_an_error_of_one_line(tmp_path):
+    path = tmp_path / "broken.urdf"
+    path.write_text("<robot name='x'><link/></robot>")
+    picture = RobotPicture(dataclasses.replace(PENDULUM, urdf_file=lambda: path))
+    with pytest.raises(RobotEnvError, match="the robot 'pendulum'"):
+        picture(PendulumState(0.0, 0.0))
+    picture.close()
