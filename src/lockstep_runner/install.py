@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import os
 
 import rospy
 
 from lockstep_runner.nodes.followers import Followers
 from lockstep_runner.replaced import (
     python_futures,
+    python_locks,
     python_threads,
     python_time,
     ros_services,
@@ -43,8 +45,10 @@ def install(args: argparse.Namespace, world: World | None = None) -> Runner:
     ros_services.install(runner)
     ros_time.install(runner)
     python_threads.install(runner)
+    python_locks.install(runner)
     python_futures.install(runner)
     python_time.install(runner, args.virtual_wall_clock)
+    os.register_at_fork(after_in_child=runner.world.leave)
     rospy.core.add_shutdown_hook(lambda reason: runner.clock.release_all())
     return runner
 

@@ -55,10 +55,15 @@ class Clock:
 
     def covers_this_thread(self) -> bool:
         """Whether this is the main thread, or one that computes while the main one waits for it."""
-        return (
-            threading.current_thread() is threading.main_thread()
-            or threading.get_ident() in self._running
-        )
+        ident = threading.get_ident()
+        return ident == threading.main_thread().ident or ident in self._running
+
+    def covers(self, ident: int) -> bool:
+        """The same of any thread, also of one that rests."""
+        if ident == threading.main_thread().ident or ident in self._running:
+            return True
+        with self._guard:
+            return any(each.thread == ident for each in self._sleepers)
 
     def wait(
         self, seconds: float, until: Condition | None = None, topics: Collection[str] = ()
@@ -139,6 +144,7 @@ class Clock:
     def _drive(self, span: float, until: Condition | None, topics: Collection[str]) -> bool:
         end = self.passed + span
         self._let_others_finish()
+        self._wake_the_due()  # those who waited for what this thread has just done
         if until is not None:
             self.exchange()
             if until():

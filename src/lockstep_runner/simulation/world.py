@@ -49,6 +49,7 @@ class World:
         self._seed = seed
         self._seeded = False
         self._next_look = 0.0
+        self._left = False
 
     @property
     def there(self) -> bool:
@@ -63,7 +64,7 @@ class World:
         """
         if self._call is not None:
             return True
-        if not rospy.core.is_initialized():
+        if self._left or not rospy.core.is_initialized():
             return False
         with self._guard:
             if not at_once and originals.monotonic() < self._next_look:
@@ -128,6 +129,9 @@ class World:
             try:
                 response: AdvanceWorldResponse = self._call(request)
             except (ServiceGone, ServiceHangs) as fault:
+                raised = _raised_elsewhere(fault)
+                if raised is not None:
+                    raise raised  # noqa: B904 - as if nobody had taken it for the connection's
                 self.forget()
                 if isinstance(fault, ServiceGone) and not _is_registered():
                     raise WorldGone("the simulator has been ended") from fault
@@ -151,6 +155,27 @@ class World:
             if self._call is not None:
                 self._call.close()
             self._call = None
+
+    def leave(self) -> None:
+        """Has a process that was forked from the script's live by the wall; the connection isn't its."""
+        self._left = True
+        self._call = None
+        self._guard = threading.RLock()  # which another thread may have held
+        self._pending = []
+
+
+def _raised_elsewhere(fault: BaseException) -> BaseException | None:
+    """What a signal's handler raised in the middle of a call: a TimeoutError is a connection's, too."""
+    cause: BaseException | None = fault
+    while cause is not None and not isinstance(cause, OSError):
+        cause = cause.__cause__
+    place = cause.__traceback__ if cause is not None else None
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    if place is None:
+        return None
+    package = place.tb_frame.f_globals.get("__name__", "").partition(".")[0]
+    return None if package in ("ros_calls", "socket") else cause
 
 
 def is_running() -> bool:

@@ -158,6 +158,40 @@ class LockstepTest(unittest.TestCase):
         for one, two in zip(seen, sorted(expected), strict=True):
             self.assertAlmostEqual(one, two, 6)
 
+    def test_a_service_call_under_a_lock_that_a_callback_wants(self):
+        script = HEAD + (
+            "from gazebo_msgs.srv import SetModelConfiguration\n"
+            "from sensor_msgs.msg import JointState\n"
+            "place = rospy.ServiceProxy('/gazebo/set_model_configuration', SetModelConfiguration)\n"
+            "lock, seen = threading.RLock(), []\n"
+            "def hear(message):\n    with lock:\n        seen.append(message.header.stamp.to_sec())\n"
+            "def act(event):\n"
+            "    with lock:\n"
+            "        before = len(seen)\n"
+            "        place('slide', '', ['slide_joint'], [0.01])\n"
+            "        print(rospy.get_time(), len(seen) - before)\n"
+            "rospy.Subscriber('/slides/joint_states', JointState, hear)\n"
+            "timer = rospy.Timer(rospy.Duration(0.02), act)\n"
+            "rospy.sleep(0.1)\ntimer.shutdown()\nprint(len(seen), seen == sorted(seen))\n"
+        )
+        runs = [lockstep(written(script)) for _ in range(2)]
+        for run in runs:
+            self.assertEqual(run.stderr, "")
+        self.assertEqual(self.check(runs[0]), self.check(runs[1]))
+
+    def test_processes_that_are_forked_live_by_the_wall(self):
+        script = HEAD + (
+            "import multiprocessing, os\n"
+            "def square(x):\n    time.sleep(0.01)\n    return x * x\n"
+            "with multiprocessing.Pool(2) as pool:\n    print(pool.map(square, range(4)))\n"
+            "child = os.fork()\n"
+            "if not child:\n    time.sleep(0.01)\n    os._exit(3)\n"
+            "before = rospy.get_time()\ntime.sleep(0.5)\nprint(round(rospy.get_time() - before, 6))\n"
+            "print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))\n"
+        )
+        out = self.check(lockstep(written(script)))
+        self.assertEqual(out, "[0, 1, 4, 9]\n0.5\n3\n")
+
     def test_the_wall_clock_may_be_simulated(self):
         script = written(
             HEAD + "from time import monotonic, perf_counter, sleep, time\n"
@@ -268,6 +302,9 @@ class LockstepTest(unittest.TestCase):
         run = lockstep(written(interrupted.format("raise RuntimeError")))
         self.assertEqual((run.returncode, run.stdout), (1, "1.0\n"), run.stderr)
         self.assertIn("KeyError: 'the end'", run.stderr)
+        own = interrupted.replace("RuntimeError", "TimeoutError")  # a connection's is the same
+        run = lockstep(written(own.format("raise TimeoutError")))
+        self.assertEqual((run.returncode, run.stdout), (1, "1.0\n"), run.stderr)
         run = lockstep(written(interrupted.format("sys.exit(5)")))
         self.assertEqual((run.returncode, run.stdout, run.stderr), (5, "", ""))
         self.check(lockstep(SCRIPTS / "rate_loop.py"))

@@ -1,0 +1,135 @@
+"""threading.Lock and RLock, where the script itself makes them: a thread that waits for one rests.
+
+Else a callback that wants a lock would seem to compute, and be waited for by the very thread that holds it.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+from typing import Any
+
+from lockstep_runner.runner import Runner
+from lockstep_runner.script.callers import GO_BETWEENS, is_the_script
+from lockstep_runner.simulation.clock import NANOSECONDS
+
+
+def install(runner: Runner) -> None:
+    """Puts the functions in place."""
+    make_lock, make_rlock = threading.Lock, threading.RLock
+
+    def lock() -> Any:
+        return _Lock(runner, make_lock()) if _is_asked_for_by_the_script() else make_lock()
+
+    def rlock() -> Any:
+        return _RLock(runner, make_rlock()) if _is_asked_for_by_the_script() else make_rlock()
+
+    threading.Lock = lock  # type: ignore[assignment]
+    threading.RLock = rlock  # type: ignore[assignment]
+
+
+def _is_asked_for_by_the_script() -> bool:
+    """Python's own, as those inside an Event, are held for moments; but a Condition's may be held long."""
+    return is_the_script(2) and (
+        sys._getframe(2).f_globals.get("__name__") not in GO_BETWEENS
+        or sys._getframe(2).f_code is threading.Condition.__init__.__code__
+    )
+
+
+class _Lock:
+    """A lock whose waits are simulated time where its holder's are."""
+
+    def __init__(self, runner: Runner, real: Any) -> None:
+        self._runner = runner
+        self._real = real
+        self._holder = 0  # the thread that has it; 0: nobody
+        self._at_fork_reinit = real._at_fork_reinit
+
+    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+        """As of Python's own."""
+        if timeout == -1 or not blocking:  # Python says what is wrong with both
+            came = self._real.acquire(False) if blocking else self._real.acquire(False, timeout)
+        else:
+            came = self._real.acquire(True, 0 if timeout > 0 else timeout)
+        if not came and blocking and timeout != 0:
+            came = self._wait(math.inf if timeout == -1 else timeout)
+        if came:
+            self._holder = threading.get_ident()
+        return bool(came)
+
+    __enter__ = acquire
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """As of Python's own."""
+        holder, self._holder = self._holder, 0
+        try:
+            self._real.release()
+        except RuntimeError:
+            self._holder = holder
+            raise
+
+    def locked(self) -> bool:
+        """As of Python's own."""
+        return bool(self._real.locked())
+
+    def _wait(self, seconds: float) -> bool:
+        """Until nobody has it; in wall time where the clock doesn't know who has."""
+        runner, clock = self._runner, self._runner.clock
+        end = clock.passed + seconds * NANOSECONDS
+        while (
+            clock.covers_this_thread()
+            and clock.covers(self._holder)
+            and not runner.is_over
+            and runner.is_connected()
+        ):
+            left = (end - clock.passed) / NANOSECONDS
+            came = runner.wait_for_event(left, lambda: not self._holder)
+            if came and self._real.acquire(False):
+                return True
+            if not came and not runner.is_over and clock.passed >= end:
+                return False
+        return bool(self._real.acquire(True, -1 if seconds == math.inf else seconds))
+
+
+class _RLock(_Lock):
+    """One that its holder may take again."""
+
+    def __init__(self, runner: Runner, real: Any) -> None:
+        super().__init__(runner, real)
+        self._depth = 0  # how often its holder has taken it
+
+    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+        """As of Python's own."""
+        came = super().acquire(blocking, timeout)
+        self._depth += came
+        return came
+
+    __enter__ = acquire
+
+    def release(self) -> None:
+        """As of Python's own."""
+        if self._depth == 1 or not self._is_owned():
+            super().release()  # which may refuse
+        else:
+            self._real.release()
+        self._depth -= 1
+
+    # What Condition asks of it
+
+    def _is_owned(self) -> bool:
+        return bool(self._real._is_owned())
+
+    def _release_save(self) -> Any:
+        depth, self._depth, self._holder = self._depth, 0, 0
+        return depth, self._real._release_save()
+
+    def _acquire_restore(self, saved: Any) -> None:
+        depth, real = saved
+        super().acquire()  # which may take time
+        self._real.release()
+        self._real._acquire_restore(real)
+        self._depth, self._holder = depth, threading.get_ident()
