@@ -6,6 +6,7 @@ import importlib.util
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -38,8 +39,11 @@ ROOT = Path(__file__).resolve().parent.parent
 # Networks this small only lose by more threads: on a busy machine a test of seconds takes a minute.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# Under nohup a closed terminal is ignored, by whatever a test starts, too; the tests are as from a terminal.
+# Under nohup a closed terminal is ignored, and in a script's background Ctrl-C, by whatever a test starts,
+# too; the tests are as from a terminal.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ENGINES = ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
 
@@ -75,6 +79,12 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         return
     subprocess.run([ROOT / "ws", "extras"], check=True)
     importlib.invalidate_caches()
+
+
+def pytest_runtest_teardown(item: pytest.Item) -> None:
+    """A test that makes its process a node changes what all later ones see: it takes another one."""
+    core = sys.modules.get("rospy.core")
+    assert core is None or not core.is_initialized(), f"{item.nodeid} made this process a node"
 
 
 @pytest.hookimpl(trylast=True)  # the reporter has to be there
