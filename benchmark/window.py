@@ -9,7 +9,6 @@ It starts simulators on masters of their own.
 """
 
 import contextlib
-import json
 import subprocess
 import sys
 import time
@@ -19,6 +18,7 @@ from pathlib import Path
 
 import msgspec
 import reporting
+import zstandard
 from bullet_gazebo_msgs.srv import StepWorld
 from cartpole_world import CART, add_cartpole
 from realtime import factor, processor_time, simulator_process
@@ -37,6 +37,8 @@ CAMERA = {
 }  # fmt: skip
 TICKS = 8  # in a request
 LINKS = 50
+HEADER = 16  # [bytes] in front of what viser sends: its lengths
+BOUND = 60.0  # [s]
 MANY = 200  # models
 BOX = """<robot name="box"><link name="box"><inertial><mass value="1"/>
 <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -62,15 +64,27 @@ def open_page(address: str) -> ClientConnection:
     return page
 
 
+def told(page: ClientConnection, timeout: float) -> bytes:
+    """What the page is told next; empty where that is nothing within `timeout` [s]."""
+    try:
+        content = page.recv(timeout=timeout)
+    except TimeoutError:
+        return b""
+    assert isinstance(content, bytes)
+    length = int.from_bytes(content[8:HEADER], "little")
+    return zstandard.ZstdDecompressor().decompress(content[HEADER : HEADER + length])
+
+
 def view(address: str) -> None:
     """Takes all that a page is sent, and tells once a second how often links have moved."""
     with open_page(address) as page:
+        told(page, BOUND)
         begin, moves = time.monotonic(), 0
+        print("open", flush=True)
         while True:
-            content = page.recv()
-            moves += isinstance(content, bytes) and b"SetPositionMessage" in content
+            moves += b"SetOrientationMessage" in told(page, 1.0)
             if time.monotonic() - begin >= 1.0:
-                print(json.dumps(moves), flush=True)
+                print(moves, flush=True)
                 begin, moves = time.monotonic(), 0
 
 
@@ -158,7 +172,7 @@ def many_connects(process: int, address: str, count: int) -> tuple[float, float]
     first = 0.0
     for index in range(count):
         with open_page(address) as opened:
-            opened.recv()
+            told(opened, BOUND)
         if index == count // 10:
             first = memory(process)
     return first, memory(process)
@@ -188,10 +202,8 @@ def many_models(results: dict[str, float]) -> None:
         begin = time.perf_counter()
         with open_page(address) as opened:
             boxes = 0
-            while boxes < MANY:
-                content = opened.recv()
-                assert isinstance(content, bytes)
-                boxes += content.count(b"BoxMessage")
+            while boxes < MANY and time.perf_counter() - begin < BOUND:
+                boxes += told(opened, 1.0).count(b"BoxMessage")
         results["200 models: shown after [s]"] = time.perf_counter() - begin
 
 
