@@ -15,8 +15,7 @@ from pathlib import Path
 FILE = "requirements/base.txt"
 PAGE = "docs/catkin.md"
 
-# What the simulator runs on, PyBullet's engine with meshes of all kinds; what its window runs on; and what all
-# programs run on.
+# What the simulator runs on, PyBullet's engine with meshes of all kinds; its window; and all programs.
 SIMULATOR = ("collada", "numpy", "pybullet", "scipy", "trimesh", "xacro", "yaml")
 WINDOW = (*SIMULATOR, "PIL", "viser", "websockets")
 ALL = (*WINDOW, "gymnasium", "matplotlib", "pygame", "tensorboard", "torch", "tqdm")

@@ -97,17 +97,37 @@ class Browser:
     def wait_for_text(self, text):
         wait_for(lambda: text in self.text, f"text {text!r}")
 
+    def choose(self, now, wanted):
+        """Chooses `wanted` in the list that shows `now`."""
+        self._press(
+            wait_for(lambda: self._middle(f"e.value === {json.dumps(now)}"), f"list {now!r}")
+        )
+        self.click(wanted)
+
     def click(self, text):
         """Clicks the element with that text, in the middle, as a mouse does."""
-        place = wait_for(lambda: self._place(text), f"element {text!r}")
+        found = f"e.innerText && e.innerText.trim() === {json.dumps(text)}"
+        self._press(wait_for(lambda: self._middle(found), f"element {text!r}"))
+
+    def press_keys(self, selector, key, count):
+        """Presses a key on the first element of a CSS selector."""
+        found = f"document.querySelector({json.dumps(selector)})"
+        wait_for(lambda: self.run(f"!!{found} && ({found}.focus(), true)"), selector)
+        for _ in range(count):
+            for kind in ("keyDown", "keyUp"):
+                self._do("Input.dispatchKeyEvent", type=kind, key=key, code=key)
+
+    def _press(self, place):
         for kind in ("mousePressed", "mouseReleased"):
             self._do("Input.dispatchMouseEvent", type=kind, button="left", clickCount=1, **place)
 
-    def _place(self, text):
+    def _middle(self, condition):
+        """Where the first visible element is that a JavaScript condition on `e` holds for."""
         return self.run(
             f"""(() => {{
-              const found = [...document.querySelectorAll("button, label, [role=tab], [role=option], p")]
-                .filter(e => e.innerText && e.innerText.trim() === {json.dumps(text)} && e.offsetParent);
+              const kinds = "button, label, input, [role=tab], [role=option], p";
+              const found = [...document.querySelectorAll(kinds)]
+                .filter(e => e.offsetParent && ({condition}));
               if (!found.length) return null;
               found[0].scrollIntoView({{block: "center"}});
               const box = found[0].getBoundingClientRect();

@@ -12,8 +12,10 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
+from controller_manager_msgs.srv import LoadController, SwitchController
 from gazebo_msgs.srv import (
     DeleteModel,
+    GetJointProperties,
     GetPhysicsProperties,
     GetWorldProperties,
     SpawnModel,
@@ -31,6 +33,7 @@ BALL = """<robot name="ball"><link name="ball">
 <visual><geometry><sphere radius="0.2"/></geometry>
   <material name="r"><color rgba="1 0 0 1"/></material></visual>
 <visual><geometry><mesh filename="file://{mesh}"/></geometry></visual></link></robot>"""
+STATES = "joint_state_controller"
 ODD = "<b>ö\t\"&'/x"
 
 
@@ -95,13 +98,22 @@ class WindowTest(unittest.TestCase):
         cls.page.__exit__()
         assert cls.window.close() == 0, cls.window.lines
 
-    def red(self):
-        """How many pixels of the picture are red."""
+    def view(self):
+        """Red, green and blue (3, n) of the pixels of the picture, without the panel beside it."""
         pixels = np.asarray(Image.open(io.BytesIO(self.page.screenshot())).convert("RGB")).astype(
             int
         )
-        view = pixels[:, : pixels.shape[1] * 2 // 3]
-        return int(((view[..., 0] > 120) & (view[..., 1:].max(axis=2) < view[..., 0] / 3)).sum())
+        return pixels[:, : pixels.shape[1] * 2 // 3].reshape(-1, 3).T
+
+    def red(self):
+        """How many pixels are those of the ball."""
+        red, green, blue = self.view()
+        return int(((red > 120) & (np.maximum(green, blue) < red / 3)).sum())
+
+    def yellow(self):
+        """How many pixels are those of joints' axes."""
+        red, green, blue = self.view()
+        return int(((red > 180) & (green > 150) & (blue < 110)).sum())
 
     def test_models_come_and_go(self):
         self.page.click("Models")
@@ -139,6 +151,33 @@ class WindowTest(unittest.TestCase):
         self.page.click("Do these steps")
         wait_for(lambda: round(self.world().sim_time, 6) == 0.101, "hundred steps")
         self.page.wait_for_text("0.101 s")
+
+    def test_a_slider_places_a_joint_of_a_paused_world(self):
+        self.page.click("Models")
+        self.page.choose("(none)", "cartpole")
+        joint = proxy("/gazebo/get_joint_properties", GetJointProperties)
+        self.page.wait_for_text("stand_cart")
+        self.page.press_keys("[role=slider]", "ArrowRight", 20)
+        wait_for(lambda: joint("stand_cart").position[0] > 0.03, "joint that was placed")
+        self.page.choose("cartpole", "(none)")
+
+    def test_controllers_are_shown_with_their_state(self):
+        self.page.click("Controllers")
+        self.page.wait_for_text("/controller_manager")
+        self.assertTrue(proxy("/controller_manager/load_controller", LoadController)(STATES).ok)
+        self.page.wait_for_text(f"{STATES}: initialized")
+        switch = proxy("/controller_manager/switch_controller", SwitchController)
+        self.assertTrue(switch([STATES], [], 2, False, 0.0).ok)
+        self.page.wait_for_text(f"{STATES}: running")
+
+    def test_shapes_and_frames_on_demand(self):
+        self.page.click("World")
+        before = self.yellow()  # the pole is nearly of that colour
+        for box in ("Collision shapes", "Joint frames", "Contact points"):
+            self.page.click(box)
+        wait_for(lambda: self.yellow() > before + 40, "axes of joints")
+        self.page.click("Joint frames")
+        wait_for(lambda: self.yellow() < before + 20, "picture without axes")
 
     def test_what_somebody_else_does_is_shown(self):
         self.page.click("World")

@@ -2,6 +2,7 @@
 
 import html
 import math
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -21,6 +22,7 @@ MOST_SHOWN = 50  # models in the list
 MOST_SLIDERS = 64
 REACH = {"revolute": math.pi, "continuous": math.pi, "prismatic": 2.0}  # [rad, m] without stops
 NO_STOP = 1e15
+HANDS_OFF = 2.0  # [s] after somebody moved a slider
 PARTS = 500  # of a slider's way
 
 
@@ -43,6 +45,7 @@ class ModelPanel:
         self._models: dict[str, DrawnModel] = {}
         self._positions: dict[str, list[float]] = {}  # of joints, by model
         self._before: np.ndarray | None = None  # where the followed model was
+        self._touched: dict[str, float] = {}  # [s] when somebody moved a joint's slider
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._choice = server.gui.add_dropdown("Model", [NONE], initial_value=NONE)
         self._follow = server.gui.add_checkbox("Follow it", False)
@@ -85,6 +88,7 @@ class ModelPanel:
         def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:  # somebody moved it
                 position = float(slider.value)
+                self._touched[joint.name] = time.monotonic()
                 self._attempt(lambda: self._move(joint.name, position))
 
         return slider
@@ -106,6 +110,7 @@ class ModelPanel:
     def show(self, links: dict[str, np.ndarray], positions: dict[str, list[float]]) -> None:
         """Shows poses (n, 7) of links and positions [rad, m] of joints, both by model."""
         self._positions = positions
+        self._show_joints(positions.get(self._choice.value, []))
         rows = []
         for name, model in list(self._models.items())[:MOST_SHOWN]:
             if name in links:
@@ -121,6 +126,16 @@ class ModelPanel:
         text = f"<table style='width: 100%; padding: 0 0.8em'>{head}{''.join(rows)}{more}</table>"
         if self._list.content != text:
             self._list.content = text
+
+    def _show_joints(self, positions: list[float]) -> None:
+        """Has the sliders follow their joints, but for those that somebody has just moved."""
+        now = time.monotonic()
+        for (name, slider), position in zip(list(self._sliders.items()), positions, strict=False):
+            if not math.isfinite(position) or now - self._touched.get(name, -math.inf) < HANDS_OFF:
+                continue
+            shown_at = min(max(position, slider.min), slider.max)
+            if abs(shown_at - slider.value) > slider.step:
+                slider.value = shown_at
 
     def follow(self, links: dict[str, np.ndarray]) -> None:
         """Moves all cameras along with the chosen model."""

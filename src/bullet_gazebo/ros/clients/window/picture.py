@@ -43,6 +43,8 @@ class Picture:
         self._lights: list[viser.SceneNodeHandle] = []
         self._frames: list[viser.FrameHandle] = []
         self._last = np.zeros((0, NUMBERS))
+        # Counts: a node of a name that was just taken away may go in the browser, too.
+        self._drawings = 0
         self._contacts: viser.PointCloudHandle | None = None
 
     def draw(self, scene: GetSceneResponse, joint_frames: bool) -> None:
@@ -68,12 +70,13 @@ class Picture:
                 for frame in model.frames:
                     frame.remove()
         self.models, self._frames = {}, []
+        self._drawings += 1
 
     def _add(self, model: SceneModel, joint_frames: bool) -> DrawnModel:
         frames = []
         for index, link in enumerate(model.links):
             # Names may hold anything, so nodes are named by numbers.
-            node = f"/m{model.number}_{index}"
+            node = f"/m{model.number}_{index}_{self._drawings}"
             frames.append(self._server.scene.add_frame(node, show_axes=False))
             where = f"model '{shown(model.name)}', link '{shown(link.name)}'"
             for count, shape in enumerate(link.visuals):
