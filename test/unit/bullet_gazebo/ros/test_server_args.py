@@ -30,7 +30,9 @@ def test_without_a_world_it_is_the_empty_one():
 
 
 def test_a_video_has_its_options():
-    args = parse_args(["--video", "a.mp4", "--video-size", "320", "240", "w.world", "--video-rate", "60"])
+    args = parse_args(
+        ["--video", "a.mp4", "--video-size", "320", "240", "w.world", "--video-rate", "60"]
+    )
     assert (args.video, args.video_size, args.video_rate) == ("a.mp4", [320, 240], 60.0)
     assert (args.video_model, args.world) == ("", "w.world")
 
