@@ -1,9 +1,9 @@
 """The command shown_joints.py: joint states for RViz, from the first moment and thirty times a second.
 
-RViz draws a link white, and at the wrong place, until it knows where the link is, and joint states come only
-while simulated time passes: in a paused world, and in one in lock-step, maybe never. So the joints are asked for
-once, by a service that answers while paused too. Later states are handed on, the newest first; those of
-joint_state_publisher, which only has zeros, are not. The topic is latched: who comes later knows the robot too.
+RViz draws a link white, and at the wrong place, until it knows where the link is, and joint states come
+only while simulated time passes: in a paused world, and in one in lock-step, maybe never. So the joints are
+asked for once, by a service that answers while paused too. Later states are handed on, the newest first;
+those of joint_state_publisher, which only has zeros, are not. The topic is latched, for who comes later.
 """
 
 import contextlib
