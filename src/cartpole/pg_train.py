@@ -24,6 +24,7 @@ from robot_envs.errors import RobotEnvError
 NODE = "pg_train"
 PROG = f"{NODE}.py"
 ENV_ID = f"{NAMESPACE}/Balance-v0"
+WINDOWS = ("gui", "rviz", "headless")  # what a resumed training may have otherwise
 LARGEST_NOISE = 0.2  # [m], [rad]; just inside the angle at which an episode ends
 
 
@@ -46,15 +47,16 @@ class RobotOptions:
         "script does, starts them all alike", 0, LARGEST_NOISE,
     )  # fmt: skip
     gui: bool = option(False, "show the simulator's window")
+    rviz: bool = option(False, "show the robot in RViz")
     headless: bool = option(False, "no window")
 
     def __post_init__(self) -> None:
         check_options(self)
         if self.headless and self.gui:
             raise WorkbenchError("--headless: not with --gui")
-        if self.backend == "bullet" and (self.realtime or self.gui):
+        if self.backend == "bullet" and (self.realtime or self.gui or self.rviz):
             raise WorkbenchError(
-                "--realtime and --gui are of a simulator over ROS: not with --backend bullet"
+                "--realtime, --gui and --rviz are of a simulator over ROS: not with --backend bullet"
             )
 
     @property
@@ -80,7 +82,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         flags, parameters, name = ros_options(argv, NODE)
         options, robot = choose(flags, parameters)
-        with session(options, name, argv, robot.gui):
+        with session(options, name, argv, robot):
             return _train(options, interrupt)
     except (WorkbenchError, RobotEnvError) as error:
         return _failed(error, interrupt)
@@ -134,7 +136,7 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOption
 def _joined(
     options: TrainingOptions, robot: RobotOptions, given: dict[str, Any]
 ) -> TrainingOptions:
-    recorded = [key for key in given if key not in ("gui", "headless")]
+    recorded = [key for key in given if key not in WINDOWS]
     if options.resume:
         if recorded:
             raise WorkbenchError(
@@ -143,7 +145,7 @@ def _joined(
         return options
     run = options.run
     if not run.env_id.startswith(f"{NAMESPACE}/"):
-        robots = [key for key in recorded + ["gui"] if getattr(robot, key) not in _ANYWHERE]
+        robots = [key for key in [*recorded, "gui", "rviz"] if getattr(robot, key) not in _ANYWHERE]
         if robots:
             raise WorkbenchError(
                 f"{flag(robots[0])} is of the robot: not with --env-id {run.env_id}"
@@ -156,13 +158,15 @@ def _joined(
 
 
 @contextlib.contextmanager
-def session(options: TrainingOptions, name: str, argv: list[str], gui: bool) -> Iterator[None]:
+def session(
+    options: TrainingOptions, name: str, argv: list[str], shown: RobotOptions
+) -> Iterator[None]:
     """What the robot needs to be running, for as long as it is trained; nothing in this process.
 
     Args:
         name: this node's full name.
         argv: the process's arguments, with roslaunch's remappings.
-        gui: ask a simulator that is started here for its window.
+        shown: asks a simulator that is started here for its window, and for RViz.
 
     Raises:
         RobotEnvError: if something can't be started, or what runs doesn't fit.
@@ -176,7 +180,10 @@ def session(options: TrainingOptions, name: str, argv: list[str], gui: bool) -> 
     from robot_envs.backends.session import RosSession
 
     height = None if "SwingUp" in options.run.env_id else 0.0
-    opened = RosSession(ROBOT, name, argv, backend == "ros-realtime", gui, options.run.seed, height)
+    realtime = backend == "ros-realtime"
+    opened = RosSession(
+        ROBOT, name, argv, realtime, shown.gui, options.run.seed, height, shown.rviz
+    )
     try:
         opened.start(tell)
         yield

@@ -66,6 +66,7 @@ ROBOT = Robot(
         urdf_folder="/robots",
         parameters_package="cartpole_controller",
         parameters_name="joint_position_control.yaml",
+        rviz=("cartpole", "rviz.launch"),
     ),
     height=max(task.height for task in TASKS.values()),  # a robot there can do every task
 )

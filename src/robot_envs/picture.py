@@ -12,6 +12,7 @@ from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.mechanics.kinematics import link_poses
 from bullet_gazebo.physics.pose import Pose, add, subtract
 from bullet_gazebo.pictures.camera import Camera, overview
+from bullet_gazebo.pictures.solids import visible_shapes
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot, State
 
@@ -87,7 +88,7 @@ class _DrawnRobot(Generic[State]):
         self._start = Pose((0.0, 0.0, raised)).compose(self._description.root_pose)
         self._base = None if self._description.fixed_base else base
         self.scene = Scene()
-        self.scene.add("robot", self._description)
+        self.scene.add("robot", visible_shapes(self._description))
 
     def aim(self, camera: Camera | None, size: tuple[int, int]) -> None:
         """Chooses what is seen: all that the joints can reach, one at a time, or what `camera` says."""

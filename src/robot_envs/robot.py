@@ -24,6 +24,7 @@ class OverRos:
         parameters_name: the name of that YAML file.
         description: the parameter that holds the URDF.
         publisher: the controller that publishes its joint states.
+        rviz: package and name of the launch file that shows it in RViz; None: there is none.
     """
 
     urdf_package: str
@@ -33,6 +34,7 @@ class OverRos:
     parameters_name: str
     description: str = "robot_description"
     publisher: str = "joint_state_controller"
+    rviz: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)

@@ -70,11 +70,22 @@ class Camera:
         matrix[:3, 3] = -matrix[:3, :3] @ self.eye
         return matrix
 
-    def projection_matrix(self, aspect: float) -> np.ndarray:
-        """From the camera's axes to OpenGL's cube, for width / height: (4, 4)."""
+    def projection_matrix(
+        self, width: int, height: int, region: tuple[int, int, int, int] | None = None
+    ) -> np.ndarray:
+        """From the camera's axes to OpenGL's cube: (4, 4).
+
+        Args:
+            width: of the picture [pixels].
+            height: of the picture [pixels].
+            region: left, top, right and bottom of what is wanted of it [pixels]; by default all.
+        """
         near, far = self.near, self.far
-        matrix = np.zeros((4, 4))
-        matrix[0, 0], matrix[1, 1] = 1.0 / (self.slope * aspect), 1.0 / self.slope
+        left, top, right, bottom = region or (0, 0, width, height)
+        matrix, scale = np.zeros((4, 4)), height / self.slope
+        matrix[0, 0], matrix[1, 1] = scale / (right - left), scale / (bottom - top)
+        matrix[0, 2] = (left + right - width) / (right - left)
+        matrix[1, 2] = (height - top - bottom) / (bottom - top)
         matrix[2, 2], matrix[2, 3] = (far + near) / (near - far), 2.0 * far * near / (near - far)
         matrix[3, 2] = -1.0
         return matrix

@@ -5,22 +5,23 @@ changes a simulation, whatever engine that has, and the same poses give the same
 """
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 
 import numpy as np
 from PIL import Image
 
-from bullet_gazebo.physics.description import DescriptionError, ModelDescription, Shape
+from bullet_gazebo.physics.description import DescriptionError, Shape
 from bullet_gazebo.physics.engines.bullet.library import pybullet
-from bullet_gazebo.physics.pose import Pose, Vector, is_finite
+from bullet_gazebo.physics.pose import Pose, is_finite, rotate
 from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.pictures.ground import Background, background
-from bullet_gazebo.pictures.solids import GREY, Solid, solid_of, visible_shapes
+from bullet_gazebo.pictures.solids import GREY, Solid, solid_of
 
 FINER = 2  # pixels of the renderer across one of the picture: smooth edges
 MOST_CORNERS = 90_000  # of a body: PyBullet refuses more than 131072
 LIGHT = (1.0, -2.0, 4.0)  # where it comes from
+NOTHING = 0.9999  # OpenGL's depth of what is too far away to be seen
 FARTHEST = 1e6  # [m]; beyond it nothing is drawn
 
 logger = logging.getLogger(__name__)
@@ -35,11 +36,14 @@ class Scene:
         self._models: dict[str, list[_Part]] = {}
         self._background = lru_cache(maxsize=2)(background)
 
-    def add(self, name: str, description: ModelDescription) -> None:
-        """Adds a model with all of its links at the origin; a mesh that can't be read is left out."""
+    def add(self, name: str, shapes: Iterable[tuple[str, Shape]]) -> None:
+        """Adds a model of these shapes, each with its link (see `solids.visible_shapes`).
+
+        All links are at the origin; a mesh that can't be read is left out.
+        """
         self.remove(name)
         self._models[name] = parts = []
-        for link, shape in visible_shapes(description):
+        for link, shape in shapes:
             try:
                 solid = solid_of(shape)
             except DescriptionError as error:
@@ -65,22 +69,50 @@ class Scene:
 
     def picture(self, camera: Camera, width: int, height: int) -> np.ndarray:
         """What the camera sees."""
-        fine = (FINER * width, FINER * height)
-        behind: Background = self._background(camera, *fine)
+        behind: Background = self._background(camera, FINER * width, FINER * height)
+        fine = Image.fromarray(behind.colours)
+        whole = np.asarray(fine.reduce(FINER)).copy()
+        region = self._region(camera, width, height)
+        left, top, right, bottom = (FINER * edge for edge in region)
+        if left >= right or top >= bottom:
+            return whole
+        part = np.s_[top:bottom, left:right]
+        size = (right - left, bottom - top)
         colours, depth = pybullet.getCameraImage(
-            *fine,
+            *size,
             viewMatrix=camera.view_matrix().T.ravel().tolist(),
-            projectionMatrix=camera.projection_matrix(width / height).T.ravel().tolist(),
+            projectionMatrix=camera.projection_matrix(width, height, region).T.ravel().tolist(),
             lightDirection=LIGHT,
             shadow=0,
             flags=pybullet.ER_NO_SEGMENTATION_MASK,
             renderer=pybullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
         )[2:4]
-        nearer = np.reshape(depth, fine[::-1]) < np.minimum(behind.depth, 0.9999)
-        pixels = np.reshape(colours, (*fine[::-1], 4))[..., :3]
-        drawn = np.where(nearer[..., np.newaxis], pixels, behind.colours)
-        return np.asarray(Image.fromarray(drawn.astype(np.uint8)).reduce(FINER)).copy()
+        nearer = np.reshape(depth, size[::-1]) < np.minimum(behind.depth[part], NOTHING)
+        pixels = np.reshape(colours, (*size[::-1], 4))[..., :3].astype(np.uint8)
+        drawn = np.where(nearer[..., np.newaxis], pixels, behind.colours[part])
+        left, top, right, bottom = region
+        whole[top:bottom, left:right] = np.asarray(Image.fromarray(drawn).reduce(FINER))
+        return whole
+
+    def _region(self, camera: Camera, width: int, height: int) -> tuple[int, int, int, int]:
+        """What of a picture the models are within [pixels]: the renderer's time goes with its size."""
+        boxes = [part.corners() for parts in self._models.values() for part in parts]
+        if not boxes:
+            return (0, 0, 0, 0)
+        seen = (np.array(boxes) - camera.eye) @ camera.axes.T  # (n, 8, 3): right, up, ahead
+        ahead = seen[..., 2] > camera.near
+        whole, some = ahead.all(axis=1), ahead.any(axis=1)
+        if (some & ~whole).any():  # the camera is beside it, or within
+            return (0, 0, width, height)
+        if not some.any():
+            return (0, 0, 0, 0)
+        x, y, depth = seen[whole].reshape(-1, 3).T
+        scale = height / (2.0 * camera.slope * depth)
+        across, down = width / 2.0 + scale * x, height / 2.0 - scale * y
+        left, right = np.clip([across.min() - 1.0, across.max() + 2.0], 0, width).astype(int)
+        top, bottom = np.clip([down.min() - 1.0, down.max() + 2.0], 0, height).astype(int)
+        return (int(left), int(top), int(right), int(bottom))
 
     def close(self) -> None:
         """Frees all of it; may be called twice."""
@@ -119,11 +151,9 @@ class _Part:
 
     def corners(self) -> np.ndarray:
         """Corners of a box around it, in the world [m]: (8, 3)."""
-        places: list[Vector] = [
-            self._seen.compose(Pose((float(x), float(y), float(z)))).position
-            for x, y, z in self._box
-        ]
-        return np.array(places)
+        turn = self._seen.orientation
+        axes = [rotate(turn, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+        return np.asarray(self._box @ np.array(axes) + self._seen.position)
 
     def remove(self) -> None:
         pybullet.removeBody(self._body, physicsClientId=self._client)

@@ -1,5 +1,6 @@
 """Shapes as triangles, for whoever draws them."""
 
+import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,7 +10,8 @@ from bullet_gazebo.physics.description import Color, ModelDescription, Shape
 from bullet_gazebo.physics.meshes.reader import read_mesh
 
 GREY: Color = (0.7, 0.7, 0.72, 1.0)  # of a shape that has no colour
-SIDES = 48  # of a cylinder
+SIDES = 40  # of a cylinder
+MOST_RINGS = 16  # of a prism
 ROUNDS = 3  # of dividing a ball's triangles
 
 
@@ -39,19 +41,48 @@ def solid_of(shape: Shape) -> Solid:
     if shape.kind == "mesh":
         mesh = shape.solid or read_mesh(Path(shape.mesh))
         return _flat((mesh.vertices * np.array(shape.size))[mesh.faces])
-    # Imported with the first shape: who looks at nothing doesn't pay for it.
-    from trimesh import creation
-
     if shape.kind == "box":
-        box = creation.box(extents=shape.size)
-        return _flat(box.vertices[box.faces])
+        return _flat(_box(shape.size))
     if shape.kind == "cylinder":
         radius, length = shape.size
-        drum = creation.cylinder(radius=radius, height=length, sections=SIDES)
-        return _flat(drum.vertices[drum.faces])
+        angles = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
+        return _flat(_prism(radius * np.stack([np.cos(angles), np.sin(angles)], axis=1), length))
+    # Imported with the first ball: who looks at none doesn't pay for it.
+    from trimesh import creation
+
     ball = creation.icosphere(subdivisions=ROUNDS, radius=shape.size[0])
     corners = ball.vertices[ball.faces].reshape(-1, 3)
     return Solid(corners, corners / shape.size[0])
+
+
+def _box(size: tuple[float, ...]) -> np.ndarray:
+    """Triangles (n, 3, 3) of a box, a prism along its longest side."""
+    longest = int(np.argmax(size))
+    order = [(longest + 1) % 3, (longest + 2) % 3, longest]
+    x, y, length = (size[axis] for axis in order)
+    profile = np.array([(x, y), (-x, y), (-x, -y), (x, -y)]) / 2.0
+    return _prism(profile, length)[..., np.argsort(order)]
+
+
+def _prism(profile: np.ndarray, length: float) -> np.ndarray:
+    """Triangles (n, 3, 3) of a prism around z, whose profile (k, 2) goes round counter-clockwise.
+
+    A long one is made of short pieces: the renderer's time goes with the box around each triangle.
+    """
+    width = float(np.ptp(profile, axis=0).max())
+    rings = min(MOST_RINGS, max(1, math.ceil(length / width))) if width > 0.0 else 1
+    heights = np.linspace(-length / 2.0, length / 2.0, rings + 1)
+    rims = np.array([np.column_stack([profile, np.full(len(profile), z)]) for z in heights])
+    low, high = rims[:-1], rims[1:]
+    low_next, high_next = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
+    sides = [(low, low_next, high_next), (low, high_next, high)]
+    top, bottom = rims[-1], rims[0]
+    ends = [
+        (np.broadcast_to((0.0, 0.0, heights[-1]), top.shape), top, np.roll(top, -1, axis=0)),
+        (np.broadcast_to((0.0, 0.0, heights[0]), top.shape), np.roll(bottom, -1, axis=0), bottom),
+    ]
+    pieces = [np.stack(corners, axis=-2).reshape(-1, 3, 3) for corners in [*sides, *ends]]
+    return np.concatenate(pieces)
 
 
 def _flat(triangles: np.ndarray) -> Solid:

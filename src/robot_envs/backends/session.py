@@ -12,6 +12,7 @@ from robot_envs.backends import bring_up, node
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.bring_up import STEP_SERVICE, Say, Undo
 from robot_envs.backends.own_simulator import OwnSimulator
+from robot_envs.backends.rviz import check_rviz, open_rviz
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot, State
 from ros_utils import ros_gazebo
@@ -32,6 +33,7 @@ class RosSession(Generic[State]):
         realtime: let the world run by itself, instead of in lock-step.
         gui: ask a simulator that is started here for its window.
         seed: for a simulator that is started here.
+        rviz: show the robot in RViz, too.
         height: above the ground, where a robot that is spawned here stands [m]; the robot's own by
             default, so that it can do each of its tasks.
     """
@@ -45,6 +47,7 @@ class RosSession(Generic[State]):
         gui: bool,
         seed: int,
         height: float | None = None,
+        rviz: bool = False,
     ) -> None:
         self._robot = robot
         self._name = name
@@ -53,6 +56,7 @@ class RosSession(Generic[State]):
         self._gui = gui
         self._seed = seed
         self._height = robot.height if height is None else height
+        self._rviz = rviz
         self._undo = contextlib.ExitStack()
 
     def start(self, say: Say) -> None:
@@ -70,6 +74,8 @@ class RosSession(Generic[State]):
                 "this process's ROS node has ended, and a process becomes one only once; keep a "
                 "session until the end, or begin another process"
             )
+        if self._rviz:
+            check_rviz(self._robot)
         own_simulator = not (node.master_is_up() and bring_up.simulator_answers())
         if own_simulator:
             say("starting the simulator")
@@ -81,6 +87,9 @@ class RosSession(Generic[State]):
             simulator = OwnSimulator()
             for undo in changes:
                 self._undo.callback(_at_living_simulator, simulator, undo)
+        if self._rviz:
+            say("opening RViz")
+            self._undo.callback(open_rviz(self._robot))
         _started().append(self)
         self._undo.callback(_started().remove, self)
 

@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import rospy
 
@@ -14,6 +15,7 @@ from bullet_gazebo.heap import use_one_arena
 from bullet_gazebo.physics.engine import Engine
 from bullet_gazebo.physics.engines.registry import BULLET, ENGINES, EngineError, make_engine
 from bullet_gazebo.physics.world import World
+from bullet_gazebo.pictures.recording import Recorder, RecordingError, RecordingOptions
 from bullet_gazebo.ros.control.control_plugin import FILENAME as CONTROL_PLUGIN
 from bullet_gazebo.ros.control.control_plugin import ControlPlugin
 from bullet_gazebo.ros.node.joint_state_plugin import FILENAME as JOINT_STATE_PLUGIN
@@ -55,6 +57,7 @@ NAME = "gazebo"
 MOST_FREQUENT = 1e9  # [Hz]; time is counted in nanoseconds
 EXIT_TIMEOUT = 10.0  # [s] for what plugins may have left to be done at the end
 HANGING_TIMEOUT = 1.0  # [s] the same where one of them never comes to its end
+RECORDING_TIMEOUT = 5.0  # [s] for what is still to be handed over to it
 MORE_ARGUMENTS = "GZSERVER_ARGS"  # variable: for a server that somebody else's program starts
 
 
@@ -69,10 +72,12 @@ class GazeboNode:
         world = World(engine)
         self.sim = Simulator(world, lockstep=args.lockstep, relatch=_flag("~relatch_on_reset"))
         self._watchdog = Watchdog(self.sim)
+        recording = _recording(args)
         fill_world(self.sim, read_world(args.world, interrupted), interrupted)
         if args.paused:
             self.sim.pause()
         self._advertise(_flag("~enable_ros_network"))
+        self._recorder = None if recording is None else Recorder(self.sim, recording)
         MasterWatch().start()
 
     def _advertise(self, network: bool) -> None:
@@ -120,11 +125,28 @@ class GazeboNode:
         signals.wait(self._watchdog.barks)
         failed = self._watchdog.barks()
         self._watchdog.stop()  # a shutdown that came before the hook was there doesn't call it
+        if self._recorder is not None:
+            self._recorder.close(RECORDING_TIMEOUT)
         hanging = self._watchdog.left_hanging()
         if hanging is not None:
             print(f"gzserver: ends while the world's lock is kept by {hanging}", file=sys.stderr)
             end_within(HANGING_TIMEOUT, 1)
         return 1 if failed or hanging is not None else 0
+
+
+def _recording(args: argparse.Namespace) -> RecordingOptions | None:
+    """Returns what the command line says of a recording.
+
+    Raises:
+        RecordingError: if it can't be made.
+    """
+    if not args.video:
+        return None
+    width, height = args.video_size
+    path = Path(args.video).absolute()
+    options = RecordingOptions(path, args.video_rate, width, height, args.video_model)
+    options.check()
+    return options
 
 
 def _flag(name: str) -> bool:
@@ -152,6 +174,9 @@ def simulate(args: argparse.Namespace, engine: Engine, signals: SignalHandler) -
     """Simulates until the end; returns the exit code."""
     try:
         return GazeboNode(args, engine, signals.noted).run(signals)
+    except RecordingError as error:
+        rospy.logfatal("%s", error)
+        return 1
     except Exception:
         if rospy.is_shutdown():
             return 0  # ended before it was ready: topics and services can't be opened any more

@@ -25,7 +25,8 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     """Reads the options, in any order; arguments of the form a:=b are ROS's and may stand anywhere.
 
     Returns:
-        world, paused, physics, lockstep, replace, seed, and `ignored`: what isn't known.
+        world, paused, physics, lockstep, replace, seed, what begins with video, and `ignored`: what isn't
+        known.
     """
     parser = argparse.ArgumentParser(
         prog="gzserver",
@@ -42,6 +43,18 @@ def parse_args(argv: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--lockstep", action="store_true", help="time moves only by ~step_world")
     parser.add_argument(
         "--replace", action="store_true", help="end a simulator that has this one's name already"
+    )
+    parser.add_argument(
+        "--video", default="", help="an MP4 file that the simulation is recorded in"
+    )
+    parser.add_argument(
+        "--video-rate", type=float, default=30.0, help="its pictures for a second of simulated time"
+    )
+    parser.add_argument(
+        "--video-size", type=int, nargs=2, default=(640, 480), help="its width and height [pixels]"
+    )
+    parser.add_argument(
+        "--video-model", default="", help="who is in its middle; else all that can move"
     )
     parser.add_argument("--seed", type=int, help="of Python's and NumPy's random numbers")
     for names, values in INERT.items():

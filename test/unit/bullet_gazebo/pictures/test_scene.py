@@ -15,6 +15,7 @@ from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.pictures.scene import Scene
+from bullet_gazebo.pictures.solids import visible_shapes
 
 WIDTH, HEIGHT = 160, 120
 CAMERA = Camera(target=(0.0, 0.0, 1.0), distance=3.0, yaw=0.0, pitch=-10.0)
@@ -54,7 +55,7 @@ def where(picture: np.ndarray, channel: int) -> np.ndarray:
     "shape", [BOX, '<sphere radius="0.2"/>', '<cylinder radius="0.2" length="0.4"/>']
 )
 def test_a_shape_is_seen_where_it_is_in_its_colour(scene, shape, place):
-    scene.add("it", parse_urdf(body(shape)))
+    scene.add("it", visible_shapes(parse_urdf(body(shape))))
     scene.place("it", {"base": Pose(place)})
     found = where(shown(scene), 0)
     assert len(found) > 50
@@ -63,7 +64,7 @@ def test_a_shape_is_seen_where_it_is_in_its_colour(scene, shape, place):
 
 
 def test_it_turns_with_its_link(scene):
-    scene.add("it", parse_urdf(body('<box size="0.1 0.1 0.8"/>')))
+    scene.add("it", visible_shapes(parse_urdf(body('<box size="0.1 0.1 0.8"/>'))))
     spans = []
     for lean in (0.0, math.pi / 2):
         scene.place("it", {"base": Pose((0.0, 0.0, 1.0), from_rpy(0.0, lean, 0.0))})
@@ -72,8 +73,8 @@ def test_it_turns_with_its_link(scene):
 
 
 def test_what_is_nearer_hides_what_is_behind_and_the_ground_what_is_below(scene):
-    scene.add("near", parse_urdf(body(BOX)))
-    scene.add("far", parse_urdf(body(BOX, GREEN)))
+    scene.add("near", visible_shapes(parse_urdf(body(BOX))))
+    scene.add("far", visible_shapes(parse_urdf(body(BOX, GREEN))))
     scene.place("near", {"base": Pose((0.0, -0.5, 1.0))})
     scene.place("far", {"base": Pose((0.0, 0.5, 1.0))})
     hidden = len(where(shown(scene), 1))
@@ -84,10 +85,10 @@ def test_what_is_nearer_hides_what_is_behind_and_the_ground_what_is_below(scene)
 
 
 def test_what_is_seen_through_is_not_drawn_and_collisions_stand_for_missing_visuals(scene):
-    scene.add("it", parse_urdf(body(BOX, "1 0 0 0")))
+    scene.add("it", visible_shapes(parse_urdf(body(BOX, "1 0 0 0"))))
     scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
     assert len(where(shown(scene), 0)) == 0
-    scene.add("it", parse_urdf(body(BOX, RED, "collision")))
+    scene.add("it", visible_shapes(parse_urdf(body(BOX, RED, "collision"))))
     scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
     assert len(where(shown(scene), 0)) > 50
 
@@ -114,7 +115,7 @@ def ball_stl(rows: int) -> str:
 def test_a_mesh_of_more_triangles_than_the_renderer_takes_at_once(scene, tmp_path):
     path = tmp_path / "ball.stl"
     path.write_text(ball_stl(135))  # 36450 triangles
-    scene.add("it", parse_urdf(body(f'<mesh filename="{path}" scale="2 2 2"/>')))
+    scene.add("it", visible_shapes(parse_urdf(body(f'<mesh filename="{path}" scale="2 2 2"/>'))))
     scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
     radius = np.ptp(where(shown(scene), 0), axis=0) / 2.0
     assert radius == pytest.approx(0.4 / 3.0 * HEIGHT / (2 * CAMERA.slope), abs=2.0)
@@ -123,14 +124,14 @@ def test_a_mesh_of_more_triangles_than_the_renderer_takes_at_once(scene, tmp_pat
 def test_a_mesh_that_cannot_be_read_is_left_out_with_a_line(scene, tmp_path, caplog):
     path = tmp_path / "broken.stl"
     path.write_bytes(b"solid what is this")
-    scene.add("it", parse_urdf(body(f'<mesh filename="{path}"/>')))
+    scene.add("it", visible_shapes(parse_urdf(body(f'<mesh filename="{path}"/>'))))
     assert len(where(shown(scene), 0)) == 0
     (line,) = [record.getMessage() for record in caplog.records]
     assert "model 'it', link 'base' isn't drawn whole" in line and "broken.stl" in line
 
 
 def test_what_is_lost_in_space_stays_where_it_was_seen_last(scene):
-    scene.add("it", parse_urdf(body(BOX)))
+    scene.add("it", visible_shapes(parse_urdf(body(BOX))))
     scene.place("it", {"base": Pose((0.0, 0.0, 1.0))})
     before = shown(scene)
     for place in ((math.nan, 0.0, 0.0), (math.inf, 0.0, 0.0), (1e30, 0.0, 0.0)):
@@ -139,7 +140,7 @@ def test_what_is_lost_in_space_stays_where_it_was_seen_last(scene):
 
 
 def test_pictures_are_the_callers_own_and_the_same_each_time(scene):
-    scene.add("it", parse_urdf(body(BOX)))
+    scene.add("it", visible_shapes(parse_urdf(body(BOX))))
     first = scene.picture(CAMERA, WIDTH, HEIGHT)
     kept = first.copy()
     first[:] = 0
@@ -161,7 +162,7 @@ def test_taking_pictures_changes_no_bit_of_the_simulation(engine):
         world, scene = World(make_engine(engine)), Scene()
         model = world.spawn("it", parse_urdf(cartpole_urdf()), Pose())
         model.set_joint_positions({"cart_pole": 0.1})
-        scene.add("it", model.description)
+        scene.add("it", visible_shapes(model.description))
         for _ in range(40):
             world.step()
             if looking:
@@ -201,3 +202,16 @@ def test_links_are_where_the_engine_has_them():
         same = abs(sum(x * y for x, y in zip(pose.orientation, there.orientation, strict=True)))
         assert same == pytest.approx(1.0, abs=1e-6)
     world.close()
+
+
+@pytest.mark.parametrize(
+    "place", [(0.0, 0.0, 1.0), (1.2, 0.3, 1.9), (-1.3, -0.5, 0.1), (0.0, -2.9, 1.3)]
+)
+def test_the_part_that_is_rendered_has_all_of_it(scene, place, monkeypatch):
+    """Also at the edges, and where the camera stands within."""
+    scene.add("it", visible_shapes(parse_urdf(body('<box size="0.9 0.3 0.5"/>'))))
+    scene.place("it", {"base": Pose(place, from_rpy(0.3, 0.2, 0.9))})
+    part = shown(scene)
+    monkeypatch.setattr(Scene, "_region", lambda self, camera, width, height: (0, 0, width, height))
+    assert np.abs(part - shown(scene)).max() <= 60  # of edges, whose samples lie elsewhere
+    assert (np.abs(part - shown(scene)).max(axis=-1) > 8).sum() < 20

@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+"""`record:=FILE`: a video that is whole after Ctrl-C, and one line for what can't be recorded."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+import rostest
+
+from video_writing.mp4 import EncoderFailed, find_encoder
+
+BOUND = 100.0  # [s]
+WORLD = ("gazebo_ros", "empty_world.launch", "gui:=false", "server_required:=true")
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def has_ffmpeg():
+    try:
+        return bool(find_encoder())
+    except EncoderFailed:
+        return False
+
+
+class Recording(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.log = self.folder / "log"
+
+    def launch(self, *arguments):
+        port = free_port()
+        env = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "PYTHONUNBUFFERED": "1"}
+        with self.log.open("w") as log:
+            launch = subprocess.Popen(
+                ["roslaunch", "-p", str(port), *arguments], env=env, stdout=log, stderr=log
+            )
+        self.addCleanup(launch.wait, BOUND)
+        self.addCleanup(launch.send_signal, signal.SIGINT)
+        return launch
+
+    def await_line(self, pattern):
+        """What the launch, or what it has left to finish the video, says."""
+        pause = threading.Event()
+        for _ in range(int(BOUND / 0.2)):
+            found = re.search(pattern, self.log.read_text())
+            if found:
+                return found
+            pause.wait(0.2)
+        raise AssertionError(f"nothing said {pattern!r}:\n{self.log.read_text()}")
+
+    @unittest.skipUnless(has_ffmpeg(), "there is no ffmpeg: ./ws extras")
+    def test_a_video_is_whole_after_ctrl_c(self):
+        video = self.folder / "it's a video.mp4"
+        launch = self.launch("cartpole", "simulation.launch", "lockstep:=false", "paused:=false",
+                             f"record:={video}")  # fmt: skip
+        self.await_line("starting joint_state_controller")
+        launch.send_signal(signal.SIGINT)
+        launch.wait(BOUND)
+        told = self.await_line(r"recording: .*video\.mp4: (\d+) pictures, [0-9.]+ s")
+        self.assertGreater(int(told[1]), 0)
+        read = [find_encoder(), "-v", "error", "-i", str(video), "-f", "null", "-"]
+        self.assertEqual(subprocess.run(read, check=False, timeout=BOUND).returncode, 0)
+
+    def test_what_cannot_be_recorded_is_one_line(self):
+        launch = self.launch(*WORLD, f"record:={self.folder}/a.avi")
+        self.assertNotIn("Traceback", self.await_line(r"a recording's name ends in \.mp4")[0])
+        launch.wait(BOUND)
+        self.assertNotIn("Traceback", self.log.read_text())
+
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "recording", Recording)

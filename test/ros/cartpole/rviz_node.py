@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+"""The robot in RViz: in its colours while no simulated time has passed, and where the simulator has it."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+import numpy as np
+import rostest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+from virtual_display import VirtualDisplay, missing
+
+BOUND = 150.0  # [s]
+ORANGE, BLUE = (lambda r, g, b: (r > b + 90) & (r > g + 40)), (lambda r, g, b: b > r + 60)
+NEEDED = ("rviz", "Xvfb")
+CONFIGURE = """model_name: cartpole
+urdf_param_name: robot_description
+joint_names: [stand_cart, cart_pole]
+joint_positions: [%s, %s]"""
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def middle(picture, colour):
+    """Mean column and row of a colour below the tool bar; None where there is too little of it."""
+    red, green, blue = np.moveaxis(picture[60:].astype(int), -1, 0)
+    rows, columns = np.nonzero(colour(red, green, blue))
+    return None if len(rows) < 100 else np.array([columns.mean(), rows.mean() + 60.0])
+
+
+@unittest.skipIf(missing(*NEEDED), f"{missing(*NEEDED)} isn't installed: apt-get install rviz xvfb")
+class Rviz(unittest.TestCase):
+    def setUp(self):
+        self.display = self.enterContext(VirtualDisplay())
+        self.env = {
+            **os.environ,
+            "ROS_MASTER_URI": f"http://localhost:{free_port()}",
+            "DISPLAY": self.display.name,
+            "LIBGL_ALWAYS_SOFTWARE": "1",
+        }
+        self.log = Path(self.enterContext(tempfile.TemporaryDirectory()), "log")
+        port = self.env["ROS_MASTER_URI"].rpartition(":")[2]
+        with self.log.open("w") as log:
+            launch = subprocess.Popen(
+                ["roslaunch", "-p", port, "cartpole", "simulation.launch", "rviz:=true"],
+                env=self.env, stdout=log, stderr=log,
+            )  # fmt: skip
+        self.addCleanup(launch.wait, BOUND)
+        self.addCleanup(launch.send_signal, signal.SIGINT)
+
+    def await_picture(self, what, holds):
+        """Middles of pole and cart, once `holds` of them."""
+        pause, seen = threading.Event(), None
+        for _ in range(int(BOUND / 0.3)):
+            picture = self.display.screenshot()
+            seen = middle(picture, ORANGE), middle(picture, BLUE)
+            if all(each is not None for each in seen) and holds(*seen):
+                return seen
+            pause.wait(0.3)
+        raise AssertionError(f"{what} wasn't seen, but {seen}:\n{self.log.read_text()}")
+
+    def configure(self, position, angle):
+        request = CONFIGURE % (position, angle)
+        call = ["rosservice", "call", "/gazebo/set_model_configuration", request]
+        done = subprocess.run(
+            call, env=self.env, capture_output=True, text=True, timeout=BOUND, check=False
+        )
+        self.assertIn("success: True", done.stdout, done.stderr)
+
+    def test_the_robot_is_where_the_simulator_has_it(self):
+        pole, cart = self.await_picture(
+            "a pole upon a cart",
+            lambda pole, cart: abs(pole[0] - cart[0]) < 30 and pole[1] < cart[1],
+        )
+        self.assertAlmostEqual(cart[0], 550.0, delta=60.0)  # the middle of the window
+        self.configure(0.3, 0.5)
+        self.await_picture("the cart on the right", lambda _, moved: moved[0] > cart[0] + 80)
+        leaning, moved = self.await_picture("a pole that leans", lambda a, b: a[0] < b[0] - 20)
+        self.assertGreater(leaning[1], pole[1])
+        self.assertNotIn("TF_REPEATED_DATA", self.log.read_text())
+
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "rviz", Rviz)

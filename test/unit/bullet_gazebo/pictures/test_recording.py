@@ -1,0 +1,163 @@
+"""A simulation recorded while it runs: pictures at simulated times, of who comes and goes."""
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from robots import cartpole_urdf
+
+from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import World, ground_plane
+from bullet_gazebo.pictures import recording
+from bullet_gazebo.pictures.recording import Recorder, RecordingError, RecordingOptions
+from bullet_gazebo.simulator import Simulator
+
+LIMIT = 120.0  # [s] for the other process to end
+BALL = """<robot name="ball"><link name="base">
+  <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+  <visual><geometry><sphere radius="0.2"/></geometry>
+    <material name="red"><color rgba="1 0 0 1"/></material></visual></link></robot>"""
+
+pytestmark = pytest.mark.extras("imageio_ffmpeg")
+
+
+@pytest.fixture
+def sim():
+    made = Simulator(World(make_engine()), lockstep=True)
+    made.world.spawn("ground_plane", ground_plane(), Pose())
+    yield made
+    made.world.close()
+
+
+def frames(path: Path) -> list[np.ndarray]:
+    import imageio_ffmpeg
+
+    read = imageio_ffmpeg.read_frames(str(path))
+    width, height = next(read)["size"]
+    return [np.frombuffer(each, np.uint8).reshape(height, width, 3).astype(int) for each in read]
+
+
+def red(frame: np.ndarray) -> int:
+    """How many pixels are red."""
+    return int((frame[..., 0] > 60 + frame[..., 1:].max(axis=-1)).sum())
+
+
+def options(path: Path, **changed: object) -> RecordingOptions:
+    return RecordingOptions(path / "a.mp4", **{"rate": 20.0, "width": 64, "height": 48, **changed})
+
+
+def test_pictures_come_at_simulated_times_and_show_who_comes_and_goes(sim, tmp_path):
+    recorder = Recorder(sim, options(tmp_path))
+    sim.advance(200)
+    sim.world.spawn("ball", parse_urdf(BALL), Pose((0.0, 0.0, 1.0)))
+    sim.advance(200)
+    sim.world.delete("ball")
+    sim.advance(200)
+    recorder.close(LIMIT)
+    assert recorder._process.wait(LIMIT) == 0
+    there = [red(frame) > 20 for frame in frames(tmp_path / "a.mp4")]
+    assert there == [False] * 5 + [True] * 4 + [False] * 4
+
+
+def test_time_that_begins_anew_is_recorded_on(sim, tmp_path):
+    recorder = Recorder(sim, options(tmp_path))
+    for _ in range(3):
+        sim.advance(100)
+        sim.reset(everything=True)
+    recorder.close(LIMIT)
+    assert recorder._process.wait(LIMIT) == 0
+    assert len(frames(tmp_path / "a.mp4")) == 9
+
+
+def test_recording_changes_no_bit_of_the_simulation(tmp_path):
+    finals = []
+    for looking in (False, True):
+        sim = Simulator(World(make_engine()), lockstep=True)
+        model = sim.world.spawn("it", parse_urdf(cartpole_urdf()), Pose())
+        model.set_joint_positions({"cart_pole": 0.1})
+        recorder = Recorder(sim, options(tmp_path)) if looking else None
+        sim.advance(300)
+        finals.append(model.joint_states())
+        sim.world.close()
+        if recorder is not None:
+            recorder.close(LIMIT)
+            assert recorder._process.wait(LIMIT) == 0
+    assert finals[0] == finals[1]
+
+
+def test_a_simulator_that_is_killed_leaves_a_video(tmp_path):
+    """The pipe ends, whatever the way."""
+    script = f"""
+import os, signal
+from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.world import World
+from bullet_gazebo.pictures.recording import Recorder, RecordingOptions
+from bullet_gazebo.simulator import Simulator
+from pathlib import Path
+sim = Simulator(World(make_engine()), lockstep=True)
+recorder = Recorder(sim, RecordingOptions(Path({str(tmp_path / "a.mp4")!r}), 20.0, 64, 48))
+sim.advance(500)
+while recorder._waiting:
+    pass
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+    import subprocess
+
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        stdout=subprocess.PIPE,
+        text=True,
+        timeout=LIMIT,
+        check=False,
+    )  # returns once nobody has its standard output any more: the other process neither
+    assert done.returncode == -signal.SIGKILL and " pictures, " in done.stdout
+    assert 9 <= len(frames(tmp_path / "a.mp4")) <= 11
+
+
+def test_the_other_process_may_end_first(sim, tmp_path, caplog):
+    recorder = Recorder(sim, options(tmp_path))
+    sim.advance(100)
+    recorder._process.kill()
+    recorder._process.wait(LIMIT)
+    while not recorder._ending:
+        sim.advance(100)
+    recorder.close(LIMIT)
+    sim.advance(100)
+    assert "the recording has ended before the simulation" in caplog.text
+
+
+def test_what_the_other_process_cannot_take_in_time_is_left_out(sim, tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(recording, "MOST_WAITING", -1)
+    recorder = Recorder(sim, options(tmp_path))
+    sim.advance(200)
+    recorder.close(LIMIT)
+    assert recorder._process.wait(LIMIT) == 0
+    assert "5 pictures of the recording were left out" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        ({"path": Path("a.avi")}, r"ends in \.mp4"),
+        ({"path": Path("/nowhere/a.mp4")}, "can't be written"),
+        ({"rate": 0.0}, "pictures a second"),
+        ({"rate": float("nan")}, "pictures a second"),
+        ({"width": 1}, "pixels"),
+        ({"height": 100_000}, "pixels"),
+    ],
+)
+def test_what_cannot_be_recorded_is_refused(tmp_path, changed, text):
+    with pytest.raises(RecordingError, match=text):
+        RecordingOptions(**{"path": tmp_path / "a.mp4", **changed}).check()
+
+
+def test_a_missing_encoder_is_told_with_what_installs_it(tmp_path, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setenv("PATH", os.fspath(tmp_path))
+    with pytest.raises(RecordingError, match="no ffmpeg: './ws extras' installs one"):
+        options(tmp_path).check()
