@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import math
+import contextlib
 import os
 import sys
 import threading
@@ -18,6 +18,8 @@ SERVER_ARGUMENTS = "GZSERVER_ARGS"  # read by every simulator that is started be
 STEP_ON = "--step-on"
 HASHES = "PYTHONHASHSEED"
 MOST_SEED = 2**32 - 1
+LONGEST = 3600.0  # [s] that may pass at a trigger
+NO_TRIGGERS = "none"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -117,7 +119,10 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("script", help="the Python file")
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help="what the script gets")
-    return parser.parse_args(_one_by_one(argv))
+    args = parser.parse_args(_one_by_one(argv))
+    if NO_TRIGGERS in (args.step_on or ()) and set(args.step_on) != {NO_TRIGGERS}:
+        parser.error(f"argument {STEP_ON}: '{NO_TRIGGERS}' stands alone")
+    return args
 
 
 def _one_by_one(argv: Sequence[str]) -> list[str]:
@@ -142,14 +147,16 @@ def _is_a_script(argument: str) -> bool:
 
 
 def _seed(text: str) -> int:
-    value = int(text)
-    if not 0 <= value <= MOST_SEED:
-        raise argparse.ArgumentTypeError(f"{text}: 0 to {MOST_SEED}")
-    return value
+    if not (text.isascii() and text.isdecimal() and int(text) <= MOST_SEED):
+        raise argparse.ArgumentTypeError(f"{text}: a whole number, 0 to {MOST_SEED}, is needed")
+    return int(text)
 
 
 def _period(text: str) -> float:
-    value = float(text)
-    if not (value > 0.0 and math.isfinite(value)):
-        raise argparse.ArgumentTypeError(f"{text}: a positive number of seconds is needed")
-    return value
+    with contextlib.suppress(ValueError):
+        value = float(text)
+        if 0.0 < value <= LONGEST:
+            return value
+    raise argparse.ArgumentTypeError(
+        f"{text}: seconds, more than 0, at most {LONGEST:g}, are needed"
+    )
