@@ -15,9 +15,12 @@ from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.rviz import check_rviz, open_rviz
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot, State
+from ros_calls.waiting import wait_until
 from ros_utils import ros_gazebo
 
 START_TIMEOUT = 60.0  # [s] for the simulator to come up
+WINDOW_TIMEOUT = 20.0  # [s] for its window
+WINDOW = "/gazebo_gui/window"  # parameter: what the window tells of where it is
 
 
 class RosSession(Generic[State]):
@@ -87,6 +90,8 @@ class RosSession(Generic[State]):
             simulator = OwnSimulator()
             for undo in changes:
                 self._undo.callback(_at_living_simulator, simulator, undo)
+        elif self._gui:
+            _tell_window(say)
         if self._rviz:
             say("opening RViz")
             self._undo.callback(open_rviz(self._robot))
@@ -167,6 +172,13 @@ class RosSession(Generic[State]):
     def close(self) -> None:
         """Ends what `start()` started, newest first; may be called twice."""
         self._undo.close()
+
+
+def _tell_window(say: Say) -> None:
+    """The simulator's own output goes to its log."""
+    lines = wait_until(lambda: rospy.get_param(WINDOW, []), WINDOW_TIMEOUT, "the window")
+    for line in lines or ["the window didn't open; the log of gazebo_gui says why"]:
+        say(str(line))
 
 
 def _at_living_simulator(simulator: OwnSimulator, undo: Undo) -> None:

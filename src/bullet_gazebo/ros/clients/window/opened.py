@@ -1,8 +1,14 @@
 """The page, served and shown until the node is shut down."""
 
+import contextlib
+
+import rospy
+
 from bullet_gazebo.ros.clients.window.address import Address
 from bullet_gazebo.ros.clients.window.page import open_browser, serve, stop
 from bullet_gazebo.ros.clients.window.window import Window
+
+TOLD = "~window"  # parameter: the lines that tell where the page is
 
 
 def show(address: Address, browser: bool) -> None:
@@ -14,10 +20,15 @@ def show(address: Address, browser: bool) -> None:
     server = serve(address)
     try:
         window = Window(server)
-        for line in address.advice():
+        advice = address.advice()
+        for line in advice:
             print(f"gzclient: {line}", flush=True)
+        if not address.token:  # a program that started it may tell it on; a token is nobody else's
+            rospy.set_param(TOLD, advice)
         if browser:
             open_browser(address)
         window.run()
     finally:
         stop(server)
+        with contextlib.suppress(KeyError, OSError, rospy.ROSException):  # a master that is gone
+            rospy.delete_param(TOLD)
