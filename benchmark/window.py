@@ -22,7 +22,8 @@ import zstandard
 from bullet_gazebo_msgs.srv import StepWorld
 from cartpole_world import CART, add_cartpole
 from realtime import factor, processor_time, simulator_process
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
 
 from ros_calls.service import ServiceClient
 from ros_utils import ros_gazebo
@@ -56,7 +57,7 @@ TARGETS = {
 }
 
 
-def open_page(address: str) -> ClientConnection:
+def open_page(address: str) -> Connection:
     """Connects as a browser does, and says where it looks from."""
     protocol = f"viser-v{version('viser')}"
     page = connect(address, subprotocols=[protocol], max_size=None)  # type: ignore[list-item]
@@ -64,7 +65,7 @@ def open_page(address: str) -> ClientConnection:
     return page
 
 
-def told(page: ClientConnection, timeout: float) -> bytes:
+def told(page: Connection, timeout: float) -> bytes:
     """What the page is told next; empty where that is nothing within `timeout` [s]."""
     try:
         content = page.recv(timeout=timeout)
@@ -197,8 +198,9 @@ def moving_links(results: dict[str, float], seconds: float, connects: int) -> No
 def many_models(results: dict[str, float]) -> None:
     with Simulation() as simulation, simulation.active(), window(simulation) as (_, address):
         for index in range(MANY):
-            place = {"pos_x": float(index % 20), "pos_y": float(index // 20)}
-            assert ros_gazebo.gazebo_spawn_urdf_string(BOX, model_name=f"box{index}", **place)[0]
+            assert ros_gazebo.gazebo_spawn_urdf_string(
+                BOX, model_name=f"box{index}", pos_x=float(index % 20), pos_y=float(index // 20)
+            )[0]
         begin = time.perf_counter()
         with open_page(address) as opened:
             boxes = 0

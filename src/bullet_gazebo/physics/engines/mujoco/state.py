@@ -116,6 +116,8 @@ class MujocoState:
             mujoco.mj_contactForce(self.model, self.data, index, force)
             if force[0] > 0.0:
                 contact = self.data.contact[index]
-                x, y, z, nx, ny, nz = (*contact.pos.tolist(), *contact.frame[:3].tolist())
-                found.append(Contact((x, y, z), scale((nx, ny, nz), float(force[0]))))
+                x, y, z = contact.pos.tolist()
+                along, across, up = contact.frame[:3].tolist()
+                normal = scale((along, across, up), float(force[0]))
+                found.append(Contact((x, y, z), normal))
         return found

@@ -5,7 +5,6 @@ from typing import Any
 import rosgraph
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from gazebo_msgs.srv import (
-    GetJointProperties,
     GetPhysicsProperties,
     GetPhysicsPropertiesResponse,
     SetModelConfiguration,
@@ -77,11 +76,6 @@ class Commands:
         self._call(
             "set_physics_properties", SetPhysicsProperties, now.time_step, rate, now.gravity, now.ode_config
         )  # fmt: skip
-
-    def joint_position(self, model: str, joint: str) -> float:
-        """Returns where a joint is [rad, m]."""
-        found = self._call("get_joint_properties", GetJointProperties, f"{model}::{joint}")
-        return float(found.position[0])
 
     def place_joint(self, model: str, joint: str, position: float) -> None:
         """Puts a joint at `position` [rad, m], at rest."""

@@ -61,7 +61,7 @@ class ModelPanel:
             kept = self._choice.value
             self._choice.options = names
             if kept in self._models:
-                self._choice.value = kept
+                self._choice.value = kept  # type: ignore[misc]
         self._choose()
 
     def _choose(self) -> None:
@@ -84,13 +84,13 @@ class ModelPanel:
             hint="commands the running controller; while paused it places the joint",
         )  # fmt: skip
 
-        @slider.on_update
-        def _(event: viser.GuiEvent[Any]) -> None:
+        def moved(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:  # somebody moved it
                 position = float(slider.value)
                 self._touched[joint.name] = time.monotonic()
                 self._attempt(lambda: self._move(joint.name, position))
 
+        slider.on_update(moved)
         return slider
 
     def _move(self, joint: str, position: float) -> None:
@@ -135,7 +135,7 @@ class ModelPanel:
                 continue
             shown_at = min(max(position, slider.min), slider.max)
             if abs(shown_at - slider.value) > slider.step:
-                slider.value = shown_at
+                slider.value = shown_at  # type: ignore[misc]
 
     def follow(self, links: dict[str, np.ndarray]) -> None:
         """Moves all cameras along with the chosen model."""

@@ -28,6 +28,7 @@ class TimePanel:
 
     def __init__(self, gui: viser.GuiApi, commands: Commands, attempt: Attempt) -> None:
         self._commands = commands
+        self._attempt = attempt
         self.paused = False
         self._shown = ""
         self._status = gui.add_html("")
@@ -43,11 +44,11 @@ class TimePanel:
         simulation = gui.add_button("Reset simulation", hint="joints and time to zero as well")
         simulation.on_click(lambda _: attempt(lambda: commands.reset(everything=True)))
         self._speed = gui.add_dropdown("Speed", [*SPEEDS, OTHER], initial_value="1 ×")
+        self._speed.on_update(self._choose_speed)
 
-        @self._speed.on_update
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None and self._speed.value != OTHER:  # somebody chose it
-                attempt(lambda: commands.set_speed(SPEEDS[self._speed.value]))
+    def _choose_speed(self, event: viser.GuiEvent[Any]) -> None:
+        if event.client is not None and self._speed.value != OTHER:  # somebody chose it
+            self._attempt(lambda: self._commands.set_speed(SPEEDS[self._speed.value]))
 
     def show(self, now: float, factor: float, paused: bool) -> None:
         """Shows the time [s], the real-time factor, and whether the world is paused."""
@@ -69,7 +70,7 @@ class TimePanel:
         names = [name for name, each in SPEEDS.items() if abs(each - factor) < 1e-6]
         name = names[0] if names else OTHER
         if self._speed.value != name:
-            self._speed.value = name
+            self._speed.value = name  # type: ignore[misc]
 
     def _write(self, text: str) -> None:
         if text != self._shown:
