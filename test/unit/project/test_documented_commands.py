@@ -25,6 +25,7 @@ import yaml
 from bullet_gazebo_msgs.srv import StepWorldRequest
 from gazebo_msgs.srv import GetWorldPropertiesRequest
 
+from bullet_gazebo.ros.clients import gzclient
 from cartpole import dqn_train, pg_train, workbench
 
 pytestmark = pytest.mark.usefixtures("signals")
@@ -100,6 +101,7 @@ GROUPS = {
     "launches": of("roslaunch"),
     "requests": of("rosservice call"),
     "tests": of("test", "rostest", "check", "shell", "tensorboard"),
+    "window": of("rosrun gazebo_ros gzclient"),
     "gains": of("rosrun dynamic_reconfigure dynparam set"),
 }
 
@@ -126,10 +128,18 @@ def test_a_training_runs(command: Command, tmp_path: Path, monkeypatch, capsys) 
         with pytest.raises(SystemExit, match="^0$"):
             TRAININGS[program](flags)
         return
+    if "--gui" in flags:  # of a simulator over ROS alone
+        pg_train.choose(flags, {})
+        flags.remove("--gui")
     flags += SHORT
     if not any(flag.startswith("--env-id") for flag in flags):
         flags.append("--backend=bullet")
     assert TRAININGS[program](flags) == 0, capsys.readouterr()
+
+
+@pytest.mark.parametrize("command", GROUPS["window"], ids=str)
+def test_the_window_takes_it(command: Command) -> None:
+    assert gzclient.parse_args(command.words[3:]).ignored == []
 
 
 @pytest.mark.parametrize("command", GROUPS["workbench"], ids=str)

@@ -22,11 +22,13 @@ NAME = "gazebo_gui"
 def main(argv: Sequence[str] | None = None) -> int:
     """Serves the page until it is ended; returns the exit code."""
     command_line = list(sys.argv if argv is None else argv)
-    options = _parse(rospy.myargv(command_line)[1:])
+    options = parse_args(rospy.myargv(command_line)[1:])
 
     def work() -> int:
         init_node(NAME, command_line, anonymous=False)
         stop_hearing_clock()  # the scene has the time, thirty times a second instead of thousands
+        if options.ignored:
+            rospy.logwarn("Arguments without effect here: %s", " ".join(options.ignored))
         missing = lack(WINDOW)
         if missing:
             rospy.logwarn("gazebo_gui: no window; the simulation goes on without one. %s", missing)
@@ -43,8 +45,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     return SignalHandler().run(work, interrupted=0)
 
 
-def _parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """The options; what is Gazebo's own is accepted and not used."""
+def parse_args(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns host, port, no_browser, and `ignored`: what isn't known, as Gazebo's own options."""
     parser = argparse.ArgumentParser(
         prog="gzclient", description="The simulator's window: a page in the browser."
     )
@@ -61,4 +63,6 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
         action="store_true",
         help="don't open the page here, where there is a display",
     )
-    return parser.parse_known_args(list(arguments))[0]
+    options, ignored = parser.parse_known_args(list(arguments))
+    options.ignored = ignored
+    return options
