@@ -37,5 +37,6 @@ setup(
     version=ElementTree.parse("package.xml").findtext("version"),
     packages=find_packages("src"),
     package_dir={"": "src"},
+    package_data={"rl_workbench.tools.pictures": ["page.html"]},
     cmdclass={"build_py": BuildWithData},
 )

@@ -63,6 +63,7 @@ usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
        ws check [NAME...]    run the checks, or those named: ${CHECKS[*]}
        ws shell              an interactive bash in the workspace, with roscd and completion
        ws extras [CMD...]    install requirements/extras.txt too, then run CMD, if any
+       ws rviz [CMD...]      install Debian's RViz too, then run CMD, if any
        ws clean              remove everything that ws made
        ws --help             this text
 
@@ -105,7 +106,7 @@ interactive_shell() {
 # What a user who has just made the workspace ready may want to know.
 next_thing() {
     case ${COMMAND%% *} in
-        true | extras | :) echo ". Next: ./ws rosrun cartpole pg_train.py, or ./ws --help" ;;
+        true | extras | rviz | :) echo ". Next: ./ws rosrun cartpole pg_train.py, or ./ws --help" ;;
         *) echo ". Now: $COMMAND" ;;
     esac
 }
@@ -131,6 +132,7 @@ main() {
     case $1 in
         test | check) steps=(debian venv test_tools companions build) ;;
         extras) steps=(debian venv extras companions build) ;;
+        rviz) steps=(debian rviz venv companions build) ;;
     esac
     choose_place "${steps[@]}"
     make_ready "${steps[@]}"
@@ -139,7 +141,7 @@ main() {
         test) run_tests "${@:2}" ;;
         check) check "${@:2}" ;;
         shell) interactive_shell ;;
-        extras) [[ $# -eq 1 ]] || exec -- "${@:2}" ;;
+        extras | rviz) [[ $# -eq 1 ]] || exec -- "${@:2}" ;;
         *) run "$@" ;;
     esac
 }

@@ -8,6 +8,7 @@
 
 declare -A TITLE=(
     [debian]="Debian packages"
+    [rviz]="Debian packages for RViz"
     [venv]="Python packages"
     [test_tools]="tools for test and check"
     [extras]="extra Python packages"
@@ -19,23 +20,24 @@ COMPILER="mend what the compiler or CMake complains of; if that is nothing of yo
 # shellcheck disable=SC2034
 declare -A REMEDY=(
     [debian]="$NETWORK; on other systems than Debian 12 see docs/catkin.md"
-    [venv]=$NETWORK [test_tools]=$NETWORK [extras]=$NETWORK
+    [rviz]=$NETWORK [venv]=$NETWORK [test_tools]=$NETWORK [extras]=$NETWORK
     [companions]=$COMPILER [build]=$COMPILER
 )
 
 # --- Debian packages -----------------------------------------------------------------------
 
-debian_list() { sed 's/#.*//' -- "$ROOT/requirements/debian.txt" | xargs -n 1; }
+debian_list() { sed 's/#.*//' -- "$ROOT/requirements/$1" | xargs -n 1; }
 
-debian_missing() {
+debian_missing() {  # file
     local installed
     installed=$(dpkg-query --show --showformat '${db:Status-Status} ${Package}\n' 2>/dev/null |
         sed -n 's/^installed //p' || true)
-    comm -23 <(debian_list | sort -u) <(sort -u <<<"$installed")
+    comm -23 <(debian_list "$1" | sort -u) <(sort -u <<<"$installed")
 }
 
 # The key is what is missing, which is nothing when ready: a package removed later is noticed.
-key_debian() { debian_missing; }
+key_debian() { debian_missing debian.txt; }
+key_rviz() { debian_missing rviz.txt; }
 
 AS_ROOT=()
 become_root() {
@@ -48,9 +50,11 @@ apt() {
     "${AS_ROOT[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=600 "$@"
 }
 
-plan_debian() {
+plan_debian() { plan_packages debian.txt; }
+plan_rviz() { plan_packages rviz.txt; }
+plan_packages() {  # file
     local missing
-    mapfile -t missing < <(debian_missing)
+    mapfile -t missing < <(debian_missing "$1")
     if [[ ${#missing[@]} -eq 0 ]]; then
         echo "all there"
         return 0
@@ -74,9 +78,11 @@ sizes_of_debian() {  # package...
         paste --serial --delimiters ';' | sed 's/;/, /g' | grep .
 }
 
-make_debian() {
+make_debian() { make_packages debian.txt; }
+make_rviz() { make_packages rviz.txt; }
+make_packages() {  # file
     local missing
-    mapfile -t missing < <(debian_missing)
+    mapfile -t missing < <(debian_missing "$1")
     [[ ${#missing[@]} -gt 0 ]] || return 0
     if ! type -P apt-get >/dev/null; then
         echo "This is no Debian: there is no apt-get. Needed: ${missing[*]}"

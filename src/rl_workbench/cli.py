@@ -31,7 +31,9 @@ TRAIN = "train"
 COMMANDS = {
     "eval": _Command("watching", "greedy episodes of a run: mean, deviation, every episode"),
     "enjoy": _Command("watching", "watch greedy episodes in a window"),
-    "record": _Command("watching", "one greedy episode as GIF or MP4, without a display"),
+    "record": _Command(
+        "watching", "episodes as GIF, MP4 or a page that plays them, without a display"
+    ),
     "plot": _Command("drawing", "the training curves of runs as PNG"),
     "policy": _Command("drawing", "the policy over the pole's angle and velocity as PNG"),
     "compare": _Command("comparing", "groups of runs: table per seed, IQM, intervals, curves"),

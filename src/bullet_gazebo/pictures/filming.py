@@ -1,7 +1,7 @@
 """The process that draws what recording.py tells it, and has it made into a video."""
 
+import json
 import logging
-import pickle
 import signal
 import sys
 import threading
@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from bullet_gazebo.physics.description import Shape
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, subtract
 from bullet_gazebo.pictures.camera import Camera, overview
 from bullet_gazebo.pictures.recording import CAST, HEADER, RecordingOptions
@@ -65,16 +66,16 @@ class Cast:
     def __init__(self, options: RecordingOptions) -> None:
         self._options = options
         self._scene = Scene()
-        self._models: list[tuple[str, str, bool, list[str], Any]] = []
+        self._models: list[Any] = []
         self._camera: Camera | None = None
         self._followed, self._offset = "", ZERO
 
-    def change(self, models: list[tuple[str, str, bool, list[str], Any]]) -> None:
+    def change(self, models: list[Any]) -> None:
         """Other models than before; the camera is placed anew with the next picture."""
         for name, *_ in self._models:
             self._scene.remove(name)
         for name, _, _, _, shapes in models:
-            self._scene.add(name, shapes)
+            self._scene.add(name, [(link, _shape(*told)) for link, told in shapes])
         self._models, self._camera = models, None
 
     def picture(self, numbers: np.ndarray) -> np.ndarray:
@@ -104,6 +105,11 @@ class Cast:
         return Camera(camera.target, ROOM * camera.distance, camera.yaw, camera.pitch, camera.view)
 
 
+def _shape(kind: str, size: list[float], pose: Any, mesh: str, rgba: Any) -> Shape:
+    position, orientation = map(tuple, pose)
+    return Shape(kind, tuple(size), Pose(position, orientation), mesh, rgba)
+
+
 def _pose(x: float, y: float, z: float, qx: float, qy: float, qz: float, qw: float) -> Pose:
     return Pose((x, y, z), (qx, qy, qz, qw))
 
@@ -119,7 +125,7 @@ def film(inbox: Inbox, options: RecordingOptions) -> int:
         while (message := inbox.take()) is not None:
             kind, data = message
             if kind == CAST:
-                cast.change(pickle.loads(data))  # the simulator's, which has started this process
+                cast.change(json.loads(data))
             else:
                 writer.add(cast.picture(np.frombuffer(data)))
                 count += 1

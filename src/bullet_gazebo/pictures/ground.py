@@ -14,7 +14,8 @@ FADING = 3.0  # of the camera's distance, until a third of the colours is left
 
 
 class Background(NamedTuple):
-    """Colours (h, w, 3) of uint8, and in OpenGL's measure how far away the ground is (h, w): 1 is none."""
+    """Colours (h, w, 3) of uint8, and how far away the ground is in OpenGL's measure, row by row (h, 1): 1 is
+    none."""
 
     colours: np.ndarray
     depth: np.ndarray
@@ -23,19 +24,26 @@ class Background(NamedTuple):
 def background(camera: Camera, width: int, height: int) -> Background:
     """What the camera would see of an empty world, whose ground is at z = 0."""
     across = (np.arange(width) + 0.5 - width / 2.0) * (2.0 * camera.slope / height)
-    down = (np.arange(height) + 0.5 - height / 2.0) * (2.0 * camera.slope / height)
+    down = (np.arange(height)[:, np.newaxis] + 0.5 - height / 2.0) * (2.0 * camera.slope / height)
     right, up, forward = camera.axes
-    rays = forward + across[:, np.newaxis] * right - down[:, np.newaxis, np.newaxis] * up
     eye = camera.eye
+    falling = forward[2] - down * up[2]  # the same all along a row: the camera stands upright
     with np.errstate(divide="ignore", invalid="ignore"):
-        reach = np.where(rays[..., 2] * eye[2] < 0.0, -eye[2] / rays[..., 2], np.inf)
+        reach = np.where(falling * eye[2] < 0.0, -eye[2] / falling, np.inf)
     seen = reach < camera.far
     reach = np.where(seen, reach, camera.far)
     size = _tile(camera.distance)
-    squares = np.floor((eye[:2] + reach[..., np.newaxis] * rays[..., :2]) / size).sum(axis=-1)
-    strength = np.where(seen, np.exp(-reach / (FADING * camera.distance)), 0.0)[..., np.newaxis]
-    tiles = np.array(TILES)[squares.astype(np.int64) % 2]
-    colours = np.rint(np.array(SKY) + strength * (tiles - np.array(SKY))).astype(np.uint8)
+    odd = np.zeros((height, width), bool)
+    for axis in (0, 1):
+        start = eye[axis] + reach * (forward[axis] - down * up[axis])
+        places = (start / size) + (reach * right[axis] / size) * across
+        odd ^= (np.floor(places).astype(np.int32) & 1).astype(bool)
+    strength = np.where(seen, np.exp(-reach / (FADING * camera.distance)), 0.0)
+    even_rows, odd_rows = (
+        np.rint(np.array(SKY) + strength * (np.array(tile) - np.array(SKY))).astype(np.uint8)
+        for tile in TILES
+    )
+    colours = np.where(odd[..., np.newaxis], odd_rows[:, np.newaxis], even_rows[:, np.newaxis])
     return Background(colours, np.where(seen, _depth(reach, camera), 1.0).astype(np.float32))
 
 

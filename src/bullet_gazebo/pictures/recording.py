@@ -5,9 +5,9 @@ in a session of its own and ends with its pipe: also a simulator that was killed
 played.
 """
 
+import json
 import logging
 import os
-import pickle
 import struct
 import subprocess
 import sys
@@ -26,7 +26,7 @@ from video_writing.mp4 import EncoderFailed, find_encoder
 
 FILMING = "bullet_gazebo.pictures.filming"
 HEADER = struct.Struct("<cI")  # kind of a message, and its length [bytes]
-CAST, PICTURE = b"c", b"p"  # kinds: pickled models, and poses
+CAST, PICTURE = b"c", b"p"  # kinds: models as JSON, and poses
 MOST_WAITING = 100_000_000  # [bytes] for the other process to take; beyond it pictures are left out
 LEAST_SIZE, LARGEST_SIZE, FASTEST = 16, 4096, 240.0
 
@@ -108,7 +108,7 @@ class Recorder:
         models = list(self._sim.world.models.values())
         if models != self._cast:
             self._cast = models
-            self._send(CAST, lambda: pickle.dumps([_looks(model) for model in models]))
+            self._send(CAST, lambda: json.dumps([_looks(model) for model in models]).encode())
         poses = array("d")
         for model in models:
             for name in model.link_names:
@@ -161,11 +161,17 @@ class Recorder:
         self._thread.join(patience)
 
 
-def _looks(model: Model) -> tuple[str, str, bool, list[str], list[tuple[str, Any]]]:
-    """Name, root link, whether it stays where it is, links in the order of their poses, shapes."""
+def _looks(model: Model) -> list[Any]:
+    """Name, root link, whether it stays where it is, links in the order of their poses, shapes with links.
+
+    A mesh goes by the name of its file.
+    """
     description = model.description
-    shapes = visible_shapes(description)
-    return model.name, description.root, description.static, model.link_names, shapes
+    shapes = [
+        (link, (shape.kind, shape.size, shape.pose, shape.mesh, shape.rgba))
+        for link, shape in visible_shapes(description)
+    ]
+    return [model.name, description.root, description.static, model.link_names, shapes]
 
 
 def _start(options: RecordingOptions) -> subprocess.Popen[bytes]:

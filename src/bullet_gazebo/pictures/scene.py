@@ -88,7 +88,7 @@ class Scene:
             renderer=pybullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
         )[2:4]
-        nearer = np.reshape(depth, size[::-1]) < np.minimum(behind.depth[part], NOTHING)
+        nearer = np.reshape(depth, size[::-1]) < np.minimum(behind.depth[top:bottom], NOTHING)
         pixels = np.reshape(colours, (*size[::-1], 4))[..., :3].astype(np.uint8)
         drawn = np.where(nearer[..., np.newaxis], pixels, behind.colours[part])
         left, top, right, bottom = region

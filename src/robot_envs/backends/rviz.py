@@ -18,7 +18,7 @@ def check_rviz(robot: Robot[State]) -> None:
     if robot.over_ros.rviz is None:
         raise RobotEnvError(f"the robot '{robot.model}' doesn't say how RViz shows it")
     if shutil.which("rviz") is None:
-        raise RobotEnvError("RViz isn't installed: apt-get install rviz")
+        raise RobotEnvError("RViz isn't installed: ./ws rviz does it, or apt-get install rviz")
     reason = hindrance()
     if reason:
         raise RobotEnvError(f"RViz needs a display to open a window on, and {reason}")

@@ -172,3 +172,18 @@ def test_private_parameters_of_dqn_train(monkeypatch) -> None:
     (options,) = chosen
     assert (options.kind.name, options.run.seed) == ("dqn", 3)
     assert (options.hyperparameters.gamma, options.hyperparameters.dueling) == (0.5, True)
+
+
+def test_rviz_where_it_cannot_be_is_one_line(monkeypatch, tmp_path, capsys):
+    """Before anything is started."""
+    pytest.importorskip("rospy")
+    monkeypatch.chdir(tmp_path)
+    for program, display, text in (
+        (None, ":0", "RViz isn't installed: ./ws rviz"),
+        ("/usr/bin/rviz", "", "RViz needs a display to open a window on, and DISPLAY isn't set"),
+    ):
+        monkeypatch.setattr("shutil.which", lambda name, program=program: program)
+        monkeypatch.setenv("DISPLAY", display)
+        assert pg_train.main(["--rviz", "--backend", "ros"]) == 1
+        assert capsys.readouterr().err.strip().splitlines()[-1].startswith(f"pg_train.py: {text}")
+    assert list(tmp_path.iterdir()) == []

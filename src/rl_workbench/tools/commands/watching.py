@@ -41,13 +41,13 @@ def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
     if command == "enjoy":
         add("--episodes", type=number(1), default=1, metavar="N", help="default 1")
         return
-    add("--out", type=Path, required=True, metavar="FILE", help="ends in .gif or .mp4")
+    add("--out", type=Path, required=True, metavar="FILE", help="ends in .gif, .mp4 or .html")
     add("--max-steps", type=number(0), default=0, metavar="N",
         help="cuts the episode off; 0: never (default)")  # fmt: skip
     add("--size", type=_size, metavar="WIDTHxHEIGHT",
         help="of an episode's pictures [pixels]; by default the environment's")  # fmt: skip
     add("--fps", type=_rate, metavar="HZ",
-        help="frames per second of simulated time (default 50, of a GIF 25)")  # fmt: skip
+        help="frames per second of simulated time (default 25, of an MP4 50)")  # fmt: skip
     add("--no-captions", action="store_true", help="no line with step, return and action")
 
 

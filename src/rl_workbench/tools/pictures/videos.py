@@ -1,8 +1,10 @@
-"""Frames as a GIF or an MP4."""
+"""Frames as a GIF, an MP4, or a page that plays them."""
 
+import base64
 import shutil
 import tempfile
 from collections.abc import Sequence
+from io import BytesIO
 from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import BinaryIO
@@ -15,9 +17,14 @@ from rl_workbench.extras import installing
 from rl_workbench.training.run.files import write_file
 from video_writing.mp4 import EncoderFailed, Mp4Writer, find_encoder
 
-RATES = {".gif": 25.0, ".mp4": 50.0}  # [Hz] by default, by the ending of a file's name
+RATES = {
+    ".gif": 25.0,
+    ".mp4": 50.0,
+    ".html": 25.0,
+}  # [Hz] by default, by the ending of a file's name
 FASTEST = 50.0  # [Hz] of a GIF: browsers slow down what is faster
 GIF_TICK = 10  # [ms], the format's own
+PAGE = Path(__file__).with_name("page.html")
 COLOURS = 96  # of a GIF; drawings have few
 
 
@@ -59,7 +66,7 @@ def write_video(path: Path, frames: Sequence[np.ndarray], rate: float) -> None:
     Raises:
         WorkbenchError: if the disk or ffmpeg refuses.
     """
-    write = _write_gif if path.suffix.lower() == ".gif" else _write_mp4
+    write = {".gif": _write_gif, ".mp4": _write_mp4, ".html": _write_html}[path.suffix.lower()]
     write_file(path, lambda stream: write(stream, frames, rate))
 
 
@@ -81,6 +88,20 @@ def _write_gif(stream: BinaryIO, frames: Sequence[np.ndarray], rate: float) -> N
         loop=0,
         optimize=False,
     )
+
+
+def _write_html(stream: BinaryIO, frames: Sequence[np.ndarray], rate: float) -> None:
+    """All in one file: pictures as WebP in text, and a script that shows them."""
+    height, width, _ = frames[0].shape
+    begin, end = PAGE.read_text(encoding="utf-8").split("@FRAMES@")
+    begin = begin.replace("@WIDTH@", str(width)).replace("@HEIGHT@", str(height))
+    begin = begin.replace("@RATE@", f"{rate:g}")
+    stream.write(begin.encode())
+    for frame in frames:
+        packed = BytesIO()
+        Image.fromarray(frame).save(packed, "WEBP", quality=80)
+        stream.write(b'"' + base64.b64encode(packed.getvalue()) + b'",\n')
+    stream.write(end.encode())
 
 
 def _write_mp4(stream: BinaryIO, frames: Sequence[np.ndarray], rate: float) -> None:

@@ -1,5 +1,8 @@
 """Episodes as films: which frames, how long they last, what stands below them, and several at once."""
 
+import base64
+import re
+from io import BytesIO
 from pathlib import Path
 
 import gymnasium
@@ -165,3 +168,15 @@ def test_flags_that_make_no_sense(run: Path, tmp_path: Path, capsys, words, text
 def test_a_gif_that_browsers_would_slow_down_is_refused(run: Path, tmp_path: Path, capsys):
     assert record(run, tmp_path / "a.gif", "--fps", "100") == 1
     assert "50 frames a second at most" in capsys.readouterr().err
+
+
+def test_a_page_holds_all_that_it_shows(tmp_path: Path):
+    path = tmp_path / "a.html"
+    frames = [np.full((20, 30, 3), 40 * step, np.uint8) for step in range(5)]
+    write_video(path, frames, 12.5)
+    text = path.read_text()
+    kept = re.findall(r'^"([A-Za-z0-9+/=]+)",$', text, re.MULTILINE)
+    levels = [np.asarray(Image.open(BytesIO(base64.b64decode(each)))).mean() for each in kept]
+    assert levels == pytest.approx([0, 40, 80, 120, 160], abs=3)
+    assert "const rate = 12.5;" in text and 'width="30" height="20"' in text
+    assert "@" not in re.sub(r'"[A-Za-z0-9+/=]+"', "", text) and "http" not in text
