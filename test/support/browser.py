@@ -13,7 +13,7 @@ from pathlib import Path
 from websockets.sync.client import connect
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
-BOUND = 60.0  # [s] for anything of the browser's
+BOUND = 180.0  # [s] for anything of the browser's
 POLL = 0.05  # [s]
 OPTIONS = (
     "--headless=new", "--no-sandbox", "--disable-gpu-sandbox", "--use-angle=swiftshader",

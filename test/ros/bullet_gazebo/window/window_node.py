@@ -33,6 +33,7 @@ BALL = """<robot name="ball"><link name="ball">
 <visual><geometry><sphere radius="0.2"/></geometry>
   <material name="r"><color rgba="1 0 0 1"/></material></visual>
 <visual><geometry><mesh filename="file://{mesh}"/></geometry></visual></link></robot>"""
+NOTICES = 160  # [pixels] from above that notices may take, and give back
 STATES = "joint_state_controller"
 ODD = "<b>ö\t\"&'/x"
 
@@ -99,16 +100,21 @@ class WindowTest(unittest.TestCase):
         assert cls.window.close() == 0, cls.window.lines
 
     def view(self):
-        """Red, green and blue (3, n) of the pixels of the picture, without the panel beside it."""
+        """Red, green and blue (3, n) of the picture's pixels, without the panel beside it and notices."""
         pixels = np.asarray(Image.open(io.BytesIO(self.page.screenshot())).convert("RGB")).astype(
             int
         )
-        return pixels[:, : pixels.shape[1] * 2 // 3].reshape(-1, 3).T
+        return pixels[NOTICES:, : pixels.shape[1] * 2 // 3].reshape(-1, 3).T
 
     def red(self):
         """How many pixels are those of the ball."""
         red, green, blue = self.view()
         return int(((red > 120) & (np.maximum(green, blue) < red / 3)).sum())
+
+    def yellow(self):
+        """How many pixels are those of joints' axes."""
+        red, green, blue = self.view()
+        return int(((red > 180) & (green > 150) & (blue < 110)).sum())
 
     def test_models_come_and_go(self):
         self.page.click("Models")
@@ -164,6 +170,17 @@ class WindowTest(unittest.TestCase):
         switch = proxy("/controller_manager/switch_controller", SwitchController)
         self.assertTrue(switch([STATES], [], 2, False, 0.0).ok)
         self.page.wait_for_text(f"{STATES}: running")
+
+    def test_shapes_and_frames_on_demand(self):
+        self.page.click("World")
+        before = self.yellow()  # the pole is nearly of that colour
+        self.page.click("Joint frames")
+        wait_for(lambda: self.yellow() > before + 40, "axes of joints")
+        self.page.click("Joint frames")
+        wait_for(lambda: self.yellow() < before + 20, "picture without axes")
+        plain = self.view()
+        self.page.click("Collision shapes")
+        wait_for(lambda: (self.view() != plain).any(axis=0).sum() > 200, "collision shapes")
 
     def test_what_somebody_else_does_is_shown(self):
         self.page.click("World")

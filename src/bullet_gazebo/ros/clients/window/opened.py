@@ -1,6 +1,7 @@
 """The page, served and shown until the node is shut down."""
 
 import contextlib
+import threading
 
 import rospy
 
@@ -25,8 +26,8 @@ def show(address: Address, browser: bool) -> None:
             print(f"gzclient: {line}", flush=True)
         if not address.token:  # a program that started it may tell it on; a token is nobody else's
             rospy.set_param(TOLD, advice)
-        if browser:
-            open_browser(address)
+        if browser:  # which may stay until its user leaves it
+            threading.Thread(target=open_browser, args=(address,), daemon=True).start()
         window.run()
     finally:
         stop(server)
