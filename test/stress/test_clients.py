@@ -16,7 +16,7 @@ from ros_calls.service import ServiceClient
 
 CLIENTS = 40
 CONNECTIONS = 40  # of each, in a case
-FEW = 4  # threads, files; of the log, for one, which connects when it likes
+FEW = 10  # threads, files; of rosout, master and log, which connect when they like, and keep connections
 GROWTH = 60.0  # [MiB] at most, while they are there and afterwards
 LONGEST = 30.0  # [s] at most until the good client is answered, on a busy machine
 full = pytest.mark.stress(full=True)
