@@ -167,4 +167,5 @@ def test_pictures_and_links_are_there(path: Path) -> None:
 
 def test_pictures_are_small() -> None:
     for path in (ROOT / "docs/images").glob("workbench_*"):
-        assert path.stat().st_size < 200_000, path.name
+        most = 500_000 if path.suffix == ".gif" else 200_000
+        assert path.stat().st_size < most, path.name
