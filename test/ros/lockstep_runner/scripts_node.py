@@ -181,12 +181,11 @@ class LockstepTest(unittest.TestCase):
 
     def test_processes_that_are_forked_live_by_the_wall(self):
         script = HEAD + (
-            "import multiprocessing, os, signal\n"
+            "import multiprocessing, os\n"
             "def square(x):\n    time.sleep(0.01)\n    return x * x\n"
-            # rospy's handler of SIGTERM, which they inherit, doesn't end the pool's processes.
-            "usual = signal.SIGTERM, signal.SIG_DFL\n"
-            "with multiprocessing.Pool(2, signal.signal, usual) as pool:\n"
-            "    print(pool.map(square, range(4)))\n"
+            # Not terminated: rospy's handler of SIGTERM, which they inherit, doesn't end them.
+            "pool = multiprocessing.Pool(2)\nprint(pool.map(square, range(4)))\n"
+            "pool.close()\npool.join()\n"
             "child = os.fork()\n"
             "if not child:\n    time.sleep(0.01)\n    os._exit(3)\n"
             "before = rospy.get_time()\ntime.sleep(0.5)\nprint(round(rospy.get_time() - before, 6))\n"
