@@ -3,7 +3,7 @@
 import time
 from typing import Generic
 
-from bullet_gazebo.physics.engines.bullet.library import pybullet
+from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
 from bullet_gazebo.scratch import scratch_folder
 from robot_envs.display import hindrance
 from robot_envs.errors import RobotEnvError

@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 from bullet_gazebo.physics.description import DescriptionError, Shape
-from bullet_gazebo.physics.engines.bullet.library import pybullet
+from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
 from bullet_gazebo.physics.pose import Pose, is_finite, rotate
 from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.pictures.ground import Background, background

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 SRC = Path(__file__).resolve().parents[4] / "src"
-LIBRARY = SRC / "bullet_gazebo/physics/engines/bullet/library.py"
+LIBRARY = SRC / "bullet_gazebo/physics/engines/bullet/quiet_import.py"
 BESIDE = """
 import os, sys, threading
 sys.setswitchinterval(1e-6)
@@ -55,7 +55,7 @@ def test_what_another_thread_writes_meanwhile_comes_whole() -> None:
 
 def test_what_c_writes_meanwhile_comes_afterwards(tmp_path: Path) -> None:
     (tmp_path / "pybullet.py").write_text("import ctypes; ctypes.CDLL(None).perror(b'of C')")
-    code = f"sys.path.insert(0, {str(tmp_path)!r}); import bullet_gazebo.physics.engines.bullet.library"
+    code = f"sys.path.insert(0, {str(tmp_path)!r}); import bullet_gazebo.physics.engines.bullet.quiet_import"
     assert outcome(code).stderr.startswith("of C: ")
 
 

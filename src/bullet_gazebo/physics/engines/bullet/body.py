@@ -10,7 +10,7 @@ from bullet_gazebo.physics.engines.bullet.contacts import (
     choose_self_collisions,
     set_friction,
 )
-from bullet_gazebo.physics.engines.bullet.library import pybullet
+from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
 
 BASE = -1

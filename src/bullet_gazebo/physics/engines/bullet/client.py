@@ -15,7 +15,7 @@ from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.engine import Contact
 from bullet_gazebo.physics.engines.bullet.body import BASE, BulletBody, is_plane
 from bullet_gazebo.physics.engines.bullet.contacts import collides_with_itself, contacts
-from bullet_gazebo.physics.engines.bullet.library import pybullet
+from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
 from bullet_gazebo.physics.engines.bullet.urdf_writer import write_urdf
 from bullet_gazebo.physics.mechanics.engine_form import at_joints, parents_first
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, scale

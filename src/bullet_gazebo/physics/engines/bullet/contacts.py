@@ -5,7 +5,7 @@ from itertools import combinations
 
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription, Shape
 from bullet_gazebo.physics.engine import Contact
-from bullet_gazebo.physics.engines.bullet.library import pybullet
+from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
 from bullet_gazebo.physics.pose import scale
 
 
