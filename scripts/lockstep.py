@@ -4,8 +4,8 @@
 import sys
 
 if __name__ == "__main__":
-    try:
+    from rl_workbench.starting import ended_by_ctrl_c
+
+    with ended_by_ctrl_c():
         from lockstep_runner.launcher import main
-    except KeyboardInterrupt:  # Ctrl-C while it is still being read; main() sees to the rest
-        sys.exit(130)
     sys.exit(main())

@@ -15,7 +15,7 @@ import numpy as np
 import rostest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
-from virtual_display import VirtualDisplay, missing
+from virtual_display import missing, virtual_display
 
 BOUND = 150.0  # [s]
 ORANGE, BLUE = (lambda r, g, b: (r > b + 90) & (r > g + 40)), (lambda r, g, b: b > r + 60)
@@ -42,7 +42,7 @@ def middle(picture, colour):
 @unittest.skipIf(missing(*NEEDED), f"{missing(*NEEDED)} isn't installed: apt-get install rviz xvfb")
 class Rviz(unittest.TestCase):
     def setUp(self):
-        self.display = self.enterContext(VirtualDisplay())
+        self.display = self.enterContext(virtual_display())
         self.env = {
             **os.environ,
             "ROS_MASTER_URI": f"http://localhost:{free_port()}",

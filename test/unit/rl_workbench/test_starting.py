@@ -40,7 +40,7 @@ def test_ctrl_c(arguments: list[str], code: int, told: str) -> None:
     assert (done.returncode, done.stdout) == (code, told)
 
 
-@pytest.mark.parametrize("script", ["workbench.py", "pg_train.py", "dqn_train.py"])
+@pytest.mark.parametrize("script", ["workbench.py", "pg_train.py", "dqn_train.py", "lockstep.py"])
 def test_the_commands_start_so(script: str, root) -> None:
     """All that may take long comes after it."""
     lines = (root / "scripts" / script).read_text().splitlines()
