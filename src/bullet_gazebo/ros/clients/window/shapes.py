@@ -10,9 +10,9 @@ from bullet_gazebo_msgs.msg import SceneShape
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.elements import shown
+from bullet_gazebo.pictures.solids import GREY
 from bullet_gazebo.ros.clients.window.meshes import read_look
 
-GREY = (0.7, 0.7, 0.7, 1.0)  # Gazebo's, without a material
 COLLISION = (1.0, 0.5, 0.0, 0.35)
 UNSHOWN = (1.0, 0.0, 1.0, 1.0)  # a box in place of what can't be shown
 SMALLEST = 1e-6  # [m]; nothing is drawn of size 0
