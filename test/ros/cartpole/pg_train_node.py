@@ -157,7 +157,7 @@ class PgTrain(unittest.TestCase):
         self.assertEqual(record["hyperparameters"]["batch_episodes"], 2)
 
     def wait_for_service(self, place: Place, name: str) -> None:
-        script = f"import rospy; rospy.wait_for_service('{name}', 30)"
+        script = f"import rospy; rospy.wait_for_service('{name}', 180)"
         self.assertEqual(place.start("python3", "-c", script).end(), 0)
 
     def models(self, place: Place) -> list[str]:

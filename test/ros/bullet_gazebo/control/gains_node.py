@@ -132,7 +132,7 @@ class GainsTest(SlidesTest):
         service = f"{PID}/set_parameters"
         for _ in range(2):
             self.assertTrue(self.load("effort_position"))
-            rospy.wait_for_service(service, 5.0)
+            rospy.wait_for_service(service, 60.0)
             self.assertTrue(self.unload("effort_position"))
             with self.assertRaises(rospy.ROSException):
                 rospy.wait_for_service(service, 0.3)
