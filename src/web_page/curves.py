@@ -25,15 +25,18 @@ HEIGHT = 150  # [pixels]
 PALE, STRONG, SINGLE = "rgba(76, 114, 176, 0.45)", "#c0392b", "#2a6f97"
 
 
+Container = viser.GuiTabHandle | viser.GuiFolderHandle
+
+
 class Curves:
-    """Charts in the tab or folder that is open when this is made.
+    """Charts in a tab or folder.
 
     Args:
         gui: of the page.
-        container: that tab or folder.
+        container: the tab or folder.
     """
 
-    def __init__(self, gui: viser.GuiApi, container: viser.GuiTabHandle) -> None:
+    def __init__(self, gui: viser.GuiApi, container: Container) -> None:
         self._gui, self._container = gui, container
         self._table: GrowingTable | None = None
         with container:
@@ -117,11 +120,11 @@ class Curves:
         words = []
         if EPISODES in self._series:
             series = self._series[EPISODES]
-            words.append(f"{series.count:,} episodes, step {self._step:,.0f}".replace(",", "\u202f"))
+            words.append(f"{series.count} episodes, {self._step:.0f} steps")
             words.append(f"return {series.average:.1f} (mean of {WINDOW})")
         if problem:
             words.append(problem)
-        self._say(escape("; ".join(words)) or "no episode has ended yet")
+        self._say(escape(", ".join(words)) or "no episode has ended yet")
 
     def _say(self, text: str) -> None:
         content = f'<div style="padding: 0.4em 0.8em">{text}</div>'
