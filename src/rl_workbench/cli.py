@@ -31,6 +31,7 @@ TRAIN = "train"
 COMMANDS = {
     "eval": _Command("watching", "greedy episodes of a run: mean, deviation, every episode"),
     "enjoy": _Command("watching", "watch greedy episodes in a window"),
+    "view": _Command("viewing", "a page in the browser: curves, and episodes, also while it trains"),
     "record": _Command(
         "watching", "episodes as GIF, MP4 or a page that plays them, without a display"
     ),

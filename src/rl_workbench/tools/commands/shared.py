@@ -24,6 +24,11 @@ def add_policy_flags(parser: argparse.ArgumentParser, several: tuple[str, ...] =
     else:
         parser.add_argument("--checkpoint", choices=WHICH, default="best",
                             help="by evaluation, or the newest (default best)")  # fmt: skip
+    add_environment_flags(parser)
+
+
+def add_environment_flags(parser: argparse.ArgumentParser) -> None:
+    """Which episodes, and of which kind."""
     parser.add_argument("--seed", type=number(0), default=0, metavar="N",
                         help="of the episodes (default 0)")  # fmt: skip
     parser.add_argument("--env-kwargs", nargs="+", default=[], metavar="KEY=VALUE",

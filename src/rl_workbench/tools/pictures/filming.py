@@ -74,10 +74,10 @@ def film_episode(
         total += step.reward
         if length < due and not step.finished:
             continue
-        picture = _picture(env, size)
+        picture = take_picture(env, size)
         if captions:
             picture = _captioned(picture, _caption(title, length, total, step.action))
-        frames.append(_packed(picture))
+        frames.append(packed(picture))
         while due <= length:
             due += stride
     return Film(frames, rate / stride, length, total)
@@ -105,7 +105,12 @@ class SideBySide(Sequence[np.ndarray]):
         return np.asarray(sheet)
 
 
-def _picture(env: gymnasium.Env[Any, Any], size: Size | None) -> Image.Image:
+def take_picture(env: gymnasium.Env[Any, Any], size: Size | None = None) -> Image.Image:
+    """What the environment draws of itself, in a size [pixels] of its own or a given one.
+
+    Raises:
+        WorkbenchError: if it draws no pictures.
+    """
     try:
         drawn: Any = env.render()
     except gymnasium.error.Error as error:  # something isn't installed, or the robot isn't there
@@ -122,10 +127,11 @@ def _picture(env: gymnasium.Env[Any, Any], size: Size | None) -> Image.Image:
 def _caption(title: str, step: int, total: float, action: Any) -> str:
     told = [title] if title else []
     told += [f"step {step}", f"return {total:.1f}"]
-    return "   ".join([*told, *([] if action is None else [f"action {_short(action)}"])])
+    return "   ".join([*told, *([] if action is None else [f"action {action_text(action)}"])])
 
 
-def _short(action: Any) -> str:
+def action_text(action: Any) -> str:
+    """An action in some characters."""
     numbers = np.ravel(action)
     if np.issubdtype(numbers.dtype, np.integer):
         words = [str(number) for number in numbers[:MOST_NUMBERS]]
@@ -149,7 +155,8 @@ def _captioned(picture: Image.Image, text: str) -> Image.Image:
     return sheet
 
 
-def _packed(picture: Image.Image) -> bytes:
+def packed(picture: Image.Image) -> bytes:
+    """A picture as PNG."""
     stream = BytesIO()
     picture.convert("RGB").save(stream, "PNG", compress_level=1)
     return stream.getvalue()

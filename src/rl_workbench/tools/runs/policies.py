@@ -1,6 +1,7 @@
 """What a training learned, ready to act in an environment of its kind."""
 
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -8,6 +9,7 @@ import gymnasium
 import numpy as np
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import whole
 from rl_workbench.tools.runs.runs import Run
 from rl_workbench.training.algorithms import recorded_options
 from rl_workbench.training.options.record import CONFIG_RECORD
@@ -27,6 +29,7 @@ class LearnedPolicy(NamedTuple):
     meaning: str  # of the preference: positive is the last action, or a push to the right
     env: gymnasium.Env[Any, Any]
     checkpoint: Path
+    steps: int  # of the training that it is from
 
 
 def load_learned(
@@ -34,12 +37,14 @@ def load_learned(
     which: str = "best",
     env_options: Mapping[str, Any] | None = None,
     say: Callable[[str], None] = warn,
+    env: gymnasium.Env[Any, Any] | None = None,
 ) -> LearnedPolicy:
     """The policy of a run's best or last checkpoint, or of the one before it if that is damaged.
 
     Args:
         env_options: of the environment, on top of the training's own; such as `render_mode`.
         say: is told of what is passed over.
+        env: to act in, of this run's kind; by default one is made.
 
     Raises:
         WorkbenchError: if there is no checkpoint that can be read, it is another run's, or there
@@ -52,13 +57,20 @@ def load_learned(
         except WorkbenchError as error:
             say(f"{error}; taking an earlier one")
             continue
-        return _learned(run, path, content, env_options or {})
+        if env is not None:
+            return _learned(run, path, content, env)
+        with ExitStack() as made:
+            env = make_environment(run.env_id, {**run.env_kwargs, **(env_options or {})})
+            made.callback(env.close)
+            policy = _learned(run, path, content, env)
+            made.pop_all()
+            return policy
     reason = "none of its checkpoints can be read" if paths else "it has no checkpoint yet"
     raise WorkbenchError(f"{run.folder} has no policy: {reason}")
 
 
 def _learned(
-    run: Run, path: Path, content: dict[str, Any], env_options: Mapping[str, Any]
+    run: Run, path: Path, content: dict[str, Any], env: gymnasium.Env[Any, Any]
 ) -> LearnedPolicy:
     options = recorded_options(content.get("config"), str(path))
     recorded = recorded_options(run.config, str(run.folder / CONFIG_RECORD))
@@ -66,9 +78,6 @@ def _learned(
         recorded.check_same(content["config"], str(path))
     except WorkbenchError as error:
         raise WorkbenchError(f"{path} isn't a checkpoint of {run.folder}") from error
-    env = make_environment(run.env_id, {**run.env_kwargs, **env_options})
-    try:
-        return LearnedPolicy(*load_policy(options, content, env, str(path)), env, path)
-    except WorkbenchError:
-        env.close()
-        raise
+    with checkpoints.fitting("number of steps"):
+        steps = whole(content["steps"])
+    return LearnedPolicy(*load_policy(options, content, env, str(path)), env, path, steps)

@@ -23,6 +23,7 @@ HEADER = "step,tag,value,wall_time\n"
 EVENTS = "events.out.tfevents."
 VERSION = "brain.Event:2"  # of the file, as TensorBoard asks for in its first record
 SHOWN_AFTER = 10.0  # [s] at most until TensorBoard can see a point
+READ_AFTER = 1.0  # [s] at most until who follows the CSV can see a row, if others come
 METRICS = ("eval/mean_reward", "charts/episodic_return")  # beside the settings, under HPARAMS
 
 Point = tuple[str, float, int, float]  # tag, value, step, wall time [s]
@@ -53,6 +54,7 @@ class ScalarLog:
         if not points:
             path.write_text(HEADER, encoding="utf-8")
         self._file = path.open("a", encoding="utf-8")
+        self._given = time.monotonic()
         for old in folder.glob(f"{EVENTS}*"):
             old.unlink()
         self._events = EventFile(folder)
@@ -70,6 +72,9 @@ class ScalarLog:
         for tag, value in values.items():
             self._file.write(f"{step},{tag},{float(value)!r},{now:.3f}\n")
             self._events.add(scalar(tag, value), step, now)
+        if time.monotonic() - self._given > READ_AFTER:
+            self._given = time.monotonic()
+            self._file.flush()
 
     def sync(self) -> int:
         """Puts the CSV on disk; returns its length [bytes].

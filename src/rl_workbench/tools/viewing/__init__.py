@@ -1,0 +1,1 @@
+"""A run on a page in the browser: its curves, and episodes of its policies."""
