@@ -19,6 +19,8 @@ from robot_envs.variation import Randomisation
 if TYPE_CHECKING:
     from viser import ViserServer
 
+    from robot_envs.page import RobotOnPage
+
 Shown_contra = TypeVar("Shown_contra", bound=tuple[float, ...], contravariant=True)
 
 
@@ -183,27 +185,29 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
         """
         return self._picture(self._state) if self.render_mode == "rgb_array" else None
 
-    def draw_on(self, server: "ViserServer") -> Callable[[], None]:
+    def draw_on(self, server: "ViserServer", beside: int = 0) -> "RobotOnPage[State]":
         """Draws the robot on a page of viser's: its visuals, a ground and lights, seen as in the pictures.
 
         Needs no render mode, with any backend:
 
             server = viser.ViserServer()
-            move = env.unwrapped.draw_on(server)
+            robot = env.unwrapped.draw_on(server)
             ...  # env.reset(), env.step(action)
-            move()
+            robot()
 
         Args:
             server: the page's.
+            beside: so many robots of this kind are on the page already; it is drawn beside them.
 
         Returns:
-            Moves the robot on the page to where it is in that moment; may raise `SimulatorError`.
+            What moves the robot on the page to where it is in that moment: a function, which takes a
+            caption to show above the robot, or nothing. It may raise `SimulatorError`.
 
         Raises:
             RobotEnvError: if the robot's file can't be read.
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
         """
-        return self._picture.draw_on(server, lambda: self._state)
+        return self._picture.draw_on(server, lambda: self._state, beside)
 
     def close(self) -> None:
         """Closes the backend and the window; may be called twice."""

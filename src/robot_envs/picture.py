@@ -5,13 +5,15 @@ from typing import TYPE_CHECKING, Generic
 
 import numpy as np
 
-from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.pose import Pose, add
 from bullet_gazebo.pictures.camera import Camera
 from robot_envs.placement import Placement
 from robot_envs.robot import Robot, State
 
 if TYPE_CHECKING:
     from viser import ViserServer
+
+    from robot_envs.page import RobotOnPage
 
 __all__ = ["HEIGHT", "WIDTH", "Camera", "RobotPicture"]
 
@@ -59,28 +61,23 @@ class RobotPicture(Generic[State]):
             RobotEnvError: if the robot's file can't be read.
         """
         if self._drawn is None:
-            self._drawn = _DrawnRobot(self._place(), self._camera, self._size)
+            self._drawn = _DrawnRobot(
+                Placement(self._robot, self._raised, self._base), self._camera, self._size
+            )
         return self._drawn(state)
 
-    def draw_on(self, server: "ViserServer", state: Callable[[], State]) -> Callable[[], None]:
-        """Draws the robot on a page of viser's, on a ground, in the light of an empty world.
-
-        Args:
-            server: the page's; its camera, for who comes to it, sees the same as the pictures.
-            state: tells the robot's.
-
-        Returns:
-            Moves it to where it is in that moment.
+    def draw_on(
+        self, server: "ViserServer", state: Callable[[], State], beside: int = 0
+    ) -> "RobotOnPage[State]":
+        """Draws the robot on a page of viser's, where `state` says; see `RobotEnv.draw_on`.
 
         Raises:
             RobotEnvError: if the robot's file can't be read.
         """
-        from robot_envs.page import draw_robot
+        from robot_envs.page import RobotOnPage
 
-        return draw_robot(server, self._place(), self._camera, self._size[0] / self._size[1], state)
-
-    def _place(self) -> Placement[State]:
-        return Placement(self._robot, self._raised, self._base)
+        placement = Placement(self._robot, self._raised, self._base)
+        return RobotOnPage(server, placement, state, self._camera, self._size, beside)
 
     def close(self) -> None:
         """Frees what it has loaded; may be called twice."""
@@ -105,4 +102,5 @@ class _DrawnRobot(Generic[State]):
     def __call__(self, state: State) -> np.ndarray:
         base = self._placement.base()
         self.scene.place("robot", self._placement.links(state, base))
-        return self.scene.picture(self._placement.following(self._camera, base), *self._size)
+        target = add(self._camera.target, self._placement.strayed(base))
+        return self.scene.picture(self._camera.at(target), *self._size)

@@ -10,7 +10,7 @@ import numpy as np
 from bullet_gazebo.physics.description import DescriptionError, Joint
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.mechanics.kinematics import link_poses
-from bullet_gazebo.physics.pose import Pose, add, subtract
+from bullet_gazebo.physics.pose import Pose, Vector, add, subtract
 from bullet_gazebo.pictures.camera import Camera, overview
 from bullet_gazebo.pictures.solids import box_around, moved, solid_of, visible_shapes
 from robot_envs.errors import RobotEnvError
@@ -53,15 +53,8 @@ class Placement(Generic[State]):
         """The frame of every link in the world, for a state and where the root link stands."""
         return link_poses(self.description, base, dict(zip(self._joints, state[::2], strict=True)))
 
-    def camera(self, camera: Camera | None, aspect: float) -> Camera:
-        """A camera that sees all that the joints can reach; or `camera`, raised with the robot.
-
-        Args:
-            camera: for the robot on the ground.
-            aspect: of the pictures, width to height.
-        """
-        if camera is not None:
-            return replace(camera, target=add(camera.target, (0.0, 0.0, self._raised)))
+    def reach(self) -> np.ndarray:
+        """Corners of boxes around all that the joints can reach from the start [m]: (n, 3)."""
         reached = [{}, *({joint.name: place} for joint, place in self._places())]
         poses = [link_poses(self.description, self._start, each) for each in reached]
         corners = [
@@ -69,11 +62,22 @@ class Placement(Generic[State]):
             for link, pose, box in self._boxes()
             for each in poses
         ]
-        return overview(np.concatenate([np.zeros((0, 3)), *corners]), aspect)
+        return np.concatenate([np.zeros((0, 3)), *corners])
 
-    def following(self, camera: Camera, base: Pose) -> Camera:
-        """The camera for a robot whose root link stands elsewhere than at the start."""
-        return camera.at(add(camera.target, subtract(base.position, self._start.position)))
+    def camera(self, camera: Camera | None, aspect: float) -> Camera:
+        """A camera that sees all that the joints can reach; or `camera`, raised with the robot.
+
+        Args:
+            camera: for the robot on the ground.
+            aspect: of the pictures, width to height.
+        """
+        if camera is None:
+            return overview(self.reach(), aspect)
+        return replace(camera, target=add(camera.target, (0.0, 0.0, self._raised)))
+
+    def strayed(self, base: Pose) -> Vector:
+        """How far the root link has come from where it starts [m]."""
+        return subtract(base.position, self._start.position)
 
     def _boxes(self) -> Iterator[tuple[str, Pose, np.ndarray]]:
         """Link, pose in it, and box around each shape that can be drawn."""

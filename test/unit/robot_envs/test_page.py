@@ -61,13 +61,36 @@ def test_the_page_is_seen_as_the_pictures_are(server, tmp_path):
     assert math.degrees(page.fov) == pytest.approx(30.0)
 
 
-def test_a_robot_that_drives_away_is_where_its_base_is(server, tmp_path):
+def test_the_world_goes_by_a_robot_that_drives_away(server, tmp_path):
+    """So whoever looks at it goes on looking at it."""
     place = [Pose((0.0, 0.0, 0.1))]
     picture = RobotPicture(rover_robot(tmp_path), base=lambda: place[0])
-    move = picture.draw_on(server, lambda: RoverState(0.0, 0.0))
+    robot = picture.draw_on(server, lambda: RoverState(0.0, 0.0))
     recording = server.get_scene_serializer()
     place[0] = Pose((7.0, -2.0, 0.1))
-    move()
+    robot()
     nodes = Recording(recording.serialize()).at()
     away = [n for n in nodes.values() if n.get("position") == pytest.approx([7.0, -2.0, 0.1])]
-    assert len(away) == 2  # hull and mast
+    assert len(away) == 2  # hull and mast, in the world
+    assert nodes["/world"]["position"] == pytest.approx([-7.0, 2.0, -0.1])
+
+
+def test_several_stand_beside_each_other_with_captions_and_are_all_seen(server, tmp_path):
+    picture = RobotPicture(rover_robot(tmp_path), camera=Camera(distance=1.0, yaw=0.0))
+    robots = [
+        picture.draw_on(server, lambda lean=lean: RoverState(lean, 0.0), number)
+        for number, lean in enumerate((0.0, 0.3, -0.3))
+    ]
+    for count, robot in enumerate(robots):
+        robot(f"the {count}. one")
+    robots[2]()  # keeps its caption
+    nodes = Recording(server.get_scene_serializer().serialize()).at()
+    assert [n["text"] for n in shapes(nodes, "LabelMessage")] == [
+        "the 0. one", "the 1. one", "the 2. one"
+    ]  # fmt: skip
+    apart = [nodes[f"/world/{number}"]["position"] for number in range(3)]
+    assert apart[2][0] == pytest.approx(2.0 * apart[1][0]) and apart[1][0] > 0.4
+    assert len(shapes(nodes, "GridMessage")) == 1
+    assert server.initial_camera.look_at[0] == pytest.approx(apart[1][0], abs=0.1)
+    seen = server.initial_camera.position[1]
+    assert seen < -1.5 * apart[1][0]  # far enough away for all of them

@@ -39,10 +39,14 @@ class Picture:
     Args:
         server: of the page.
         warn: is told what can't be shown, in one line.
+        below: the node below which the models are.
     """
 
-    def __init__(self, server: viser.ViserServer, warn: Callable[[str], None]) -> None:
+    def __init__(
+        self, server: viser.ViserServer, warn: Callable[[str], None], below: str = ""
+    ) -> None:
         self._server = server
+        self._below = below
         self._shapes = ShapeMaker(server.scene, warn)
         self.models: dict[int, DrawnModel] = {}  # in the scene's order
         self._lights: list[viser.SceneNodeHandle] = []
@@ -83,7 +87,7 @@ class Picture:
         frames = []
         for index, link in enumerate(model.links):
             # Names may hold anything, so nodes are named by numbers.
-            node = f"/m{model.number}_{index}_{self._drawings}"
+            node = f"{self._below}/m{model.number}_{index}_{self._drawings}"
             frames.append(self._server.scene.add_frame(node, show_axes=False))
             where = f"model '{shown(model.name)}', link '{shown(link.name)}'"
             for count, shape in enumerate(link.visuals):
