@@ -11,10 +11,11 @@ from collections.abc import Sequence
 
 import rospy
 
-from bullet_gazebo.ros.clients.window.address import LOOPBACK, PortInUse, find_address
 from bullet_gazebo.ros.wire.rospy_patches.node import stop_hearing_clock
 from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
 from ros_calls.requirements import WINDOW, lack
+from web_page.address import PortInUse, find_address
+from web_page.flags import add_flags
 
 NAME = "gazebo_gui"
 
@@ -50,19 +51,7 @@ def parse_args(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="gzclient", description="The simulator's window: a page in the browser."
     )
-    parser.add_argument(
-        "--port", type=int, help="of the page (default: the first free one from 8080 on)"
-    )
-    parser.add_argument(
-        "--host", default=LOOPBACK,
-        help="the address to serve on (default: %(default)s, this machine only); on any other one the page's "
-        "address holds a token, without which nobody gets in",
-    )  # fmt: skip
-    parser.add_argument(
-        "--no-browser",
-        action="store_true",
-        help="don't open the page here, where there is a display",
-    )
+    add_flags(parser)
     options, ignored = parser.parse_known_args(list(arguments))
     options.ignored = ignored
     return options

@@ -1,1 +1,1 @@
-"""The simulator's window: a page that this process serves to a browser. Only here is viser imported."""
+"""The simulator's window: a page that this process serves to a browser."""

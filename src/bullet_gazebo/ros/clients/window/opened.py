@@ -5,10 +5,12 @@ import threading
 
 import rospy
 
-from bullet_gazebo.ros.clients.window.address import Address
-from bullet_gazebo.ros.clients.window.page import open_browser, serve, stop
 from bullet_gazebo.ros.clients.window.window import Window
+from web_page.address import Address
+from web_page.server import open_browser, serve, stop
 
+TITLE = "gzclient"
+CAMERA, LOOK_AT = (1.4, -1.9, 1.1), (0.0, 0.0, 0.35)  # [m]
 TOLD = "~window"  # parameter: the lines that tell where the page is
 
 
@@ -18,18 +20,22 @@ def show(address: Address, browser: bool) -> None:
     Raises:
         PortInUse: somebody else was quicker.
     """
-    server = serve(address)
+    server = serve(address, TITLE, CAMERA, LOOK_AT)
     try:
         window = Window(server)
-        advice = address.advice()
+        advice = address.advice("the window", "moves the simulation")
         for line in advice:
             print(f"gzclient: {line}", flush=True)
         if not address.token:  # a program that started it may tell it on; a token is nobody else's
             rospy.set_param(TOLD, advice)
         if browser:  # which may stay until its user leaves it
-            threading.Thread(target=open_browser, args=(address,), daemon=True).start()
+            threading.Thread(target=open_browser, args=(address, _warn), daemon=True).start()
         window.run()
     finally:
         stop(server)
         with contextlib.suppress(KeyError, OSError, rospy.ROSException):  # a master that is gone
             rospy.delete_param(TOLD)
+
+
+def _warn(text: str) -> None:
+    rospy.logwarn("gazebo_gui: %s", text)

@@ -1,4 +1,4 @@
-"""Where the window's page is, and who gets in."""
+"""Where a page is, and who gets in."""
 
 import socket
 
@@ -6,10 +6,11 @@ import pytest
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from bullet_gazebo.ros.clients.window.address import Address, PortInUse, find_address
-from bullet_gazebo.ros.clients.window.gate import Gate
+from web_page.address import Address, PortInUse, find_address
+from web_page.gate import Gate
 
 TOKEN = "a-token"
+WINDOW = ("the window", "moves the simulation")
 
 
 @pytest.fixture
@@ -56,18 +57,18 @@ def test_a_free_port_is_found():
 def test_this_machine_needs_no_token_and_no_display(monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    told = "\n".join(Address("127.0.0.1", 8081).advice())
+    told = "\n".join(Address("127.0.0.1", 8081).advice(*WINDOW))
     assert "http://127.0.0.1:8081/" in told
     assert "ssh -N -L 8081:127.0.0.1:8081" in told
     monkeypatch.setenv("DISPLAY", ":0")
-    assert "ssh" not in "\n".join(Address("127.0.0.1", 8081).advice())
+    assert "ssh" not in "\n".join(Address("127.0.0.1", 8081).advice(*WINDOW))
 
 
 def test_other_machines_need_a_token_and_that_is_said():
     found = find_address("0.0.0.0", 0)
     assert len(found.token) > 16
     assert found.url.endswith(f"/?token={found.token}")
-    assert "whoever has this address" in "\n".join(found.advice())
+    assert "whoever has this address" in "\n".join(found.advice(*WINDOW))
     assert found.token not in repr(found)
 
 
@@ -92,7 +93,7 @@ def test_without_the_token_nobody_gets_in():
     for path in ("/", "/?token=", "/?token=b", "/?token=ä", f"/?x={TOKEN}"):
         assert ask(gate, path, host=host).status_code == 403
         assert ask(gate, path, host=host, upgrade="websocket").status_code == 403
-    for cookie in ("", "gzclient_8080=b", f"gzclient_8081={TOKEN}", "=;="):
+    for cookie in ("", "web_page_8080=b", f"web_page_8081={TOKEN}", "=;="):
         assert ask(gate, host=host, cookie=cookie).status_code == 403
     answer = ask(gate, f"/?token={TOKEN}", host=host)
     assert answer.status_code == 200

@@ -1,30 +1,34 @@
-"""The server of the page: viser, quiet, with a gate in front, and without its tunnel to the internet."""
+"""The server of a page: viser, quiet, with a gate in front, and without its tunnel to the internet."""
 
 import contextlib
 import io
 import webbrowser
+from collections.abc import Callable
 
-import rospy
 import viser
 from viser import _messages as messages
 
-from bullet_gazebo.ros.clients.window.address import Address, PortInUse, has_display
-from bullet_gazebo.ros.clients.window.gate import Gate
+from web_page.address import Address, PortInUse, has_display
+from web_page.gate import Gate
 
-TITLE = "gzclient"
-CAMERA = (1.4, -1.9, 1.1)  # [m]
-LOOK_AT = (0.0, 0.0, 0.35)  # [m]
+Point = tuple[float, float, float]  # [m]
 
 
-def serve(address: Address) -> viser.ViserServer:
+def serve(address: Address, title: str, camera: Point, look_at: Point) -> viser.ViserServer:
     """Starts the server in threads of its own.
+
+    Args:
+        address: from `find_address`.
+        title: of the page.
+        camera: where those who open it look from.
+        look_at: what they look at.
 
     Raises:
         PortInUse: somebody else was quicker.
     """
     # viser tells where it listens in a box of its own.
     with Gate(address).before_viser(), contextlib.redirect_stdout(io.StringIO()):
-        server = viser.ViserServer(address.host, address.port, label=TITLE, verbose=False)
+        server = viser.ViserServer(address.host, address.port, label=title, verbose=False)
     if server.get_port() != address.port:
         stop(server)
         raise PortInUse(
@@ -35,8 +39,8 @@ def serve(address: Address) -> viser.ViserServer:
     server.gui.configure_theme(
         control_layout="fixed", control_width="medium", show_logo=False, show_share_button=False
     )
-    server.initial_camera.position = CAMERA
-    server.initial_camera.look_at = LOOK_AT
+    server.initial_camera.position = camera
+    server.initial_camera.look_at = look_at
     return server
 
 
@@ -46,8 +50,12 @@ def stop(server: viser.ViserServer) -> None:
         server.stop()
 
 
-def open_browser(address: Address) -> None:
-    """Opens the page in this machine's browser, if there are a display and a browser."""
+def open_browser(address: Address, warn: Callable[[str], None]) -> None:
+    """Opens the page in this machine's browser, if there is a display.
+
+    Args:
+        warn: is told where there is one and no browser.
+    """
     if not has_display():
         return
     try:
@@ -55,4 +63,4 @@ def open_browser(address: Address) -> None:
     except webbrowser.Error:
         opened = False
     if not opened:
-        rospy.logwarn("No browser could be opened here: open %s in one", address.url)
+        warn(f"no browser could be opened here: open {address.url} in one")

@@ -16,7 +16,7 @@ import websockets.asyncio.server
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from bullet_gazebo.ros.clients.window.address import Address, is_loopback
+from web_page.address import Address, is_loopback
 
 Answer = Callable[[Any, Request], Response | None]
 
@@ -26,7 +26,7 @@ class Gate:
 
     def __init__(self, address: Address) -> None:
         self._token = address.token
-        self._cookie = f"gzclient_{address.port}"
+        self._cookie = f"web_page_{address.port}"
 
     def refusal(self, request: Request) -> str:
         """Returns why the request is refused; empty where it isn't."""

@@ -34,13 +34,18 @@ class Address:
             host = socket.gethostname()
         return f"http://{host}:{self.port}/" + (f"?token={self.token}" if self.token else "")
 
-    def advice(self) -> list[str]:
-        """Returns the lines that tell where the page is, and how to get there from elsewhere."""
-        lines = [f"the window is the page {self.url}"]
+    def advice(self, what: str, power: str) -> list[str]:
+        """Returns the lines that tell where the page is, and how to get there from elsewhere.
+
+        Args:
+            what: it is, as "the window".
+            power: that it gives to whoever opens it, as "moves the simulation".
+        """
+        lines = [f"{what} is the page {self.url}"]
         if self.token:
             lines.append(
                 f"it is served on {self.host}, to whoever has this address: it goes unencrypted "
-                "over the network, and moves the simulation"
+                f"over the network, and {power}"
             )
         elif not has_display():
             here = f"{getpass.getuser()}@{socket.gethostname()}"
