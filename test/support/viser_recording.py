@@ -1,7 +1,15 @@
 """What a recording of viser's holds, read back."""
 
+import base64
+import re
+
 import msgspec
 import zstandard
+
+
+def of_page(text):
+    """The recording that an HTML file plays."""
+    return Recording(base64.b64decode(re.search(r'__VISER_EMBED_DATA__="([^"]*)"', text)[1]))
 
 
 class Recording:
