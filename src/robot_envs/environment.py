@@ -1,7 +1,7 @@
 """The Gymnasium environment: it hands commands to a robot and lets the task judge the state."""
 
 from collections.abc import Callable
-from typing import Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import gymnasium
 import numpy as np
@@ -15,6 +15,11 @@ from robot_envs.robot import State
 from robot_envs.sensing import Sensor
 from robot_envs.task import Task
 from robot_envs.variation import Randomisation
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+    from robot_envs.page import RobotOnPage
 
 Shown_contra = TypeVar("Shown_contra", bound=tuple[float, ...], contravariant=True)
 
@@ -179,6 +184,30 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
         """
         return self._picture(self._state) if self.render_mode == "rgb_array" else None
+
+    def draw_on(self, server: "ViserServer", beside: int = 0) -> "RobotOnPage[State]":
+        """Draws the robot on a page of viser's: its visuals, a ground and lights, seen as in the pictures.
+
+        Needs no render mode, with any backend:
+
+            server = viser.ViserServer()
+            robot = env.unwrapped.draw_on(server)
+            ...  # env.reset(), env.step(action)
+            robot()
+
+        Args:
+            server: the page's.
+            beside: so many robots of this kind are on the page already; it is drawn beside them.
+
+        Returns:
+            What moves the robot on the page to where it is in that moment: a function, which takes a
+            caption to show above the robot, or nothing. It may raise `SimulatorError`.
+
+        Raises:
+            RobotEnvError: if the robot's file can't be read.
+            SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
+        """
+        return self._picture.draw_on(server, lambda: self._state, beside)
 
     def close(self) -> None:
         """Closes the backend and the window; may be called twice."""

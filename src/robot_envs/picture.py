@@ -1,26 +1,24 @@
 """Pictures of a robot from its state: the same for every backend, and without a display."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
-from math import pi
-from typing import Generic
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Generic
 
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError, Joint
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.mechanics.kinematics import link_poses
-from bullet_gazebo.physics.pose import Pose, add, subtract
-from bullet_gazebo.pictures.camera import Camera, overview
-from bullet_gazebo.pictures.solids import visible_shapes
-from robot_envs.errors import RobotEnvError
+from bullet_gazebo.physics.pose import Pose, add
+from bullet_gazebo.pictures.camera import Camera
+from robot_envs.placement import Placement
 from robot_envs.robot import Robot, State
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+    from robot_envs.page import RobotOnPage
 
 __all__ = ["HEIGHT", "WIDTH", "Camera", "RobotPicture"]
 
 WIDTH, HEIGHT = 640, 320  # [pixels], by default
 LARGEST = 4096  # [pixels]
-QUARTERS = (0.0, pi / 2.0, pi, -pi / 2.0)  # [rad] of a joint without stops
 
 
 class RobotPicture(Generic[State]):
@@ -63,9 +61,23 @@ class RobotPicture(Generic[State]):
             RobotEnvError: if the robot's file can't be read.
         """
         if self._drawn is None:
-            self._drawn = _DrawnRobot(self._robot, self._raised, self._base)
-            self._drawn.aim(self._camera, self._size)
-        return self._drawn(state, self._size)
+            self._drawn = _DrawnRobot(
+                Placement(self._robot, self._raised, self._base), self._camera, self._size
+            )
+        return self._drawn(state)
+
+    def draw_on(
+        self, server: "ViserServer", state: Callable[[], State], beside: int = 0
+    ) -> "RobotOnPage[State]":
+        """Draws the robot on a page of viser's, where `state` says; see `RobotEnv.draw_on`.
+
+        Raises:
+            RobotEnvError: if the robot's file can't be read.
+        """
+        from robot_envs.page import RobotOnPage
+
+        placement = Placement(self._robot, self._raised, self._base)
+        return RobotOnPage(server, placement, state, self._camera, self._size, beside)
 
     def close(self) -> None:
         """Frees what it has loaded; may be called twice."""
@@ -77,44 +89,18 @@ class RobotPicture(Generic[State]):
 class _DrawnRobot(Generic[State]):
     """A robot in a scene, and a camera."""
 
-    def __init__(self, robot: Robot[State], raised: float, base: Callable[[], Pose] | None) -> None:
+    def __init__(
+        self, placement: Placement[State], camera: Camera | None, size: tuple[int, int]
+    ) -> None:
         from bullet_gazebo.pictures.scene import Scene  # loads PyBullet: when it is asked for
 
-        self._joints, self._raised = robot.joints, raised
-        try:
-            self._description = parse_urdf(robot.urdf())
-        except DescriptionError as error:
-            raise RobotEnvError(f"the robot '{robot.model}': {error}") from error
-        self._start = Pose((0.0, 0.0, raised)).compose(self._description.root_pose)
-        self._base = None if self._description.fixed_base else base
+        self._placement, self._size = placement, size
+        self._camera = placement.camera(camera, size[0] / size[1])
         self.scene = Scene()
-        self.scene.add("robot", visible_shapes(self._description))
+        self.scene.add("robot", placement.shapes)
 
-    def aim(self, camera: Camera | None, size: tuple[int, int]) -> None:
-        """Chooses what is seen: all that the joints can reach, one at a time, or what `camera` says."""
-        if camera is None:
-            corners = [self._corners({})]
-            for joint in self._description.movable_joints:
-                corners += [self._corners({joint.name: place}) for place in _places(joint)]
-            camera = overview(np.concatenate(corners), size[0] / size[1])
-        else:
-            camera = replace(camera, target=add(camera.target, (0.0, 0.0, self._raised)))
-        self._camera, self._offset = camera, subtract(camera.target, self._start.position)
-
-    def _corners(self, positions: dict[str, float]) -> np.ndarray:
-        self.scene.place("robot", link_poses(self._description, self._start, positions))
-        return self.scene.corners("robot")
-
-    def __call__(self, state: State, size: tuple[int, int]) -> np.ndarray:
-        base = self._start if self._base is None else self._base()
-        positions = dict(zip(self._joints, state[::2], strict=True))
-        self.scene.place("robot", link_poses(self._description, base, positions))
-        return self.scene.picture(self._camera.at(add(base.position, self._offset)), *size)
-
-
-def _places(joint: Joint) -> Iterator[float]:
-    """Some of where a joint can be [rad, m]: its stops, or all the way round."""
-    if joint.bounded and joint.upper - joint.lower < 2.0 * pi:
-        yield from (joint.lower, joint.upper)
-    elif joint.kind != "prismatic":
-        yield from QUARTERS
+    def __call__(self, state: State) -> np.ndarray:
+        base = self._placement.base()
+        self.scene.place("robot", self._placement.links(state, base))
+        target = add(self._camera.target, self._placement.strayed(base))
+        return self.scene.picture(self._camera.at(target), *self._size)

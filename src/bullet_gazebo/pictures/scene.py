@@ -13,10 +13,10 @@ from PIL import Image
 
 from bullet_gazebo.physics.description import DescriptionError, Shape
 from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
-from bullet_gazebo.physics.pose import Pose, is_finite, rotate
+from bullet_gazebo.physics.pose import Pose, is_finite
 from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.pictures.ground import Background, background
-from bullet_gazebo.pictures.solids import GREY, Solid, solid_of
+from bullet_gazebo.pictures.solids import GREY, Solid, box_around, moved, solid_of
 
 FINER = 2  # pixels of the renderer across one of the picture: smooth edges
 MOST_CORNERS = 90_000  # of a body: PyBullet refuses more than 131072
@@ -127,8 +127,7 @@ class _Part:
     def __init__(self, client: int, link: str, shape: Shape, solid: Solid) -> None:
         self.link = link
         self._client, self._pose = client, shape.pose
-        low, high = solid.corners.min(axis=0), solid.corners.max(axis=0)
-        self._box = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+        self._box = box_around(solid)
         visual = pybullet.createVisualShape(
             pybullet.GEOM_MESH,
             vertices=solid.corners.tolist(),
@@ -151,9 +150,7 @@ class _Part:
 
     def corners(self) -> np.ndarray:
         """Corners of a box around it, in the world [m]: (8, 3)."""
-        turn = self._seen.orientation
-        axes = [rotate(turn, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
-        return np.asarray(self._box @ np.array(axes) + self._seen.position)
+        return moved(self._box, self._seen)
 
     def remove(self) -> None:
         pybullet.removeBody(self._body, physicsClientId=self._client)

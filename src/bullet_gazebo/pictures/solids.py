@@ -8,6 +8,7 @@ import numpy as np
 
 from bullet_gazebo.physics.description import Color, ModelDescription, Shape
 from bullet_gazebo.physics.meshes.reader import read_mesh
+from bullet_gazebo.physics.pose import Pose, rotate
 
 GREY: Color = (0.7, 0.7, 0.72, 1.0)  # of a shape that has no colour
 SIDES = 40  # of a cylinder
@@ -53,6 +54,21 @@ def solid_of(shape: Shape) -> Solid:
     ball = creation.icosphere(subdivisions=ROUNDS, radius=shape.size[0])
     corners = ball.vertices[ball.faces].reshape(-1, 3)
     return Solid(corners, corners / shape.size[0])
+
+
+def box_around(solid: Solid) -> np.ndarray:
+    """Corners of the box around a solid, in its frame [m]: (8, 3)."""
+    low, high = solid.corners.min(axis=0), solid.corners.max(axis=0)
+    return np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+
+
+def moved(points: np.ndarray, pose: Pose) -> np.ndarray:
+    """Points (n, 3) of a frame, in the one that its pose is given in."""
+    axes = [
+        rotate(pose.orientation, axis)
+        for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    ]
+    return np.asarray(points @ np.array(axes) + pose.position)
 
 
 def _box(size: tuple[float, ...]) -> np.ndarray:

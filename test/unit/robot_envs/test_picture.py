@@ -2,11 +2,11 @@
 
 import dataclasses
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 from pendulum import PENDULUM, PendulumState
+from rover import RoverState, rover_robot
 
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
@@ -14,31 +14,10 @@ from robot_envs.errors import RobotEnvError
 from robot_envs.picture import RobotPicture
 from robot_envs.robot import Robot
 
-ROVER = """<robot name="rover"><link name="hull">
-  <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
-  <visual><geometry><box size="0.4 0.2 0.1"/></geometry>
-    <material name="red"><color rgba="1 0 0 1"/></material></visual></link>
-  <link name="mast">
-  <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
-  <visual><origin xyz="0 0 0.2"/><geometry><box size="0.05 0.05 0.4"/></geometry>
-    <material name="green"><color rgba="0 1 0 1"/></material></visual></link>
-  <joint name="neck" type="revolute"><parent link="hull"/><child link="mast"/><axis xyz="0 1 0"/>
-    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-</robot>"""
-
-
-class RoverState(NamedTuple):
-    """One joint."""
-
-    neck: float  # [rad]
-    rate: float  # [rad/s]
-
 
 @pytest.fixture
 def rover(tmp_path: Path) -> Robot[RoverState]:
-    path = tmp_path / "rover.urdf"
-    path.write_text(ROVER)
-    return Robot("rover", RoverState, ("neck",), (), (), lambda: path, lambda: path)
+    return rover_robot(tmp_path)
 
 
 def where(picture: np.ndarray, channel: int) -> np.ndarray:

@@ -1,51 +1,40 @@
-"""Descriptions and lights as the messages of a scene."""
+"""What is seen of models, and lights, as the messages of a scene and back."""
 
 from bullet_gazebo_msgs.msg import SceneJoint, SceneLight, SceneLink, SceneModel, SceneShape
 from geometry_msgs.msg import Vector3
 from std_msgs.msg import ColorRGBA
 
-from bullet_gazebo.physics.description import Light, Shape
+from bullet_gazebo.physics.description import Color, Light, Shape
 from bullet_gazebo.physics.model import Model
-from bullet_gazebo.ros.wire.conversions import to_pose_msg
+from bullet_gazebo.pictures.page.seen import SeenJoint, SeenLink, SeenModel, seen_model
+from bullet_gazebo.ros.wire.conversions import from_pose_msg, to_pose_msg, to_vector
 
 
 def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
     """Returns all that the model consists of, its `collisions` where they are asked for."""
     description = model.description
-    names = model.link_names
-    links = []
-    for name in names:
-        link = description.links[name]
-        # A plane is read as a collision only, and the ground is to be seen.
-        planes = [shape for shape in link.collisions if shape.kind == "plane"]
-        others = [shape for shape in link.collisions if shape.kind != "plane"]
-        links.append(
-            SceneLink(
-                name,
-                [_to_shape(shape) for shape in (*link.visuals, *planes)],
-                [_to_shape(shape) for shape in others if collisions],
-            )
-        )
-    joints = [
-        SceneJoint(
-            name=joint.name,
-            kind=joint.kind,
-            child=joint.child,
-            frame=to_pose_msg(joint.anchor),
-            axis=Vector3(*joint.axis),
-            lower=joint.lower if joint.bounded else 1.0,
-            upper=joint.upper if joint.bounded else 0.0,
-        )
-        for joint in (description.joints[name] for name in model.joint_names)
-    ]
+    seen = seen_model(
+        description, number, model.name, model.link_names, model.joint_names, collisions
+    )
     return SceneModel(
         number=number,
         name=model.name,
         is_static=description.static,
-        links=links,
-        joints=joints,
-        root=names.index(description.root) if description.root in names else 0,
-        frame=to_pose_msg(description.root_pose.inverse()),
+        links=[_to_link(link) for link in seen.links],
+        joints=[_to_joint(joint) for joint in seen.joints],
+        root=seen.root,
+        frame=to_pose_msg(seen.frame),
+    )
+
+
+def from_model(message: SceneModel) -> SeenModel:
+    return SeenModel(
+        message.number,
+        message.name,
+        [_from_link(link) for link in message.links],
+        [_from_joint(joint) for joint in message.joints],
+        message.root,
+        from_pose_msg(message.frame),
     )
 
 
@@ -59,6 +48,56 @@ def to_light(light: Light) -> SceneLight:
     )
 
 
+def from_light(message: SceneLight) -> Light:
+    return Light(
+        message.name,
+        diffuse=_from_color(message.diffuse),
+        direction=to_vector(message.direction),
+        pose=from_pose_msg(message.pose),
+        kind=message.kind,
+    )
+
+
+def _to_link(link: SeenLink) -> SceneLink:
+    return SceneLink(
+        link.name,
+        [_to_shape(shape) for shape in link.visuals],
+        [_to_shape(shape) for shape in link.collisions],
+    )
+
+
+def _from_link(message: SceneLink) -> SeenLink:
+    return SeenLink(
+        message.name,
+        [_from_shape(shape) for shape in message.visuals],
+        [_from_shape(shape) for shape in message.collisions],
+    )
+
+
+def _to_joint(joint: SeenJoint) -> SceneJoint:
+    return SceneJoint(
+        name=joint.name,
+        kind=joint.kind,
+        child=joint.child,
+        frame=to_pose_msg(joint.frame),
+        axis=Vector3(*joint.axis),
+        lower=joint.lower,
+        upper=joint.upper,
+    )
+
+
+def _from_joint(message: SceneJoint) -> SeenJoint:
+    return SeenJoint(
+        message.name,
+        message.kind,
+        message.child,
+        from_pose_msg(message.frame),
+        to_vector(message.axis),
+        message.lower,
+        message.upper,
+    )
+
+
 def _to_shape(shape: Shape) -> SceneShape:
     return SceneShape(
         name=shape.name,
@@ -69,3 +108,18 @@ def _to_shape(shape: Shape) -> SceneShape:
         has_color=shape.rgba is not None,
         color=ColorRGBA(*(shape.rgba or (0.0, 0.0, 0.0, 0.0))),
     )
+
+
+def _from_shape(message: SceneShape) -> Shape:
+    return Shape(
+        message.kind,
+        tuple(message.size),
+        from_pose_msg(message.pose),
+        message.mesh,
+        _from_color(message.color) if message.has_color else None,
+        message.name,
+    )
+
+
+def _from_color(message: ColorRGBA) -> Color:
+    return (message.r, message.g, message.b, message.a)

@@ -1,9 +1,11 @@
 """eval, enjoy and record: a run's policy at work."""
 
 import argparse
+import contextlib
 import json
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +13,14 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.commands.shared import add_policy_flags, env_options, number
 from rl_workbench.tools.pictures import videos
 from rl_workbench.tools.pictures.filming import (
-    Act,
-    Film,
+    Player,
+    Recorded,
     SideBySide,
     Size,
     film_episode,
     size_options,
 )
+from rl_workbench.tools.pictures.scenes import is_scene, record_scene
 from rl_workbench.tools.runs import episodes
 from rl_workbench.tools.runs.policies import WHICH, LearnedPolicy, load_learned
 from rl_workbench.tools.runs.runs import Run, open_run, threshold
@@ -124,30 +127,56 @@ def _record(arguments: argparse.Namespace, run: Run) -> None:
         raise WorkbenchError(f"--fps: a GIF has {videos.FASTEST:g} frames a second at most")
     check_writable(out)
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # or pygame would look for a screen
-    several = len(arguments.checkpoint) > 1
-    films = []
-    for which in arguments.checkpoint:
-        films.append(_film(arguments, run, which, fastest, which if several else ""))
-        told = f"{which}: " if several else ""
-        tell(f"{told}return {films[-1].total_reward:.2f} in {films[-1].length} steps")
-    frames = SideBySide(films)
-    videos.write_video(out, frames, films[0].rate)
-    tell(f"{out}: {len(frames)} frames, {len(frames) / films[0].rate:.1f} s")
+    with contextlib.ExitStack() as stack:
+        players = []
+        for which in arguments.checkpoint:
+            players.append(_player(arguments, run, which))
+            stack.callback(players[-1].env.close)
+        as_scene = out.suffix.lower() == ".html" and is_scene(players[0].env)
+        write = _write_scene if as_scene else _write_film
+        ends, frames, seconds = write(arguments, players, fastest)
+    for player, end in zip(players, ends, strict=True):
+        told = f"{player.title}: " if player.title else ""
+        tell(f"{told}return {end.total_reward:.2f} in {end.length} steps")
+    tell(f"{out}: {frames} frames, {seconds:.1f} s")
 
 
-def _film(arguments: argparse.Namespace, run: Run, which: str, fastest: float, title: str) -> Film:
+def _player(arguments: argparse.Namespace, run: Run, which: str) -> Player:
     options = {"render_mode": "rgb_array", **size_options(run.env_id, arguments.size)}
-    if which == RANDOM:
-        env = make_environment(run.env_id, {**run.env_kwargs, **env_options(arguments), **options})
-        env.action_space.seed(arguments.seed)
-        act: Act = lambda _: env.action_space.sample()  # noqa: E731
-    else:
+    title = which if len(arguments.checkpoint) > 1 else ""
+    if which != RANDOM:
         policy = _policy(arguments, run, which, **options)
-        env, act = policy.env, policy.act
-    try:
-        return film_episode(
-            env, act, episodes.TEST_SEED + arguments.seed, fastest, longest=arguments.max_steps,
-            size=arguments.size, title=title, captions=not arguments.no_captions,
+        return Player(title, policy.env, policy.act)
+    env = make_environment(run.env_id, {**run.env_kwargs, **env_options(arguments), **options})
+    env.action_space.seed(arguments.seed)
+    return Player(title, env, lambda _: env.action_space.sample())
+
+
+def _write_film(
+    arguments: argparse.Namespace, players: Sequence[Player], fastest: float
+) -> Recorded:
+    films = [
+        film_episode(
+            player,
+            episodes.TEST_SEED + arguments.seed,
+            fastest,
+            longest=arguments.max_steps,
+            size=arguments.size,
+            captions=not arguments.no_captions,
         )  # fmt: skip
-    finally:
-        env.close()
+        for player in players
+    ]
+    frames = SideBySide(films)
+    videos.write_video(arguments.out, frames, films[0].rate)
+    return Recorded([film.end for film in films], len(frames), len(frames) / films[0].rate)
+
+
+def _write_scene(
+    arguments: argparse.Namespace, players: Sequence[Player], fastest: float
+) -> Recorded:
+    if arguments.size:
+        raise WorkbenchError("--size: a recording in 3-D is as large as the browser's window")
+    return record_scene(
+        arguments.out, players, episodes.TEST_SEED + arguments.seed, fastest,
+        longest=arguments.max_steps, captions=not arguments.no_captions,
+    )  # fmt: skip

@@ -1,7 +1,7 @@
 """Episodes as they are seen: what a video is made of; needs no display."""
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
 from typing import Any, NamedTuple
 
@@ -23,13 +23,36 @@ LINES = 14.0  # of text that would fit into a picture's height
 MOST_NUMBERS = 3  # of an action that has many
 
 
+class Player(NamedTuple):
+    """A policy in its environment."""
+
+    title: str  # that captions begin with
+    env: gymnasium.Env[Any, Any]
+    act: Act
+
+
+class Shot(NamedTuple):
+    """A moment of an episode."""
+
+    caption: str
+    length: int  # [steps]
+    total_reward: float
+
+
 class Film(NamedTuple):
     """An episode that was seen. Frames are PNG: thousands of them are kept."""
 
     frames: list[bytes]
     rate: float  # [Hz] of the frames, in simulated time
-    length: int  # [steps]
-    total_reward: float
+    end: Shot
+
+
+class Recorded(NamedTuple):
+    """What a file shows: the last moment of each episode, and so many frames in that time [s]."""
+
+    ends: list[Shot]
+    frames: int
+    seconds: float
 
 
 def size_options(env_id: str, size: Size | None) -> dict[str, int]:
@@ -46,14 +69,12 @@ def size_options(env_id: str, size: Size | None) -> dict[str, int]:
 
 
 def film_episode(
-    env: gymnasium.Env[Any, Any],
-    act: Act,
+    player: Player,
     seed: int,
     fastest: float,
     *,
     longest: int = 0,
     size: Size | None = None,
-    title: str = "",
     captions: bool = True,
 ) -> Film:
     """Plays one episode and keeps every frame that a video of at most `fastest` [Hz] shows.
@@ -61,26 +82,41 @@ def film_episode(
     Args:
         longest: number of steps after which it is cut off; 0: never.
         size: of the pictures [pixels]; by default as they are drawn.
-        title: what captions begin with.
         captions: tell step, return and action below the pictures.
 
     Raises:
         WorkbenchError: if the environment draws no pictures.
     """
+    rate, stride = frame_rate(player.env, fastest)
+    frames = []
+    for shot in shots(player, seed, stride, longest):
+        picture = take_picture(player.env, size)
+        frames.append(packed(_captioned(picture, shot.caption) if captions else picture))
+    return Film(frames, rate, shot)
+
+
+def frame_rate(env: gymnasium.Env[Any, Any], fastest: float) -> tuple[float, float]:
+    """Frames a second [Hz] of a video of at most `fastest` [Hz], and steps from one frame to the next."""
     rate = float(env.metadata.get("render_fps") or DEFAULT_RATE)
-    stride = max(1.0, rate / fastest)  # steps from one frame to the next
-    frames, total, due = [], 0.0, 0.0
-    for length, step in enumerate(episode_steps(env, act, seed, longest)):
+    stride = max(1.0, rate / fastest)
+    return rate / stride, stride
+
+
+def shots(player: Player, seed: int, stride: float, longest: int = 0) -> Iterator[Shot]:
+    """Plays one episode; stops wherever a video has a frame, at the end in any case.
+
+    Args:
+        stride: steps from one frame to the next, on average.
+        longest: number of steps after which it is cut off; 0: never.
+    """
+    total, due = 0.0, 0.0
+    for length, step in enumerate(episode_steps(player.env, player.act, seed, longest)):
         total += step.reward
         if length < due and not step.finished:
             continue
-        picture = take_picture(env, size)
-        if captions:
-            picture = _captioned(picture, _caption(title, length, total, step.action))
-        frames.append(packed(picture))
+        yield Shot(_caption(player.title, length, total, step.action), length, total)
         while due <= length:
             due += stride
-    return Film(frames, rate / stride, length, total)
 
 
 class SideBySide(Sequence[np.ndarray]):

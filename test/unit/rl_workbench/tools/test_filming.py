@@ -44,9 +44,9 @@ class Counter(gymnasium.Env):
         return np.full((60, 400, 3), 10 * self._step, np.uint8)
 
 
-def film(length: int, fastest: float, **options) -> filming.Film:
-    act = lambda _: np.zeros(4, np.float32)  # noqa: E731
-    return filming.film_episode(Counter(length), act, 0, fastest, **options)
+def film(length: int, fastest: float, title: str = "", **options) -> filming.Film:
+    player = filming.Player(title, Counter(length), lambda _: np.zeros(4, np.float32))
+    return filming.film_episode(player, 0, fastest, **options)
 
 
 def brightness(films: list[filming.Film]) -> list[int]:
@@ -65,11 +65,11 @@ def brightness(films: list[filming.Film]) -> list[int]:
 def test_frames_come_at_the_rate_that_was_asked_for(fastest, rate, steps):
     made = film(8, fastest, captions=False)
     assert brightness([made]) == steps
-    assert (made.rate, made.length, made.total_reward) == (rate, 8, 4.0)
+    assert (made.rate, *made.end[1:]) == (rate, 8, 4.0)
 
 
 def test_an_episode_is_cut_off_where_one_wants():
-    assert film(8, RATE, longest=3).length == 3
+    assert film(8, RATE, longest=3).end.length == 3
 
 
 def test_episodes_side_by_side_wait_for_the_longest():
@@ -125,7 +125,7 @@ def test_an_environment_that_draws_nothing_is_refused():
             return None
 
     with pytest.raises(WorkbenchError, match="draws no pictures"):
-        filming.film_episode(Blind(), lambda _: np.zeros(4), 0, RATE)
+        filming.film_episode(filming.Player("", Blind(), lambda _: np.zeros(4)), 0, RATE)
 
 
 @pytest.fixture(scope="module")

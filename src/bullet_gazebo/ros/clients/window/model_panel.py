@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import viser
-from bullet_gazebo_msgs.msg import SceneJoint
 
 from bullet_gazebo.physics.elements import shown
+from bullet_gazebo.pictures.page.picture import DrawnModel
+from bullet_gazebo.pictures.page.seen import SeenJoint
 from bullet_gazebo.ros.clients.window.commands import Commands
 from bullet_gazebo.ros.clients.window.controllers import Controllers
-from bullet_gazebo.ros.clients.window.picture import DrawnModel
 from bullet_gazebo.ros.clients.window.time_panel import Attempt
 from ros_calls.service import ServiceFailed
 
@@ -55,7 +55,7 @@ class ModelPanel:
 
     def set_models(self, models: Sequence[DrawnModel]) -> None:
         """Shows other models than before."""
-        self._models = {each.message.name: each for each in models}
+        self._models = {each.seen.name: each for each in models}
         names = [NONE, *self._models]
         if list(self._choice.options) != names:
             kept = self._choice.value
@@ -68,7 +68,7 @@ class ModelPanel:
         """Makes sliders for the chosen model, where they aren't there already."""
         self._before = None
         model = self._models.get(self._choice.value)
-        joints = list(model.message.joints)[:MOST_SLIDERS] if model is not None else []
+        joints = list(model.seen.joints)[:MOST_SLIDERS] if model is not None else []
         self._joints.visible = bool(joints)
         for slider in self._sliders.values():
             slider.remove()
@@ -77,7 +77,7 @@ class ModelPanel:
             for joint in joints:
                 self._sliders[joint.name] = self._slider(joint)
 
-    def _slider(self, joint: SceneJoint) -> viser.GuiSliderHandle[float]:
+    def _slider(self, joint: SeenJoint) -> viser.GuiSliderHandle[float]:
         low, high = _range(joint)
         slider = self._server.gui.add_slider(
             shown(joint.name), low, high, (high - low) / PARTS, min(max(0.0, low), high),
@@ -103,7 +103,7 @@ class ModelPanel:
             raise ServiceFailed(
                 f"no running controller takes positions of {joint}; pause the world to place it"
             )
-        names = [each.name for each in self._models[model].message.joints]
+        names = [each.name for each in self._models[model].seen.joints]
         positions = dict(zip(names, self._positions.get(model, []), strict=False))
         self._controllers.command(holder, joint, positions | {joint: position})
 
@@ -140,10 +140,10 @@ class ModelPanel:
     def follow(self, links: dict[str, np.ndarray]) -> None:
         """Moves all cameras along with the chosen model."""
         model = self._models.get(self._choice.value)
-        if not self._follow.value or model is None or model.message.name not in links:
+        if not self._follow.value or model is None or model.seen.name not in links:
             self._before = None
             return
-        place = np.array(model.pose(links[model.message.name]).position)
+        place = np.array(model.pose(links[model.seen.name]).position)
         if self._before is not None and np.isfinite(place).all():
             way = place - self._before
             if np.abs(way).max() > 1e-6:
@@ -154,7 +154,7 @@ class ModelPanel:
         self._before = place
 
 
-def _range(joint: SceneJoint) -> tuple[float, float]:
+def _range(joint: SeenJoint) -> tuple[float, float]:
     """The slider's ends [rad, m]: the joint's stops, or what suits its kind."""
     reach = REACH.get(joint.kind, 1.0)
     if joint.lower >= joint.upper:

@@ -6,19 +6,21 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import rosgraph
 import rospy
 import viser
 from bullet_gazebo_msgs.msg import SceneContacts, ScenePoses
 from PIL import Image
 
+from bullet_gazebo.pictures.page.picture import NUMBERS, Picture
 from bullet_gazebo.ros.clients.window.commands import Commands
 from bullet_gazebo.ros.clients.window.controllers import Controllers
 from bullet_gazebo.ros.clients.window.model_panel import ModelPanel
-from bullet_gazebo.ros.clients.window.picture import Picture
 from bullet_gazebo.ros.clients.window.remote_scene import RemoteScene
 from bullet_gazebo.ros.clients.window.time_panel import TimePanel
 from bullet_gazebo.ros.clients.world_client import ControlFailed
+from bullet_gazebo.ros.scene.scene_messages import from_light, from_model
 from ros_calls.service import ServiceFailed
 
 WAIT = 0.5  # [s] for a message, before the rest is looked after
@@ -34,7 +36,7 @@ class Window:
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._scene = RemoteScene()
-        self._picture = Picture(server)
+        self._picture = Picture(server, rospy.logwarn)
         self._version: int | None = None  # that is drawn
         self._redraw = threading.Event()  # all of it, otherwise than before
         self._newest: ScenePoses | None = None
@@ -81,7 +83,7 @@ class Window:
             try:
                 if poses is not None:
                     self._show(poses)
-                self._picture.touch(contacts if self._contacts.value else NOTHING)
+                self._touch(contacts if self._contacts.value else NOTHING)
                 self._look_after(self._show_texts, OFTEN)
                 self._look_after(self._show_rest, SELDOM)
             except (ServiceFailed, rosgraph.MasterException, OSError) as fault:
@@ -94,13 +96,22 @@ class Window:
             self._version = None
         if poses.version != self._version:
             scene = self._scene.get(list(self._picture.models), self._collisions.value)
-            self._picture.draw(scene, self._joint_frames.value)
+            self._picture.draw(
+                [from_model(each) for each in scene.models],
+                [from_light(each) for each in scene.lights],
+                self._joint_frames.value,
+            )
             self._models.set_models(list(self._picture.models.values()))
             self._version = scene.version
         if poses.version == self._version:
             self._newest = poses
-            self._picture.move(poses)
+            self._picture.move(np.array(poses.poses, dtype=float).reshape(-1, NUMBERS))
             self._models.follow(self._picture.links)
+
+    def _touch(self, message: SceneContacts | None) -> None:
+        """Shows contact points; None leaves what is shown."""
+        if message is not None:
+            self._picture.touch(np.array(message.points).reshape(-1, 3))
 
     def _look_after(self, show: Callable[[], None], period: float) -> None:
         now = time.monotonic()
@@ -114,7 +125,7 @@ class Window:
         elif self._newest is not None:
             now = self._newest.now.to_sec()
             self._time.show(now, self._scene.real_time_factor, self._newest.paused)
-            self._models.show(self._picture.links, self._picture.joints(self._newest))
+            self._models.show(self._picture.links, self._picture.joints(self._newest.positions))
 
     def _show_rest(self) -> None:
         if self._scene.is_heard:

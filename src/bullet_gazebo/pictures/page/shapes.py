@@ -1,17 +1,16 @@
 """A visual or collision as an object of the page."""
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import rospy
 import viser
-from bullet_gazebo_msgs.msg import SceneShape
 
-from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.description import DescriptionError, Shape
 from bullet_gazebo.physics.elements import shown
+from bullet_gazebo.pictures.looks import read_look
 from bullet_gazebo.pictures.solids import GREY
-from bullet_gazebo.ros.clients.window.meshes import read_look
 
 COLLISION = (1.0, 0.5, 0.0, 0.35)
 UNSHOWN = (1.0, 0.0, 1.0, 1.0)  # a box in place of what can't be shown
@@ -19,32 +18,33 @@ SMALLEST = 1e-6  # [m]; nothing is drawn of size 0
 BOX = 0.1  # [m] of an unshown mesh
 
 
-def wxyz(orientation: np.ndarray) -> np.ndarray:
-    """Returns a quaternion in viser's order, from ROS's x y z w."""
+def wxyz(orientation: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Returns a quaternion in viser's order, from x y z w."""
     return np.asarray(orientation)[[3, 0, 1, 2]]
 
 
 class ShapeMaker:
-    """Draws shapes. What a file can't show is told once."""
+    """Draws shapes. What a file can't show is told once.
 
-    def __init__(self, scene: viser.SceneApi) -> None:
+    Args:
+        scene: of the page.
+        warn: is told what can't be shown, in one line.
+    """
+
+    def __init__(self, scene: viser.SceneApi, warn: Callable[[str], None]) -> None:
         self._scene = scene
+        self._warn = warn
         self._complained: set[str] = set()
 
-    def add(self, name: str, shape: SceneShape, where: str, collision: bool) -> None:
+    def add(self, name: str, shape: Shape, where: str, collision: bool) -> None:
         """Adds the shape as node `name`; `where` is it, for the log."""
-        color = shape.color
-        rgba = (color.r, color.g, color.b, color.a) if shape.has_color else GREY
-        if collision:
-            rgba = COLLISION
-        pose = shape.pose
-        q = pose.orientation
+        rgba = COLLISION if collision else shape.rgba or GREY
         place: dict[str, Any] = {
-            "position": (pose.position.x, pose.position.y, pose.position.z),
-            "wxyz": (q.w, q.x, q.y, q.z),
+            "position": shape.pose.position,
+            "wxyz": wxyz(shape.pose.orientation),
         }
         look: dict[str, Any] = {
-            "color": _bytes(rgba),
+            "color": color_bytes(rgba),
             "opacity": _opacity(rgba),
             "cast_shadow": not collision,
         }
@@ -72,7 +72,7 @@ class ShapeMaker:
     def _add_mesh(
         self,
         name: str,
-        shape: SceneShape,
+        shape: Shape,
         where: str,
         collision: bool,
         look: dict[str, Any],
@@ -83,7 +83,8 @@ class ShapeMaker:
         except (DescriptionError, OSError) as error:
             self._add_unshown(name, f"{where}: {error}", place)
             return
-        scale = tuple(shape.size) if len(shape.size) == 3 else (1.0, 1.0, 1.0)
+        x, y, z = shape.size if len(shape.size) == 3 else (1.0, 1.0, 1.0)
+        scale = x, y, z
         if mesh.glb is not None and not collision:
             self._scene.add_glb(name, mesh.glb, scale=scale, **place)
             return
@@ -96,11 +97,11 @@ class ShapeMaker:
     def _add_unshown(self, name: str, complaint: str, place: dict[str, Any]) -> None:
         if complaint not in self._complained:
             self._complained.add(complaint)
-            rospy.logwarn("The window shows a box instead of %s", complaint)
-        self._scene.add_box(name, _bytes(UNSHOWN), (BOX, BOX, BOX), **place)
+            self._warn(f"The page shows a box instead of {complaint}")
+        self._scene.add_box(name, color_bytes(UNSHOWN), (BOX, BOX, BOX), **place)
 
 
-def _bytes(rgba: tuple[float, ...]) -> tuple[int, int, int]:
+def color_bytes(rgba: tuple[float, ...]) -> tuple[int, int, int]:
     """Red, green and blue as the page takes them; what isn't a colour becomes the next one that is."""
     red, green, blue = (
         round(255.0 * min(max(each, 0.0), 1.0)) if math.isfinite(each) else 0 for each in rgba[:3]

@@ -1,0 +1,131 @@
+"""A robot on a page of viser's: as the simulator's window shows it, without a simulator."""
+
+import logging
+from collections import defaultdict
+from collections.abc import Callable
+from typing import Generic
+
+import numpy as np
+import viser
+
+from bullet_gazebo.physics.description import Shape
+from bullet_gazebo.physics.files.world_file import empty_world
+from bullet_gazebo.physics.pose import IDENTITY, ZERO
+from bullet_gazebo.pictures.camera import Camera, overview
+from bullet_gazebo.pictures.page.picture import Picture
+from bullet_gazebo.pictures.page.seen import SeenLink, SeenModel, seen_model
+from robot_envs.placement import Placement
+from robot_envs.robot import State
+
+WORLD = "/world"  # node
+GAP = 0.15  # between robots, as a share of what one of them can reach
+CAPTION_GAP = 0.04  # above it, as a share of the camera's distance
+
+logger = logging.getLogger(__name__)
+
+
+class RobotOnPage(Generic[State]):
+    """A robot, and for the first one of a page a ground, lights, and where the page is seen from.
+
+    The first one stays where it is on the page, and the world goes by: so all cameras follow it, wherever
+    somebody has turned them to, and those of a recording, too.
+
+    Args:
+        server: of the page.
+        placement: of the robot.
+        state: tells the robot's.
+        camera: where pictures of it are taken from.
+        size: of these pictures [pixels].
+        beside: so many robots of its kind are on the page already.
+
+    Raises:
+        SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        placement: Placement[State],
+        state: Callable[[], State],
+        camera: Camera | None,
+        size: tuple[int, int],
+        beside: int,
+    ) -> None:
+        self._server, self._placement, self._state = server, placement, state
+        self._is_first, self._node = not beside, f"{WORLD}/{beside}"
+        self._caption: viser.LabelHandle | None = None
+        reach, aspect = placement.reach(), size[0] / size[1]
+        looking = placement.camera(camera, aspect)
+        across = reach @ looking.axes[0]
+        width = (1.0 + GAP) * float(np.ptp(across)) if len(reach) else 0.0
+        aside = width * looking.axes[0]
+        if beside:
+            row = [reach + number * aside for number in range(beside + 1)]
+            looking = overview(np.concatenate(row), aspect, looking)
+        _look(server.initial_camera, looking)
+        top = reach[:, 2].max(initial=0.0) + CAPTION_GAP * looking.distance
+        self._above = (*(reach.mean(axis=0)[:2] if len(reach) else (0.0, 0.0)), top)
+        scene = server.scene
+        if self._is_first:
+            self._world = scene.add_frame(WORLD, show_axes=False)
+            _draw_ground(server)
+        scene.add_frame(self._node, show_axes=False, position=beside * aside)
+        self._seen = _seen(placement)
+        self._picture = Picture(server, logger.warning, below=self._node)
+        self._picture.draw([self._seen], [])
+        self()
+
+    def __call__(self, caption: str = "") -> None:
+        """Moves it to where it is now.
+
+        Args:
+            caption: a line of text above it; empty: the one that is there stays.
+
+        Raises:
+            SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
+        """
+        base = self._placement.base()
+        poses = self._placement.links(self._state(), base)
+        rows = [
+            [*poses[link.name].position, *poses[link.name].orientation] for link in self._seen.links
+        ]
+        with self._server.atomic():
+            self._picture.move(np.array(rows))
+            if self._is_first:
+                self._world.position = -np.array(self._placement.strayed(base))
+            if caption:
+                self._tell(caption)
+
+    def _tell(self, caption: str) -> None:
+        if self._caption is None:
+            self._caption = self._server.scene.add_label(
+                f"{self._node}/caption", caption, position=self._above, anchor="bottom-center"
+            )
+        elif caption != self._caption.text:
+            self._caption.text = caption
+
+
+def _draw_ground(server: viser.ViserServer) -> None:
+    world = empty_world()
+    seen = [
+        seen_model(model, number, name, list(model.links), [], collisions=False)
+        for number, (name, model) in enumerate(world.models.items())
+    ]
+    ground = Picture(server, logger.warning, below=WORLD)
+    ground.draw(seen, world.lights.values())
+    ground.move(np.array([(*ZERO, *IDENTITY)] * sum(len(model.links) for model in seen)))
+
+
+def _seen(placement: Placement[State]) -> SeenModel:
+    shapes: dict[str, list[Shape]] = defaultdict(list)
+    for link, shape in placement.shapes:
+        shapes[link].append(shape)
+    return SeenModel(
+        0, placement.name, [SeenLink(name, shapes[name]) for name in placement.description.links]
+    )
+
+
+def _look(page: viser.InitialCameraConfig, camera: Camera) -> None:
+    x, y, z = camera.eye.tolist()
+    page.position, page.look_at = (x, y, z), camera.target
+    page.fov = float(np.radians(camera.view))

@@ -1,0 +1,51 @@
+"""What a recording of viser's holds, read back."""
+
+import base64
+import re
+
+import msgspec
+import zstandard
+
+
+def of_page(text):
+    """The recording that an HTML file plays."""
+    return Recording(base64.b64decode(re.search(r'__VISER_EMBED_DATA__="([^"]*)"', text)[1]))
+
+
+class Recording:
+    """Messages with their times [s], and the nodes that they leave."""
+
+    def __init__(self, content):
+        whole = zstandard.ZstdDecompressor().decompress(content[8:])
+        length = int.from_bytes(whole[:8], "little")
+        found = msgspec.msgpack.decode(whole[8 : 8 + length])
+        self.duration = found["durationSeconds"]  # [s]
+        self.messages = found["messages"]
+
+    def of(self, kind):
+        """The messages of a type, without their times."""
+        return [message for _, message in self.messages if message["type"] == kind]
+
+    def at(self, time=float("inf")):
+        """Nodes by name as they are at a time [s]: their props, position and wxyz."""
+        nodes = {}
+        for when, message in self.messages:
+            if when > time:
+                break
+            kind, name = message["type"], message.get("name")
+            if "props" in message:
+                nodes[name] = {"kind": kind, "position": [0.0] * 3, "wxyz": [1.0, 0.0, 0.0, 0.0]}
+                nodes[name] |= message["props"]
+            elif kind == "RemoveSceneNodeMessage":
+                nodes = {
+                    each: node
+                    for each, node in nodes.items()
+                    if each != name and not each.startswith(f"{name}/")
+                }
+            elif kind in ("SetPositionMessage", "SetOrientationMessage"):
+                nodes.setdefault(name, {}).update(
+                    {key: message[key] for key in ("position", "wxyz") if key in message}
+                )
+            elif kind == "SceneNodeUpdateMessage":
+                nodes[name].update(message["updates"])
+        return nodes

@@ -1,0 +1,71 @@
+"""Episodes of robots in 3-D: what the file holds. That a browser plays it: test/ros/bullet_gazebo/window."""
+
+from pathlib import Path
+
+import pytest
+import viser_recording
+import workbench_runs
+
+import cartpole  # noqa: F401 - registers the environments
+from rl_workbench import cli
+
+pytestmark = pytest.mark.usefixtures("signals")
+LARGEST = 1_000_000  # [bytes]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "robot"
+    workbench_runs.dqn(folder, env_id="cartpole/Classic-v0", total_timesteps=200)
+    return folder
+
+
+def record(run: Path, out: Path, *words: str) -> int:
+    return cli.main(["record", str(run), "--out", str(out), "--max-steps", "12", *words])
+
+
+def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(run: Path, tmp_path: Path, capsys):
+    out = tmp_path / "a.html"
+    assert record(run, out) == 0
+    steps = int(capsys.readouterr().out.split(" steps")[0].split()[-1])
+    text = out.read_text()
+    assert len(text) < LARGEST
+    assert 'src="http' not in text and 'href="http' not in text
+    found = viser_recording.of_page(text)
+    frames = len({time for time, _ in found.messages})
+    assert frames == pytest.approx(steps / 5, abs=1.1)  # 125 steps a second, 25 frames
+    assert found.duration == pytest.approx(1.0 + (frames - 1) / 25)
+    labels = {when: found.at(when)["/world/0/caption"]["text"] for when in (0.0, found.duration)}
+    assert labels[0.0].startswith("step 0   return 0.0")
+    assert labels[found.duration].startswith(f"step {steps}   return {steps:.1f}   action ")
+    before, after = found.at(0.0), found.at()
+    assert any(before[name]["wxyz"] != after[name]["wxyz"] for name in before if "m0" in name)
+
+
+def test_several_are_seen_beside_each_other(run: Path, tmp_path: Path, capsys):
+    out = tmp_path / "a.html"
+    assert record(run, out, "--checkpoint", "best", "last", "random", "--fps", "10") == 0
+    told = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
+    nodes = viser_recording.of_page(out.read_text()).at()
+    captions = [nodes[f"/world/{number}/caption"]["text"] for number in range(3)]
+    assert [each.split()[0] for each in captions] == ["best", "last", "random"]
+
+
+def test_captions_may_be_left_out(run: Path, tmp_path: Path):
+    out = tmp_path / "a.html"
+    assert record(run, out, "--no-captions") == 0
+    assert "/world/0/caption" not in viser_recording.of_page(out.read_text()).at()
+
+
+def test_a_size_is_refused_where_it_has_none(run: Path, tmp_path: Path, capsys):
+    assert record(run, tmp_path / "a.html", "--size", "64x48") == 1
+    assert "as large as the browser's window" in capsys.readouterr().err
+
+
+def test_what_is_no_robot_of_ours_is_played_as_pictures(tmp_path: Path):
+    folder = tmp_path / "classic"
+    workbench_runs.dqn(folder, env_id="CartPole-v1", total_timesteps=200)
+    out = tmp_path / "a.html"
+    assert record(folder, out, "--size", "64x48") == 0
+    assert 'width="64"' in out.read_text()

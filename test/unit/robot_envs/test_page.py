@@ -1,0 +1,96 @@
+"""A robot's environment on a page of viser's."""
+
+import math
+
+import gymnasium
+import pytest
+import viser
+from rover import RoverState, rover_robot
+from viser_recording import Recording
+
+import cartpole  # noqa: F401 - registers its environments
+from bullet_gazebo.physics.pose import Pose
+from robot_envs.picture import Camera, RobotPicture
+
+
+@pytest.fixture
+def server():
+    server = viser.ViserServer("127.0.0.1", 0, verbose=False)
+    yield server
+    server.stop()
+
+
+def shapes(nodes, kind):
+    return [node for node in nodes.values() if node.get("kind") == kind]
+
+
+def test_the_cart_pole_stands_on_the_page_and_follows_the_environment(server):
+    env = gymnasium.make("cartpole/SwingUp-v0", noise=0.0)
+    observation, _ = env.reset(seed=0)
+    move = env.unwrapped.draw_on(server)
+    recording = server.get_scene_serializer()
+    for _ in range(15):
+        observation, *_ = env.step([1.0])
+    recording.insert_sleep(1.0)
+    move()
+    env.close()
+    found = Recording(recording.serialize())
+    nodes, before = found.at(), found.at(0.5)
+    assert len(shapes(nodes, "BoxMessage")) > 3  # rails, posts, cart
+    (ground,) = shapes(nodes, "GridMessage")
+    assert ground["infinite_grid"]
+    assert shapes(nodes, "DirectionalLightMessage")
+    turned = [
+        name for name in nodes if name in before and nodes[name]["wxyz"] != before[name]["wxyz"]
+    ]
+    (pole,) = [name for name in turned if nodes[name]["kind"] == "FrameMessage"]
+    x, _, z = nodes[pole]["position"]
+    assert x == pytest.approx(float(observation[0]), abs=1e-5)
+    assert z > 0.5  # the robot of this task stands on a height
+    w, _, y, _ = nodes[pole]["wxyz"]
+    assert (-2.0 * w * y, w * w - y * y) == pytest.approx(tuple(observation[2:4]), abs=1e-5)
+
+
+def test_the_page_is_seen_as_the_pictures_are(server, tmp_path):
+    camera = Camera(target=(0.0, 0.0, 0.1), distance=2.0, yaw=0.0, pitch=0.0, view=30.0)
+    picture = RobotPicture(rover_robot(tmp_path), camera=camera, raised=0.5)
+    picture.draw_on(server, lambda: RoverState(0.0, 0.0))
+    page = server.initial_camera
+    assert page.position.tolist() == pytest.approx([0.0, -2.0, 0.6])
+    assert page.look_at.tolist() == pytest.approx([0.0, 0.0, 0.6])
+    assert math.degrees(page.fov) == pytest.approx(30.0)
+
+
+def test_the_world_goes_by_a_robot_that_drives_away(server, tmp_path):
+    """So whoever looks at it goes on looking at it."""
+    place = [Pose((0.0, 0.0, 0.1))]
+    picture = RobotPicture(rover_robot(tmp_path), base=lambda: place[0])
+    robot = picture.draw_on(server, lambda: RoverState(0.0, 0.0))
+    recording = server.get_scene_serializer()
+    place[0] = Pose((7.0, -2.0, 0.1))
+    robot()
+    nodes = Recording(recording.serialize()).at()
+    away = [n for n in nodes.values() if n.get("position") == pytest.approx([7.0, -2.0, 0.1])]
+    assert len(away) == 2  # hull and mast, in the world
+    assert nodes["/world"]["position"] == pytest.approx([-7.0, 2.0, -0.1])
+
+
+def test_several_stand_beside_each_other_with_captions_and_are_all_seen(server, tmp_path):
+    picture = RobotPicture(rover_robot(tmp_path), camera=Camera(distance=1.0, yaw=0.0))
+    robots = [
+        picture.draw_on(server, lambda lean=lean: RoverState(lean, 0.0), number)
+        for number, lean in enumerate((0.0, 0.3, -0.3))
+    ]
+    for count, robot in enumerate(robots):
+        robot(f"the {count}. one")
+    robots[2]()  # keeps its caption
+    nodes = Recording(server.get_scene_serializer().serialize()).at()
+    assert [n["text"] for n in shapes(nodes, "LabelMessage")] == [
+        "the 0. one", "the 1. one", "the 2. one"
+    ]  # fmt: skip
+    apart = [nodes[f"/world/{number}"]["position"] for number in range(3)]
+    assert apart[2][0] == pytest.approx(2.0 * apart[1][0]) and apart[1][0] > 0.4
+    assert len(shapes(nodes, "GridMessage")) == 1
+    assert server.initial_camera.look_at[0] == pytest.approx(apart[1][0], abs=0.1)
+    seen = server.initial_camera.position[1]
+    assert seen < -1.5 * apart[1][0]  # far enough away for all of them
