@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """The client helpers against the stand-in, in the order in which a user calls them."""
 
+import sys
 import time
 import unittest
+from pathlib import Path
 
 import rosgraph
 import rospy
@@ -10,6 +12,9 @@ import rostest
 from sensor_msgs.msg import JointState
 
 from ros_utils import ros_controllers, ros_gazebo, ros_node, ros_params, ros_spawn
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+from subscribed import wait_until_heard
 
 CONTROLLERS = ["joint_state_controller", "stand_cart_position_controller"]
 
@@ -66,10 +71,9 @@ class Gazebo(unittest.TestCase):
         self.assertTrue(ros_gazebo.gazebo_reset_sim())
         joints = (["stand_cart", "cart_pole"], [0.1, 0.2])
         heard = []
-        listener = rospy.Subscriber("/joint_states", JointState, heard.append)
+        rospy.Subscriber("/joint_states", JointState, heard.append)
         deadline = time.monotonic() + 60.0
-        while not listener.get_num_connections() and time.monotonic() < deadline:
-            time.sleep(0.02)
+        self.assertTrue(wait_until_heard("/joint_states"))
         self.assertTrue(ros_gazebo.gazebo_set_model_configuration("cartpole", *joints))
         while not heard and time.monotonic() < deadline:
             time.sleep(0.02)

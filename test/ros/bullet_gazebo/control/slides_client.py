@@ -1,7 +1,9 @@
 """The robot `slides` in a lock-step world, as a client of its controller manager sees it."""
 
+import sys
 import threading
 import unittest
+from pathlib import Path
 
 import rospy
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
@@ -14,6 +16,9 @@ from controller_manager_msgs.srv import (
 )
 from gazebo_msgs.srv import DeleteModel, SpawnModel, SpawnModelRequest
 from std_srvs.srv import Empty
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
+from subscribed import wait_until_heard
 
 BOUND = 60.0  # [s of wall time]
 STRICT = 2
@@ -39,10 +44,9 @@ class Topic:
 
     def __init__(self, name, kind):
         self.messages = []
-        self._subscriber = rospy.Subscriber(
-            rospy.names.ns_join("/slides", name), kind, self.messages.append
-        )
-        assert wait_until(lambda: self._subscriber.get_num_connections() > 0), name
+        topic = rospy.names.ns_join("/slides", name)
+        self._subscriber = rospy.Subscriber(topic, kind, self.messages.append)
+        assert wait_until_heard(topic), name
 
     def wait_for(self, condition):
         return wait_until(lambda: condition(self.messages))

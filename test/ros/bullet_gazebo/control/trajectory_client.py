@@ -1,5 +1,8 @@
 """A client of a trajectory controller, as MoveIt, rqt and rostopic are; waits are in wall time."""
 
+import sys
+from pathlib import Path
+
 import actionlib
 import rospy
 from actionlib import CommState
@@ -11,6 +14,9 @@ from control_msgs.msg import (
 )
 from controller_client import wait_until
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
+from subscribed import is_heard
 
 NAMES = {value: name for name, value in vars(GoalStatus).items() if name.isupper()}
 
@@ -82,7 +88,7 @@ class Arm:
             lambda: (
                 self.action.wait_for_server(rospy.Duration(1e-9))
                 and self.command.get_num_connections()
-                and self._state.get_num_connections()
+                and is_heard(self._state.name)
             )
         )
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import unittest
+from pathlib import Path
 
 import rospy
 import rostest
@@ -20,6 +21,9 @@ from gazebo_msgs.srv import (
 )
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
+from subscribed import wait_until_heard
 
 BOUND = 60.0  # [s of wall time]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"
@@ -90,10 +94,7 @@ class MujocoTest(unittest.TestCase):
         listener = rospy.Subscriber(
             "/joint_states", JointState, lambda m: m.position == (0.2, 0.5) and moved.set()
         )
-        for _ in range(1000):
-            if listener.get_num_connections():
-                break
-            moved.wait(0.01)
+        self.assertTrue(wait_until_heard("/joint_states"))
         place = call("/gazebo/set_model_configuration", SetModelConfiguration, "cartpole",
                      "robot_description", ["stand_cart", "cart_pole"], [0.7, 0.2])  # fmt: skip
         self.assertTrue(place.success)

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """Gazebo's services and topics as a client sees them (docs/contract/gazebo.md 1 and 2), over real ROS."""
 
+import sys
 import threading
 import unittest
 from itertools import pairwise
+from pathlib import Path
 
 import rospy
 import rostest
@@ -29,6 +31,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
+from subscribed import wait_until_heard
+
 BOUND = 60.0  # [s of wall time]
 STRICT = 2
 CONTROLLERS = ["joint_state_controller", "stand_cart_position_controller"]
@@ -46,6 +51,7 @@ class Listener:
 
     def __init__(self, topic, kind):
         self.messages = []
+        self._topic = topic
         self._news = threading.Condition()
         self._subscriber = rospy.Subscriber(topic, kind, self._receive)
 
@@ -59,7 +65,7 @@ class Listener:
             return self._news.wait_for(lambda: condition(self.messages), bound)
 
     def wait_connected(self):
-        return wait_until(lambda: self._subscriber.get_num_connections() > 0)
+        return wait_until_heard(self._topic)
 
     def close(self):
         self._subscriber.unregister()

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Services that tell, change and place joints, and the resets: over real ROS."""
 
+import sys
 import threading
+from pathlib import Path
 
 import rospy
 import rostest
@@ -9,6 +11,9 @@ from gazebo_msgs.msg import LinkState, LinkStates, ModelState, ODEJointPropertie
 from gazebo_world import BOUND, BOX, INF, NAN, GazeboTest, call, now, run, wait_until
 from geometry_msgs.msg import Point, Pose, Twist, Vector3
 from rosgraph_msgs.msg import Clock
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
+from subscribed import wait_until_heard
 
 
 class JointsTest(GazeboTest):
@@ -107,7 +112,7 @@ class JointsTest(GazeboTest):
 
         topics = [rospy.Subscriber("/clock", Clock, keep),
                   rospy.Subscriber("/gazebo/link_states", LinkStates, keep)]  # fmt: skip
-        self.assertTrue(wait_until(lambda: all(topic.get_num_connections() for topic in topics)))
+        self.assertTrue(wait_until_heard("/clock", "/gazebo/link_states"))
         call("unpause_physics")
         self.assertTrue(seen.wait(BOUND))
         call("pause_physics")

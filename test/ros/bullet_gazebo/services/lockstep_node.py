@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """The step service over real ROS: exact ticks, repeatable bits, and what it refuses."""
 
+import sys
 import threading
 import unittest
+from pathlib import Path
 
 import rospy
 import rostest
@@ -11,6 +13,9 @@ from controller_manager_msgs.srv import LoadController, SwitchController
 from gazebo_msgs.srv import GetWorldProperties, SpawnModel, SpawnModelRequest
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
+from subscribed import wait_until_heard
 
 BOUND = 60.0  # [s of wall time]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"
@@ -176,10 +181,7 @@ class LockstepTest(unittest.TestCase):
                 arrived.set()
 
         subscriber = rospy.Subscriber("/clock", Clock, receive)
-        for _ in range(int(BOUND / 0.01)):
-            if subscriber.get_num_connections():
-                break
-            threading.Event().wait(0.01)
+        self.assertTrue(wait_until_heard("/clock"))
         self.step(1000, [], [])
         self.assertTrue(arrived.wait(BOUND))
         subscriber.unregister()

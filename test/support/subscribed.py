@@ -1,0 +1,38 @@
+"""When a subscriber has every message from now on: its publishers have to know it, not only it them."""
+
+import xmlrpc.client
+
+import rosgraph
+import rospy
+
+BOUND = 180.0  # [s of wall time]
+POLL = 0.01  # [s of wall time]
+
+
+def is_heard(topic):
+    """Whether somebody publishes on `topic`, and each who does sends to this process.
+
+    rospy's subscriber counts a connection when it has read the publisher's header, which the publisher writes
+    before it puts the connection into its list: what it publishes in between is lost.
+    """
+    name = rospy.resolve_name(topic)
+    master = rosgraph.Master(rospy.get_name())
+    publishers = [nodes for each, nodes in master.getSystemState()[0] if each == name]
+    return bool(publishers) and all(_sends(master.lookupNode(node), name) for node in publishers[0])
+
+
+def _sends(address, name):
+    with xmlrpc.client.ServerProxy(address) as node:
+        _, _, connections = node.getBusInfo(rospy.get_name())
+    return any(
+        each[1] == rospy.get_name() and each[2] == "o" and each[4] == name for each in connections
+    )
+
+
+def wait_until_heard(*topics):
+    """Returns whether that came to be."""
+    for _ in range(int(BOUND / POLL)):
+        if all(map(is_heard, topics)):
+            return True
+        rospy.rostime.wallsleep(POLL)
+    return False
