@@ -3,6 +3,7 @@
 from html import escape
 from pathlib import Path
 
+import numpy as np
 import viser
 from viser import uplot
 
@@ -98,7 +99,7 @@ class Curves:
                     self._charts[tag] = self._chart(tag, data, smooth)
         self._unseen.clear()
 
-    def _chart(self, tag: str, data: tuple[object, ...], smooth: bool) -> viser.GuiUplotHandle:
+    def _chart(self, tag: str, data: tuple[np.ndarray, ...], smooth: bool) -> viser.GuiUplotHandle:
         lines = [uplot.Series(label="step")]
         if smooth:
             lines.append(uplot.Series(label="each", stroke=PALE, width=1))
