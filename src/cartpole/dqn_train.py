@@ -3,6 +3,7 @@
 import sys
 
 from cartpole.ros_options import ros_options
+from cartpole.workbench import PROGRAM
 from rl_workbench.training import cli
 from robot_envs.errors import RobotEnvError
 
@@ -16,4 +17,4 @@ def main(argv: list[str] | None = None) -> int:
     except RobotEnvError as error:
         print(f"{NODE}.py: {error}", file=sys.stderr)
         return 1
-    return cli.main(flags, parameters, f"{NODE}.py", "dqn")
+    return cli.main(flags, parameters, f"{NODE}.py", "dqn", PROGRAM)

@@ -3,16 +3,18 @@
 import argparse
 import contextlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from cartpole.registration import NAMESPACE
 from cartpole.ros_options import ros_options
+from cartpole.workbench import PROGRAM
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import check_options, option
 from rl_workbench.output import reader_may_go
-from rl_workbench.training.cli import choose_training, train
+from rl_workbench.training.cli import choose_training, shown, train
 from rl_workbench.training.options.command_line import USAGE, flag
 from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.training_options import TrainingOptions
@@ -24,7 +26,7 @@ from robot_envs.errors import RobotEnvError
 NODE = "pg_train"
 PROG = f"{NODE}.py"
 ENV_ID = f"{NAMESPACE}/Balance-v0"
-WINDOWS = ("gui", "rviz", "headless")  # what a resumed training may have otherwise
+WINDOWS = ("rviz", "headless")  # what a resumed training may have otherwise
 LARGEST_NOISE = 0.2  # [m], [rad]; just inside the angle at which an episode ends
 
 
@@ -46,17 +48,14 @@ class RobotOptions:
         0.0, "episodes start within +-X of the origin [m] and of upright [rad]; 0, as the existing "
         "script does, starts them all alike", 0, LARGEST_NOISE,
     )  # fmt: skip
-    gui: bool = option(False, "show the simulator's window")
     rviz: bool = option(False, "show the robot in RViz")
     headless: bool = option(False, "no window")
 
     def __post_init__(self) -> None:
         check_options(self)
-        if self.headless and self.gui:
-            raise WorkbenchError("--headless: not with --gui")
-        if self.backend == "bullet" and (self.realtime or self.gui or self.rviz):
+        if self.backend == "bullet" and (self.realtime or self.rviz):
             raise WorkbenchError(
-                "--realtime, --gui and --rviz are of a simulator over ROS: not with --backend bullet"
+                "--realtime and --rviz are of a simulator over ROS: not with --backend bullet"
             )
 
     @property
@@ -82,8 +81,15 @@ def main(argv: list[str] | None = None) -> int:
     try:
         flags, parameters, name = ros_options(argv, NODE)
         options, robot = choose(flags, parameters)
-        with session(options, name, argv, robot):
-            return _train(options, interrupt)
+        with contextlib.ExitStack() as beside:
+
+            def begin(folder: Path) -> None:
+                if needs_session(options):
+                    beside.enter_context(session(options, name, argv, robot, folder))
+                else:
+                    beside.enter_context(shown(options, folder, PROGRAM))
+
+            return _train(options, interrupt, begin)
     except (WorkbenchError, RobotEnvError) as error:
         return _failed(error, interrupt)
     except KeyboardInterrupt:
@@ -93,10 +99,10 @@ def main(argv: list[str] | None = None) -> int:
         interrupt.defer()
 
 
-def _train(options: TrainingOptions, interrupt: Interrupt) -> int:
+def _train(options: TrainingOptions, interrupt: Interrupt, begin: Callable[[Path], None]) -> int:
     """Tells of a failure before the session is closed: a simulator that hangs takes its time."""
     try:
-        train(options, interrupt)
+        train(options, interrupt, begin)
         return interrupt.exit_code
     except WorkbenchError as error:
         return _failed(error, interrupt)
@@ -136,6 +142,8 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOption
 def _joined(
     options: TrainingOptions, robot: RobotOptions, given: dict[str, Any]
 ) -> TrainingOptions:
+    if robot.headless and options.showing.gui:
+        raise WorkbenchError("--headless: not with --gui")
     recorded = [key for key in given if key not in WINDOWS]
     if options.resume:
         if recorded:
@@ -145,7 +153,7 @@ def _joined(
         return options
     run = options.run
     if not run.env_id.startswith(f"{NAMESPACE}/"):
-        robots = [key for key in [*recorded, "gui", "rviz"] if getattr(robot, key) not in _ANYWHERE]
+        robots = [key for key in [*recorded, "rviz"] if getattr(robot, key) not in _ANYWHERE]
         if robots:
             raise WorkbenchError(
                 f"{flag(robots[0])} is of the robot: not with --env-id {run.env_id}"
@@ -157,32 +165,48 @@ def _joined(
     return options._replace(run=replace(run, train_env_kwargs=run.train_env_kwargs | environment))
 
 
+def needs_session(options: TrainingOptions) -> bool:
+    """Whether a robot is trained that isn't in this process."""
+    of_robot = options.run.env_id.startswith(f"{NAMESPACE}/")
+    return of_robot and _backend(options) != "bullet"
+
+
+def _backend(options: TrainingOptions) -> str:
+    return str(options.run.training_environment.get("backend", "bullet"))
+
+
 @contextlib.contextmanager
 def session(
-    options: TrainingOptions, name: str, argv: list[str], shown: RobotOptions
+    options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions, folder: Path
 ) -> Iterator[None]:
-    """What the robot needs to be running, for as long as it is trained; nothing in this process.
+    """What the robot needs to be running, for as long as it is trained.
 
     Args:
+        options: of a training that needs it.
         name: this node's full name.
         argv: the process's arguments, with roslaunch's remappings.
-        shown: asks a simulator that is started here for its window, and for RViz.
+        robot: whether RViz is to be opened.
+        folder: of the training, whose curves are shown in the simulator's window.
 
     Raises:
         RobotEnvError: if something can't be started, or what runs doesn't fit.
     """
-    backend = options.run.training_environment.get("backend", "bullet")
-    if backend == "bullet" or not options.run.env_id.startswith(f"{NAMESPACE}/"):
-        yield
-        return
+    backend = _backend(options)
     need_ros(f"the backend {backend}")
     from cartpole.robot import ROBOT
     from robot_envs.backends.session import RosSession
 
     height = None if "SwingUp" in options.run.env_id else 0.0
-    realtime = backend == "ros-realtime"
     opened = RosSession(
-        ROBOT, name, argv, realtime, shown.gui, options.run.seed, height, shown.rviz
+        ROBOT,
+        name,
+        argv,
+        realtime=backend == "ros-realtime",
+        gui=options.showing.gui,
+        seed=options.run.seed,
+        height=height,
+        rviz=robot.rviz,
+        curves=folder,
     )
     try:
         opened.start(tell)

@@ -12,7 +12,6 @@ from rl_workbench.training.options.options import unknown
 from rl_workbench.training.run.interrupt import Interrupt
 
 PROG = "rl-workbench"
-PROGRAM = (sys.executable, "-m", "rl_workbench")
 DESCRIPTION = """\
 Trains agents in Gymnasium's environments, and looks at what they learned.
 
@@ -31,7 +30,9 @@ TRAIN = "train"
 COMMANDS = {
     "eval": _Command("watching", "greedy episodes of a run: mean, deviation, every episode"),
     "enjoy": _Command("watching", "watch greedy episodes in a window"),
-    "view": _Command("viewing", "a page in the browser: curves, and episodes, also while it trains"),
+    "view": _Command(
+        "viewing", "a page in the browser: curves, and episodes, also while it trains"
+    ),
     "record": _Command(
         "watching", "episodes as GIF, MP4 or a page that plays them, without a display"
     ),
@@ -49,7 +50,7 @@ PACKAGE = "rl_workbench.tools.commands"
 
 @reader_may_go()
 def main(
-    argv: list[str] | None = None, prog: str = PROG, program: tuple[str, ...] = PROGRAM
+    argv: list[str] | None = None, prog: str = PROG, program: tuple[str, ...] = training.PROGRAM
 ) -> int:
     """Does what the arguments say; returns the process's exit code.
 
@@ -59,7 +60,7 @@ def main(
     """
     argv = sys.argv[1:] if argv is None else argv
     if argv[:1] == [TRAIN]:  # its flags depend on the algorithm
-        return training.main(argv[1:], prog=f"{prog} {TRAIN}")
+        return training.main(argv[1:], prog=f"{prog} {TRAIN}", program=program)
     interrupt = Interrupt().install()
     try:
         with interrupt.reading():

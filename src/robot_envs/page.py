@@ -3,7 +3,7 @@
 import logging
 from collections import defaultdict
 from collections.abc import Callable
-from typing import Generic
+from typing import Generic, NamedTuple
 
 import numpy as np
 import viser
@@ -22,6 +22,13 @@ GAP = 0.15  # between robots, as a share of what one of them can reach
 CAPTION_GAP = 0.04  # above it, as a share of the camera's distance
 
 logger = logging.getLogger(__name__)
+
+
+class Placed(NamedTuple):
+    """Where a robot was in a moment."""
+
+    links: np.ndarray  # (N, 7): positions [m] and quaternions xyzw, in the world
+    strayed: np.ndarray  # (3,) [m]: what a robot that drives has gone from where it started
 
 
 class RobotOnPage(Generic[State]):
@@ -84,15 +91,27 @@ class RobotOnPage(Generic[State]):
         Raises:
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
         """
+        self.show(self.look(), caption)
+
+    def look(self) -> Placed:
+        """Where it is now, to be shown later; the page stays as it is.
+
+        Raises:
+            SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
+        """
         base = self._placement.base()
         poses = self._placement.links(self._state(), base)
         rows = [
             [*poses[link.name].position, *poses[link.name].orientation] for link in self._seen.links
         ]
+        return Placed(np.array(rows), np.array(self._placement.strayed(base)))
+
+    def show(self, placed: Placed, caption: str = "") -> None:
+        """Moves it to where it was in another moment; asks nobody."""
         with self._server.atomic():
-            self._picture.move(np.array(rows))
+            self._picture.move(placed.links)
             if self._is_first:
-                self._world.position = -np.array(self._placement.strayed(base))
+                self._world.position = -placed.strayed
             if caption:
                 self._tell(caption)
 

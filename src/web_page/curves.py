@@ -1,8 +1,10 @@
 """The curves of a training on a page: of a table that grows, in charts with a bounded number of points."""
 
+import math
 from html import escape
 from pathlib import Path
 
+import numpy as np
 import viser
 from viser import uplot
 
@@ -22,6 +24,9 @@ OTHERS = "losses/"
 SMOOTH = (EPISODES, LENGTHS)  # and losses
 MOST_CHARTS = 16
 HEIGHT = 150  # [pixels]
+# Mantissas of the axes' ends. The axis of steps is given, and seldom another one: viser's own way of
+# following data loses the range of a chart that is drawn while it can't be seen.
+ENDS = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0, 6.4, 8.0, 10.0)
 PALE, STRONG, SINGLE = "rgba(76, 114, 176, 0.45)", "#c0392b", "#2a6f97"
 
 
@@ -43,6 +48,7 @@ class Curves:
             self._told = gui.add_html("")
         self._series: dict[str, Series] = {}
         self._charts: dict[str, viser.GuiUplotHandle] = {}
+        self._ends: dict[str, float] = {}  # of the charts' axes of steps
         self._step = 0.0
         self._unseen: set[str] = set()  # tags that have more than their charts
         self._say("no training")
@@ -93,12 +99,14 @@ class Curves:
             data = (x, values, averages) if smooth else (x, values)
             if tag in self._charts:
                 self._charts[tag].data = data
+                if self._ends[tag] < x[-1]:
+                    self._charts[tag].scales = self._scales(tag, x[-1])
             else:
                 with self._container:
                     self._charts[tag] = self._chart(tag, data, smooth)
         self._unseen.clear()
 
-    def _chart(self, tag: str, data: tuple[object, ...], smooth: bool) -> viser.GuiUplotHandle:
+    def _chart(self, tag: str, data: tuple[np.ndarray, ...], smooth: bool) -> viser.GuiUplotHandle:
         lines = [uplot.Series(label="step")]
         if smooth:
             lines.append(uplot.Series(label="each", stroke=PALE, width=1))
@@ -110,8 +118,14 @@ class Curves:
         place = names.index(tag) if tag in names else len(names)
         return self._gui.add_uplot(
             data, tuple(lines), title=title, height=HEIGHT, order=self._order(place),
-            legend=uplot.Legend(show=False), scales={"x": uplot.Scale(time=False)},
+            legend=uplot.Legend(show=False), scales=self._scales(tag, data[0][-1]),
         )  # fmt: skip
+
+    def _scales(self, tag: str, last: float) -> dict[str, uplot.Scale]:
+        """An axis from 0 to somewhat beyond the last step."""
+        tens = 10.0 ** math.floor(math.log10(max(last, 1.0)))
+        self._ends[tag] = next(each * tens for each in ENDS if each * tens >= last)
+        return {"x": uplot.Scale(time=False, auto=False, range=(0.0, self._ends[tag]))}
 
     def _order(self, place: int) -> float:
         return float(self._told.order) + 0.001 * (1 + place)

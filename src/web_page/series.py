@@ -23,8 +23,8 @@ class _Bucket(NamedTuple):
 class Series:
     """Values over steps, and their moving average over the last WINDOW of them.
 
-    Beyond MOST values, several become a bucket that is drawn by its least and its greatest value. The average is
-    that of the single values.
+    Beyond MOST values, several become a bucket that is drawn by its least and its greatest value. The average
+    is that of the single values.
     """
 
     def __init__(self) -> None:

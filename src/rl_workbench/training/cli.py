@@ -2,7 +2,8 @@
 
 import argparse
 import sys
-from contextlib import ExitStack
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
@@ -13,10 +14,13 @@ from rl_workbench.training.algorithms import ALGORITHMS, algorithm, recorded_kin
 from rl_workbench.training.options.command_line import USAGE, check_flag
 from rl_workbench.training.options.kind import AlgorithmKind
 from rl_workbench.training.options.training_options import TrainingOptions, choose
+from rl_workbench.training.page import page_beside
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.progress import tell
 
 PROG = "rl-workbench train"
+PROGRAM = (sys.executable, "-m", "rl_workbench")
 EPILOG = """\
 dqn and the two of REINFORCE are our own, the others Stable-Baselines3's.
 Each has flags of its own: --algo NAME --help shows them."""
@@ -91,8 +95,13 @@ def _without_algorithm(parser: argparse.ArgumentParser, rest: list[str]) -> NoRe
     parser.error(f"--algo is missing, one of {', '.join(ALGORITHMS)}")
 
 
-def train(options: TrainingOptions, interrupt: Interrupt) -> Path:
+def train(
+    options: TrainingOptions, interrupt: Interrupt, begin: Callable[[Path], object] = lambda _: None
+) -> Path:
     """Trains into the options' folder, or a new one below runs/; returns it.
+
+    Args:
+        begin: is called with the folder before anything is trained, to start what goes beside.
 
     Raises:
         WorkbenchError: if something fails that the user can mend; what was learned is saved.
@@ -111,6 +120,7 @@ def train(options: TrainingOptions, interrupt: Interrupt) -> Path:
             else:
                 place = (run.run_dir, run.env_id, run.exp_name, run.seed)
                 folder = holding.enter_context(run_folder.opened(*place))
+            begin(folder)
             training = Training(options, folder, interrupt)
             interrupt.defer()
             training.run()
@@ -125,11 +135,25 @@ def main(
     parameters: dict[str, Any] | None = None,
     prog: str = PROG,
     default: str | None = None,
+    program: tuple[str, ...] = PROGRAM,
 ) -> int:
-    """Trains as the arguments say; returns the process's exit code."""
+    """Trains as the arguments say; returns the process's exit code.
+
+    Args:
+        parameters: ROS parameters of the node that trains, if it is one.
+        prog: the command's name, for --help and errors.
+        default: the algorithm if none is named.
+        program: how the whole command line is started, for a page in a process of its own.
+    """
     interrupt = Interrupt().install()
     try:
-        train(_chosen(sys.argv[1:] if argv is None else argv, parameters, prog, default), interrupt)
+        options = _chosen(sys.argv[1:] if argv is None else argv, parameters, prog, default)
+        with ExitStack() as beside:
+            train(
+                options,
+                interrupt,
+                lambda folder: beside.enter_context(shown(options, folder, program)),
+            )
         return interrupt.exit_code
     except WorkbenchError as error:
         print(f"{prog}: {error}", file=sys.stderr, flush=True)
@@ -137,6 +161,13 @@ def main(
     except KeyboardInterrupt:
         print(f"{prog}: interrupted before the training began", file=sys.stderr)
         return interrupt.exit_code or 130
+
+
+def shown(
+    options: TrainingOptions, folder: Path, program: tuple[str, ...]
+) -> AbstractContextManager[None]:
+    """The training's page for as long as it is entered, if it is asked for."""
+    return page_beside(folder, program, tell) if options.showing.gui else nullcontext()
 
 
 def _chosen(

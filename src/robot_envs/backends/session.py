@@ -4,6 +4,7 @@ import atexit
 import contextlib
 import os
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, Generic
 
 import rospy
@@ -13,14 +14,12 @@ from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.bring_up import STEP_SERVICE, Say, Undo
 from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.rviz import check_rviz, open_rviz
+from robot_envs.backends.window import open_window, show_curves, tell_window
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot, State
-from ros_calls.waiting import wait_until
 from ros_utils import ros_gazebo
 
 START_TIMEOUT = 60.0  # [s] for the simulator to come up
-WINDOW_TIMEOUT = 20.0  # [s] for its window
-WINDOW = "/gazebo_gui/window"  # parameter: what the window tells of where it is
 
 
 class RosSession(Generic[State]):
@@ -34,9 +33,10 @@ class RosSession(Generic[State]):
         name: this process's node name, with namespace.
         argv: the process's arguments, with roslaunch's remappings.
         realtime: let the world run by itself, instead of in lock-step.
-        gui: ask a simulator that is started here for its window.
+        gui: open the simulator's window, if it isn't open.
         seed: for a simulator that is started here.
         rviz: show the robot in RViz, too.
+        curves: a run folder, whose curves the window shows beside the robot, whoever opened it.
         height: above the ground, where a robot that is spawned here stands [m]; the robot's own by
             default, so that it can do each of its tasks.
     """
@@ -51,6 +51,7 @@ class RosSession(Generic[State]):
         seed: int,
         height: float | None = None,
         rviz: bool = False,
+        curves: Path | None = None,
     ) -> None:
         self._robot = robot
         self._name = name
@@ -60,6 +61,7 @@ class RosSession(Generic[State]):
         self._seed = seed
         self._height = robot.height if height is None else height
         self._rviz = rviz
+        self._curves = curves
         self._undo = contextlib.ExitStack()
 
     def start(self, say: Say) -> None:
@@ -85,13 +87,17 @@ class RosSession(Generic[State]):
             self._start_simulator()
         self._join()
         self._check_mode()
+        if self._curves is not None:
+            self._undo.callback(show_curves(self._curves))
         changes = bring_up.bring_up(self._robot, say, self._height)
         if not own_simulator:  # one of ours ends with all that is in it
             simulator = OwnSimulator()
             for undo in changes:
                 self._undo.callback(_at_living_simulator, simulator, undo)
-        elif self._gui:
-            _tell_window(say)
+        if self._gui:
+            if not own_simulator:
+                self._undo.callback(open_window(say))
+            tell_window(say)
         if self._rviz:
             say("opening RViz")
             self._undo.callback(open_rviz(self._robot))
@@ -172,13 +178,6 @@ class RosSession(Generic[State]):
     def close(self) -> None:
         """Ends what `start()` started, newest first; may be called twice."""
         self._undo.close()
-
-
-def _tell_window(say: Say) -> None:
-    """The simulator's own output goes to its log."""
-    lines = wait_until(lambda: rospy.get_param(WINDOW, []), WINDOW_TIMEOUT, "the window")
-    for line in lines or ["the window didn't open; the log of gazebo_gui says why"]:
-        say(str(line))
 
 
 def _at_living_simulator(simulator: OwnSimulator, undo: Undo) -> None:

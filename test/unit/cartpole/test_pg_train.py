@@ -52,10 +52,10 @@ def test_without_flags_it_is_the_robot_by_reinforce() -> None:
 
 
 def test_flags_of_the_robot_become_options_of_its_environment() -> None:
-    flags = ["--episodes=5", "--seed=3", "--run-dir=out", "--save-every=2", "--gui"]
+    flags = ["--episodes=5", "--seed=3", "--run-dir=out", "--save-every=2", "--rviz"]
     options, robot = choose([*flags, "--realtime", "--start-noise=0.05"], {})
     assert (options.run.episodes, options.run.seed, options.run.run_dir) == (5, 3, "out")
-    assert options.hyperparameters.save_every == 2 and robot.gui
+    assert options.hyperparameters.save_every == 2 and robot.rviz
     assert options.run.train_env_kwargs == {
         "backend": "ros-realtime", "control_period": None, "noise": 0.05
     }  # fmt: skip
@@ -73,7 +73,8 @@ def test_parameters_and_flags_over_them() -> None:
     assert robot == RobotOptions(backend="bullet", start_noise=0.05)
     empty = {"run_dir": "", "realtime": "", "gui": False, "resume": "", "config": "", "algo": ""}
     assert choose([], empty) == choose([], {})
-    assert choose([], {"gui": True})[1].gui and not choose(["--no-gui"], {"gui": True})[1].gui
+    assert choose([], {"gui": True})[0].showing.gui
+    assert not choose(["--no-gui"], {"gui": True})[0].showing.gui
 
 
 @pytest.mark.parametrize(
@@ -84,7 +85,7 @@ def test_parameters_and_flags_over_them() -> None:
         (["--start-noise=nan"], "start_noise lies between"),
         (["--backend=gazebo"], "invalid choice: 'gazebo'"),
         (["--gui", "--headless"], "--headless: not with --gui"),
-        (["--backend=bullet", "--gui"], "not with --backend bullet"),
+        (["--backend=bullet", "--rviz"], "not with --backend bullet"),
         (["--backend=bullet", "--realtime"], "not with --backend bullet"),
         (["--episods=5"], "unknown flag '--episods'; did you mean --episodes?"),
         (["--gamma=1.5"], "gamma lies between 0 and 1"),
@@ -104,11 +105,18 @@ def test_wrong_parameters_too(capsys) -> None:
     assert "realtime must be true or false, not 'yes'" in refused(capsys, realtime="yes")
 
 
-@pytest.mark.parametrize("given", ["--backend=ros", "--start-noise=0.1", "--gui", "--realtime"])
+@pytest.mark.parametrize("given", ["--backend=ros", "--start-noise=0.1", "--rviz", "--realtime"])
 def test_what_is_the_robots_alone(capsys, given: str) -> None:
     flag = given.partition("=")[0]
     line = refused(capsys, "--env-id=X-v0", given)
     assert f"{flag} is of the robot: not with --env-id X-v0" in line
+
+
+def test_every_training_may_be_shown() -> None:
+    for given in (["--backend=bullet"], ["--env-id=X-v0"], ["--realtime"]):
+        options, robot = choose([*given, "--gui"], {})
+        plain = choose(given, {})
+        assert options.showing.gui and options.record() == plain[0].record() and robot == plain[1]
 
 
 def test_what_goes_for_every_environment() -> None:
@@ -167,7 +175,7 @@ def test_ctrl_c_before_the_training(capsys, monkeypatch) -> None:
 def test_private_parameters_of_dqn_train(monkeypatch) -> None:
     """As every node takes them: rosrun cartpole dqn_train.py _gamma:=0.5."""
     chosen: list[TrainingOptions] = []
-    monkeypatch.setattr(cli, "train", lambda options, interrupt: chosen.append(options))
+    monkeypatch.setattr(cli, "train", lambda options, *_: chosen.append(options))
     assert dqn_train.main(["_gamma:=0.5", "--seed=3", "_seed:=4", "_dueling:=true"]) == 0
     (options,) = chosen
     assert (options.kind.name, options.run.seed) == ("dqn", 3)
@@ -186,4 +194,4 @@ def test_rviz_where_it_cannot_be_is_one_line(monkeypatch, tmp_path, capsys):
         monkeypatch.setenv("DISPLAY", display)
         assert pg_train.main(["--rviz", "--backend", "ros"]) == 1
         assert capsys.readouterr().err.strip().splitlines()[-1].startswith(f"pg_train.py: {text}")
-    assert list(tmp_path.iterdir()) == []
+    assert list(tmp_path.glob("runs/*")) == []

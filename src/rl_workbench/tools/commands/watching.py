@@ -11,6 +11,7 @@ from typing import Any
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.commands.shared import add_policy_flags, env_options, number
+from rl_workbench.tools.commands.viewing import show as show_page
 from rl_workbench.tools.pictures import videos
 from rl_workbench.tools.pictures.filming import (
     Player,
@@ -24,10 +25,12 @@ from rl_workbench.tools.pictures.scenes import is_scene, record_scene
 from rl_workbench.tools.runs import episodes
 from rl_workbench.tools.runs.policies import WHICH, LearnedPolicy, load_learned
 from rl_workbench.tools.runs.runs import Run, open_run, threshold
+from rl_workbench.tools.viewing.page import Place, Wanted
 from rl_workbench.training.run.environments import make_environment
 from rl_workbench.training.run.files import as_json, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell
+from web_page.address import LOOPBACK
 
 RANDOM = "random"  # a policy that every environment has
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")  # any of them names one
@@ -43,6 +46,8 @@ def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
         return
     if command == "enjoy":
         add("--episodes", type=number(1), default=1, metavar="N", help="default 1")
+        add("--gui", action="store_true", help="on a page in the browser instead, as view does; "
+            "each episode has a seed of its own, from --seed on")  # fmt: skip
         return
     add("--out", type=Path, required=True, metavar="FILE", help="ends in .gif, .mp4 or .html")
     add("--max-steps", type=number(0), default=0, metavar="N",
@@ -75,7 +80,11 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         WorkbenchError: if something is wrong with the run, the display or the file.
     """
     commands = {"eval": _eval, "enjoy": _enjoy, "record": _record}
-    commands[arguments.command](arguments, open_run(arguments.run))
+    run = open_run(arguments.run)
+    if arguments.command == "enjoy" and arguments.gui:
+        _enjoy_on_page(arguments, run, interrupt)
+    else:
+        commands[arguments.command](arguments, run)
 
 
 def _policy(
@@ -110,13 +119,27 @@ def _enjoy(arguments: argparse.Namespace, run: Run) -> None:
     if not any(os.environ.get(name) for name in DISPLAYS):
         raise WorkbenchError(
             "enjoy needs a display to open a window on, and DISPLAY isn't set; "
-            f"record {arguments.run} --out episode.gif shows it without one"
+            f"--gui shows it on a page in the browser, record {arguments.run} --out episode.gif writes it"
         )
     policy = _policy(arguments, run, render_mode="human")
     try:
         tell(episodes.lines(episodes.play(policy, arguments.episodes, arguments.seed)))
     finally:
         policy.env.close()
+
+
+def _enjoy_on_page(arguments: argparse.Namespace, run: Run, interrupt: Interrupt) -> None:
+    show_page(
+        Wanted(
+            run.folder,
+            (arguments.checkpoint,),
+            arguments.seed,
+            arguments.episodes,
+            env_options(arguments),
+        ),
+        Place(LOOPBACK, None, browser=True),
+        interrupt,
+    )
 
 
 def _record(arguments: argparse.Namespace, run: Run) -> None:

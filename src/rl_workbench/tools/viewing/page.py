@@ -14,7 +14,7 @@ from rl_workbench.tools.viewing.player import Player
 from rl_workbench.tools.viewing.recorder import Recorder
 from rl_workbench.tools.viewing.views import CAMERA, LOOK_AT
 from rl_workbench.training.run.progress import tell, warn
-from web_page.address import Address, PortInUse, find_address
+from web_page.address import PortInUse, find_address
 from web_page.curves import Curves
 from web_page.server import open_browser, serve, stop
 
@@ -44,7 +44,10 @@ class Place(NamedTuple):
 
 
 def show_run(
-    wanted: Wanted, place: Place, is_over: Callable[[], bool], told: Callable[[], None] = lambda: None
+    wanted: Wanted,
+    place: Place,
+    is_over: Callable[[], bool],
+    told: Callable[[], None] = lambda: None,
 ) -> None:
     """Serves the page until it is over.
 

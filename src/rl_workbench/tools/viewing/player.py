@@ -119,7 +119,8 @@ class Player:
         self._place = self._waited = 0.0
         if self._episodes > 1:
             after = int(self._seed.value) + 1
-            self._seed.value = after if after < self._first + self._episodes else self._first
+            is_last = after >= self._first + self._episodes
+            self._seed.value = self._first if is_last else after  # type: ignore[misc]
             self._begin()
 
     def _show(self, episode: Episode, index: int, frame: Frame) -> None:
@@ -130,7 +131,7 @@ class Player:
         self._recorder.view.show(frame.seen)
         if self._slider.max != max(1, episode.length):
             self._slider.max = max(1, episode.length)
-        self._slider.value = index
+        self._slider.value = index  # type: ignore[misc]
 
     def _tell(self, episode: Episode) -> None:
         lines = [f"{episode.policy or episode.which}, seed {episode.seed}"]

@@ -61,7 +61,9 @@ class Recorder:
         env_options: of the environment, on top of the training's own.
     """
 
-    def __init__(self, folder: Path, server: viser.ViserServer, env_options: dict[str, Any]) -> None:
+    def __init__(
+        self, folder: Path, server: viser.ViserServer, env_options: dict[str, Any]
+    ) -> None:
         self._folder, self._server, self._env_options = folder, server, env_options
         self._env: gymnasium.Env[Any, Any] | None = None
         self.view: View | None = None
@@ -162,9 +164,7 @@ class Recorder:
             self.view = make_view(self._server, self._env)
         return self._env, self.view
 
-    def _policy(
-        self, run: Run, episode: Episode, env: gymnasium.Env[Any, Any]
-    ) -> Act:
+    def _policy(self, run: Run, episode: Episode, env: gymnasium.Env[Any, Any]) -> Act:
         if episode.which == RANDOM:
             env.action_space.seed(episode.seed)
             episode.policy = RANDOM

@@ -10,6 +10,7 @@ from PIL import Image
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.pictures.filming import packed, take_picture
+from rl_workbench.tools.pictures.scenes import DRAW, is_scene
 
 CAMERA, LOOK_AT = (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)  # in front of the pictures
 HEIGHT = 1.2  # of a picture, at most
@@ -63,7 +64,7 @@ class RobotView:
     """An environment that draws itself on pages, as those of `robot_envs` do."""
 
     def __init__(self, server: viser.ViserServer, env: gymnasium.Env[Any, Any]) -> None:
-        self._drawn = env.unwrapped.draw_on(server)  # type: ignore[attr-defined]
+        self._drawn = getattr(env.unwrapped, DRAW)(server)
 
     def take(self) -> Any:
         return self._drawn.look()
@@ -73,14 +74,20 @@ class RobotView:
 
 
 def make_view(server: viser.ViserServer, env: gymnasium.Env[Any, Any]) -> View:
-    """The best that the environment has.
+    """The best that the environment has; those who look at the page already see it from the front.
 
     Raises:
         WorkbenchError: if it can't be seen.
     """
-    if not hasattr(env.unwrapped, "draw_on"):
+    if not is_scene(env):
         return PictureView(server, env)
     try:
-        return RobotView(server, env)
+        view = RobotView(server, env)
     except gymnasium.error.Error as error:  # as where its file can't be read
         raise WorkbenchError(f"the environment can't be drawn: {error}") from error
+    front = server.initial_camera
+    for client in server.get_clients().values():
+        with client.atomic():
+            client.camera.position, client.camera.look_at = front.position, front.look_at
+            client.camera.fov = front.fov
+    return view

@@ -14,6 +14,7 @@ from rl_workbench.training.options.kind import AlgorithmKind
 from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.record import CONFIG_RECORD, read_record
 from rl_workbench.training.options.run_options import RunOptions
+from rl_workbench.training.options.showing import ShowingOptions
 
 # May be changed when resuming.
 EXTENDING = ("total_timesteps", "episodes", "stop_at_length", "stop_at_return", "device")
@@ -26,9 +27,10 @@ class TrainingOptions(NamedTuple):
     run: RunOptions
     hyperparameters: Any  # an instance of the kind's dataclass
     resume: Path | None = None
+    showing: ShowingOptions = ShowingOptions()
 
     def record(self) -> dict[str, Any]:
-        """All of it as plain values, for config.json and checkpoints."""
+        """All settings as plain values, for config.json and checkpoints."""
         run, own = asdict(self.run), asdict(self.hyperparameters)
         # What both have, as a length that a schedule depends on, is the run's.
         hyperparameters = {name: value for name, value in own.items() if name not in run}
@@ -108,16 +110,17 @@ def choose(
     options = known_options(kind)
     default = env_id or kind.defaults.get("env_id", RunOptions.env_id)
     line = CommandLine(kind, options, prog, default, parents)
-    given, special = line.given(flags, parameters or {})
+    given, special, showing = line.given(flags, parameters or {})
     if "resume" in special:
-        return resumed(kind, Path(special["resume"]), given, special)
+        old = resumed(kind, Path(special["resume"]), given, special)
+        return old._replace(showing=showing)
     origin = f"--config {special['config']}" if "config" in special else f"config/{kind.config}"
     path = Path(special["config"]) if "config" in special else default_file(kind.config)
     preset = special.get("preset")
     wanted = given.get("env_id", None if preset else default)
     section = read_section(path, wanted and kind.section.format(env_id=wanted), preset)
     merged = ({"env_id": wanted} if wanted else {}) | options.read(section, origin)
-    return make_options(kind, until_the_steps(merged, given))
+    return make_options(kind, until_the_steps(merged, given))._replace(showing=showing)
 
 
 def resumed(

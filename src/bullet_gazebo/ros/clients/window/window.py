@@ -19,6 +19,7 @@ from bullet_gazebo.ros.clients.window.controllers import Controllers
 from bullet_gazebo.ros.clients.window.model_panel import ModelPanel
 from bullet_gazebo.ros.clients.window.remote_scene import RemoteScene
 from bullet_gazebo.ros.clients.window.time_panel import TimePanel
+from bullet_gazebo.ros.clients.window.training import Training
 from bullet_gazebo.ros.clients.world_client import ControlFailed
 from bullet_gazebo.ros.scene.scene_messages import from_light, from_model
 from ros_calls.service import ServiceFailed
@@ -57,6 +58,7 @@ class Window:
             )
         with tabs.add_tab("Controllers"):
             self._tree = gui.add_html("")
+        Training(self._server, tabs).start()
         for box in (self._collisions, self._joint_frames):
             box.on_update(lambda _: self._redraw.set())
         self._due = {self._show_texts: 0.0, self._show_rest: 0.0}  # [s of wall time]
