@@ -2,8 +2,8 @@
 
 client = StepClient()
 client.reset({"cart_pole": 0.1}, {"cart_pole": -0.5})
-state = client.step(8, {"stand_cart_position_controller": 0.02})
-state.joint_states.position, state.sim_time
+state = client.step(8, {"stand_cart_position_controller": 0.02}, links=["pole"], contacts=["pole"])
+state.joint_states.position, state.sim_time, state.link_poses[0].position.z, state.contacts
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from numbers import Integral
 from typing import Any
 
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
+from geometry_msgs.msg import Pose, Twist
 
 from ros_calls.service import ServiceClient, ServiceFailed
 
@@ -20,6 +21,8 @@ STEP_SERVICE = "/gazebo/step_world"
 TIMEOUT = 10.0  # [s] of wall time
 SLOWEST_TICK = 0.01  # [s] of wall time; one of a very full world
 Commands = Mapping[str, float | Sequence[float]]
+Some = bool | Sequence[str]
+"""All, none, or those of these names."""
 
 
 class StepRefused(ServiceFailed):
@@ -43,18 +46,26 @@ class StepClient:
         commands: Commands | None = None,
         *,
         joint_commands: Mapping[str, float] | None = None,
-        model_states: bool = False,
+        model_states: Some = False,
+        links: Sequence[str] | Mapping[str, str] = (),
+        contacts: Some = False,
     ) -> StepWorldResponse:
         """Commands controllers and joints, and lets `ticks` physics steps pass.
+
+        What the answer tells beside the joints costs nothing where it isn't asked for.
 
         Args:
             ticks: at least 1.
             commands: for controllers by name: a number, or as many as a group has joints
                 [m, rad, m/s, rad/s, N, N m].
             joint_commands: for joints that no running controller has.
-            model_states: ask for the models' poses and twists, too.
+            model_states: which models' poses and twists are told.
+            links: whose poses and twists are told, in this order: a plain name, or model::link. A
+                mapping says in which link's frame each is told; "": in the world.
+            contacts: those of the last tick: all, or those with these models, links or collisions.
         """
-        request = _request(ticks, commands or {}, joint_commands or {}, model_states)
+        request = _request(ticks, commands or {}, joint_commands or {})
+        _ask(request, model_states, links, contacts)
         return self._answer(request, self._call)
 
     def reset(
@@ -66,7 +77,11 @@ class StepClient:
         everything: bool = False,
         ticks: int = 0,
         commands: Commands | None = None,
-        model_states: bool = False,
+        models: Mapping[str, Pose] | None = None,
+        twists: Mapping[str, Twist] | None = None,
+        model_states: Some = False,
+        links: Sequence[str] | Mapping[str, str] = (),
+        contacts: Some = False,
     ) -> StepWorldResponse:
         """Resets the world, and begins an episode from a defined state.
 
@@ -76,13 +91,23 @@ class StepClient:
             velocities: of the joints that are placed [rad/s, m/s]; the others rest.
             seed: for the simulator's random numbers; 0 leaves them.
             everything: as reset_simulation, time begins at 0; else as reset_world, it goes on.
-            ticks, commands, model_states: as for `step`; no step unless asked for.
+            models: models to place, in the world; the others stand where they were spawned.
+            twists: of the models that are placed; the others rest.
+            ticks, commands, model_states, links, contacts: as for `step`; no step unless asked for.
         """
-        positions = positions or {}
-        missing = sorted(set(velocities or {}) - set(positions))
-        if missing:
-            raise StepRefused(f"velocities without positions: {missing}")
-        request = _request(ticks, commands or {}, {}, model_states)
+        positions, models = positions or {}, models or {}
+        for what, more, those in (
+            ("velocities without positions", velocities, positions),
+            ("twists without models", twists, models),
+        ):
+            missing = sorted(set(more or {}) - set(those))
+            if missing:
+                raise StepRefused(f"{what}: {missing}")
+        request = _request(ticks, commands or {}, {})
+        _ask(request, model_states, links, contacts)
+        request.models = list(models)
+        request.poses = list(models.values())
+        request.twists = [(twists or {}).get(name, Twist()) for name in models]
         request.reset = StepWorldRequest.SIMULATION if everything else StepWorldRequest.WORLD
         request.seed = seed
         request.joints = list(positions)
@@ -113,7 +138,7 @@ def time_of(ticks: Any) -> float:
 
 
 def _request(
-    ticks: int, commands: Commands, joint_commands: Mapping[str, float], model_states: bool
+    ticks: int, commands: Commands, joint_commands: Mapping[str, float]
 ) -> StepWorldRequest:
     values: list[float] = []
     for command in commands.values():
@@ -124,5 +149,22 @@ def _request(
         commands=values,
         commanded_joints=list(joint_commands),
         joint_commands=list(joint_commands.values()),
-        model_states=model_states,
     )
+
+
+def _ask(
+    request: StepWorldRequest,
+    model_states: Some,
+    links: Sequence[str] | Mapping[str, str],
+    contacts: Some,
+) -> None:
+    """Has a request ask for more than the joints."""
+    request.model_states, request.model_states_of = _chosen(model_states)
+    request.contacts, request.contacts_of = _chosen(contacts)
+    request.link_states_of = list(links)
+    if isinstance(links, Mapping):
+        request.link_frames = list(links.values())
+
+
+def _chosen(some: Some) -> tuple[bool, list[str]]:
+    return (some, []) if isinstance(some, bool) else (False, list(some))

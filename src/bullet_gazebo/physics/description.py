@@ -151,7 +151,8 @@ class ModelDescription:
     """Links and joints in document order. `world_joints` fix the root link to the world, if there are any.
 
     `initial_pose` is where the file puts the model, `root_pose` the root link in the model. `islands` are
-    links of a static model that no joint connects with the root, and where they are, seen from it.
+    links of a static model that no joint connects with the root, and where they are, seen from it. `lumped`
+    are links that a fixed joint has made part of another one: that one, and where they are in it.
     """
 
     name: str
@@ -165,6 +166,7 @@ class ModelDescription:
     # Sensors and the like, which nothing simulates.
     left_out: list[str] = field(default_factory=list)
     islands: dict[str, Pose] = field(default_factory=dict)
+    lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
     initial_pose: Pose = Pose()
     static: bool = False
 

@@ -12,11 +12,27 @@ Twist = tuple[Vector, Vector]
 """Linear [m/s] and angular [rad/s] velocity in world axes."""
 
 
-class Contact(NamedTuple):
-    """A point [m] at which two bodies touch, and the force [N] along its normal, in world axes."""
+class Side(NamedTuple):
+    """One of two bodies that touch: its link, and which of the link's collisions it may be, by name.
 
-    point: Vector
-    force: Vector
+    An engine that knows the very collision names one.
+    """
+
+    body: "Body"
+    link: str
+    collisions: tuple[str, ...]
+
+
+class Contact(NamedTuple):
+    """A point at which two bodies touch; forces and normal are those on the first one, in world axes."""
+
+    point: Vector  # [m]
+    force: Vector  # [N] along the normal
+    friction: Vector  # [N] across it
+    normal: Vector  # of length 1, towards the first body
+    depth: float  # [m] by which they overlap
+    first: Side
+    second: Side
 
 
 FURTHEST = math.pi

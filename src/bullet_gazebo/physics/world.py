@@ -12,7 +12,7 @@ from bullet_gazebo.physics.description import (
 )
 from bullet_gazebo.physics.engine import Engine, Twist
 from bullet_gazebo.physics.model import AT_REST, Model
-from bullet_gazebo.physics.pose import Pose, Vector
+from bullet_gazebo.physics.pose import Pose, Vector, conjugate, rotate, subtract
 from bullet_gazebo.physics.settings import SolverSettings
 
 GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
@@ -197,6 +197,15 @@ class World:
     def _enter(self, entity: Entity, scoped: str) -> None:
         for key in (scoped, entity.name):
             self._entities.setdefault(key, entity)
+
+
+def seen_from(state: tuple[Pose, Twist], frame: tuple[Pose, Twist]) -> tuple[Pose, Twist]:
+    """Returns a state relative to a frame, as Gazebo does: without the ω × r term."""
+    back = conjugate(frame[0].orientation)
+    linear, angular = (
+        rotate(back, subtract(own, other)) for own, other in zip(state[1], frame[1], strict=True)
+    )
+    return state[0].relative_to(frame[0]), (linear, angular)
 
 
 def ground_plane() -> ModelDescription:

@@ -28,6 +28,7 @@ def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
         _lump(model, name)
     _drop_free_joints(model)
     drop_massless(model)
+    model.lumped = {name: at for name, at in model.lumped.items() if at[0] in model.links}
     mend_moments(model)
     for link in model.links.values():
         link.collisions = _named(link, link.collisions, "_collision")
@@ -68,6 +69,10 @@ def _lump(model: ModelDescription, name: str) -> None:
     for other in model.joints.values():
         if other.parent == child.name:
             other.parent, other.pose = parent.name, joint.pose.compose(other.pose)
+    for name, (link, pose) in model.lumped.items():
+        if link == child.name:
+            model.lumped[name] = parent.name, joint.pose.compose(pose)
+    model.lumped[child.name] = parent.name, joint.pose
 
 
 def _moved(inertia: Inertia | None, pose: Pose) -> Inertia | None:

@@ -19,7 +19,7 @@ from gazebo_msgs.srv import (
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.properties import PropertyError, link_inertia, set_link_properties
-from bullet_gazebo.ros.services.model_services import seen_from
+from bullet_gazebo.physics.world import seen_from
 from bullet_gazebo.ros.wire.checks import bad_number
 from bullet_gazebo.ros.wire.conversions import to_pose_msg, to_twist_msg, to_vector
 from bullet_gazebo.simulator import Simulator

@@ -17,8 +17,7 @@ from gazebo_msgs.srv import (
 )
 from std_msgs.msg import Header
 
-from bullet_gazebo.physics.engine import Twist
-from bullet_gazebo.physics.pose import Pose, conjugate, rotate, subtract
+from bullet_gazebo.physics.world import seen_from
 from bullet_gazebo.ros.wire.conversions import to_pose_msg, to_time, to_twist_msg
 from bullet_gazebo.simulator import Simulator
 
@@ -98,12 +97,3 @@ class ModelServices:
         """The node's own time, as Gazebo stamps it: the wall's with use_sim_time:=false."""
         # rospy's simulated time may lag behind where /clock is thinned.
         return rospy.get_rostime() if rospy.rostime.is_wallclock() else to_time(self._sim.now)
-
-
-def seen_from(state: tuple[Pose, Twist], frame: tuple[Pose, Twist]) -> tuple[Pose, Twist]:
-    """Returns a state relative to a frame, as Gazebo does: without the ω × r term."""
-    back = conjugate(frame[0].orientation)
-    linear, angular = (
-        rotate(back, subtract(own, other)) for own, other in zip(state[1], frame[1], strict=True)
-    )
-    return state[0].relative_to(frame[0]), (linear, angular)

@@ -2,7 +2,8 @@
 
 import genpy
 from control_msgs.msg import JointControllerState
-from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
+from gazebo_msgs.msg import ContactState
+from geometry_msgs.msg import Point, Quaternion, Twist, Vector3, Wrench
 from geometry_msgs.msg import Pose as PoseMsg
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -10,6 +11,7 @@ from std_msgs.msg import Header
 from bullet_gazebo.control.samples import JointControllerSample, JointStateSample
 from bullet_gazebo.physics import pose as poses
 from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.state.contacts import ContactPair
 
 NANOSECONDS = 1_000_000_000
 
@@ -53,3 +55,19 @@ def to_vector(msg: Point | Vector3) -> poses.Vector:
 
 def from_twist_msg(msg: Twist) -> tuple[poses.Vector, poses.Vector]:
     return to_vector(msg.linear), to_vector(msg.angular)
+
+
+def to_contact_state(pair: ContactPair) -> ContactState:
+    return ContactState(
+        collision1_name=pair.first,
+        collision2_name=pair.second,
+        wrenches=[to_wrench_msg(*wrench) for wrench in pair.wrenches],
+        total_wrench=to_wrench_msg(*pair.total),
+        contact_positions=[Vector3(*point) for point in pair.points],
+        contact_normals=[Vector3(*normal) for normal in pair.normals],
+        depths=pair.depths,
+    )
+
+
+def to_wrench_msg(force: poses.Vector, torque: poses.Vector) -> Wrench:
+    return Wrench(Vector3(*force), Vector3(*torque))

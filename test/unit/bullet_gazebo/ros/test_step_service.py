@@ -11,6 +11,8 @@ import rospy
 import xacro
 import yaml
 from bullet_gazebo_msgs.srv import StepWorldRequest
+from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
+from geometry_msgs.msg import Pose as PoseMsg
 
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
@@ -18,13 +20,17 @@ from bullet_gazebo.control.manager import STRICT, ControllerManager
 from bullet_gazebo.physics.engines.registry import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.physics.world import World
+from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.ros.services.stepping.step_service import StepService
 from bullet_gazebo.simulator import Simulator
 
 WORLD = StepWorldRequest.WORLD
 FREE = {"effort_a": 2.0, "position_a": 0.01, "velocity_a": 0.3}  # joints, and commands to them
+BOX = """<robot name="crate"><link name="crate">
+<inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link></robot>"""
+HIGH = PoseMsg(Point(1.0, 2.0, 3.0), Quaternion(0.0, 0.0, 0.0, 0.0))  # turned by nothing
 
 
 @lru_cache(maxsize=1)
@@ -209,3 +215,117 @@ def test_a_long_request_gives_others_their_turn(world, monkeypatch):
     monkeypatch.setattr(world.sim.lock, "yield_turn", lambda: turns.append(world.sim.now))
     assert world.call(1200).sim_time == pytest.approx(1.2)
     assert turns == [500_000_000, 1_000_000_000]
+
+
+@pytest.fixture
+def objects(world):
+    """The world with a robot, the ground, and a crate on it."""
+    world.add("slides", "effort_joint")
+    world.sim.world.spawn("ground_plane", ground_plane(), Pose())
+    world.sim.world.spawn("crate", parse_urdf(BOX), Pose((0.0, 3.0, 0.1)))
+    return world
+
+
+def test_nothing_is_told_that_was_not_asked_for(objects):
+    answer = objects.call(1)
+    assert answer.success
+    for name in ("model_names", "model_poses", "link_poses", "link_twists", "contacts"):
+        assert getattr(answer, name) == [], name
+
+
+def test_links_models_and_contacts_are_told_after_the_ticks(objects):
+    fields = {"link_states_of": ["crate", "effort_a", "crate"], "link_frames": ["", "", "effort_a"]}
+    links = [joint.child for joint in objects.sim.robots[0].model.description.movable_joints]
+    fields["link_states_of"][1] = fields["link_frames"][2] = links[0]
+    answer = objects.call(500, model_states_of=["crate"], contacts_of=["crate"], **fields)
+    assert answer.success, answer.status_message
+    assert answer.model_names == ["crate"]
+    assert answer.model_poses[0].position.z == pytest.approx(0.1, abs=1e-3)
+    assert answer.link_poses[0] == answer.model_poses[0]
+    assert len(answer.link_poses) == len(answer.link_twists) == 3
+    away = answer.link_poses[0].position.y - answer.link_poses[1].position.y
+    assert answer.link_poses[2].position.y == pytest.approx(away)
+    (pair,) = answer.contacts
+    assert pair.collision1_name == "crate::crate::crate_collision"
+    assert pair.collision2_name == "ground_plane::link::collision"
+    assert pair.total_wrench.force.z == pytest.approx(2 * 9.8, rel=0.01)
+    assert sum(each.force.z for each in pair.wrenches) == pytest.approx(pair.total_wrench.force.z)
+    counts = {len(getattr(pair, f"contact_{name}")) for name in ("positions", "normals")}
+    assert counts == {len(pair.depths)} == {len(pair.wrenches)}
+
+
+def test_all_models_and_all_contacts(objects):
+    answer = objects.call(500, model_states=True, contacts=True)
+    assert answer.model_names == ["slides", "ground_plane", "crate"]
+    assert len(answer.contacts) == 1
+
+
+def test_models_are_placed_with_a_reset_and_before_joints(objects):
+    twist = Twist(Vector3(0.0, 0.0, 1.0), Vector3(0.0, 2.0, 0.0))
+    answer = objects.call(
+        0, reset=WORLD, models=["crate", "slides"], poses=[HIGH, PoseMsg()],
+        twists=[twist, Twist()], joints=["effort_b"], positions=[0.1], velocities=[0.5],
+        model_states_of=["crate"], contacts=True,
+    )  # fmt: skip
+    assert answer.success, answer.status_message
+    place = answer.model_poses[0].position
+    assert (place.x, place.y, place.z) == pytest.approx((1.0, 2.0, 3.0))
+    assert answer.model_twists[0].linear.z == pytest.approx(1.0)
+    assert answer.model_twists[0].angular.y == pytest.approx(2.0)
+    assert answer.contacts == []  # it has left the ground
+    joints = dict(zip(answer.joint_states.name, answer.joint_states.velocity, strict=True))
+    assert joints["effort_b"] == 0.5
+    assert objects.call(0, reset=WORLD, model_states_of=["crate"]).model_poses[0].position.y == 3.0
+
+
+def test_a_placing_alone_needs_no_ticks(objects):
+    answer = objects.call(0, models=["crate"], poses=[HIGH], model_states_of=["crate"])
+    assert answer.model_poses[0].position.z == pytest.approx(3.0)
+    assert answer.sim_time == 0.0
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"models": ["crat"], "poses": [HIGH]}, "no model 'crat'; did you mean 'crate'?"),
+        ({"models": ["crate"]}, "1 models but 0 poses"),
+        ({"models": ["crate"], "poses": [HIGH], "twists": [Twist()] * 2}, "1 models but 2 twists"),
+        ({"models": ["crate"] * 2, "poses": [HIGH] * 2}, "models names one twice"),
+        (
+            {"models": ["crate"], "poses": [PoseMsg(Point(0.0, float("nan"), 0.0), Quaternion())]},
+            "poses[0].position.y is nan",
+        ),
+        (
+            {"models": ["crate"], "poses": [HIGH], "twists": [Twist(Vector3(1e300, 0, 0), Vector3())]},
+            "twists[0].linear.x is 1e+300",
+        ),
+        ({"model_states_of": ["crat"]}, "no model 'crat'; did you mean 'crate'?"),
+        ({"link_states_of": ["crat"]}, "no link 'crat'; did you mean 'crate'?"),
+        ({"link_states_of": ["crate"], "link_frames": ["grond"]}, "no link 'grond'"),
+        ({"link_states_of": ["crate"], "link_frames": ["", ""]}, "1 link_states_of but 2 link_frames"),
+        ({"link_frames": [""]}, "0 link_states_of but 1 link_frames"),
+        ({"contacts_of": ["crate_colision"]}, "did you mean 'crate_collision'?"),
+        ({"joints": ["efort_b"], "positions": [0.0]}, "did you mean 'effort_b'?"),
+        ({"controllers": ["effort_jiont"], "commands": [0.0]}, "did you mean 'effort_joint'?"),
+        (
+            {"commanded_joints": ["slides::efort_b"], "joint_commands": [0.0]},
+            "did you mean 'slides::effort_b'?",
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_placed_or_told_is_refused_and_nothing_done(objects, fields, text):
+    before = [model.state() for model in objects.sim.world.models.values()]
+    answer = objects.call(1, reset=WORLD, **fields)
+    assert not answer.success
+    assert text in answer.status_message
+    assert answer.sim_time == 0.0
+    assert [model.state() for model in objects.sim.world.models.values()] == before
+
+
+def test_what_has_gone_during_a_long_request_is_told(objects, monkeypatch):
+    sim = objects.sim
+    monkeypatch.setattr(sim.lock, "yield_turn", lambda: sim.delete_model(sim.world.models["crate"]))
+    answer = objects.call(600, link_states_of=["crate"])
+    assert not answer.success
+    assert "the ticks are done, but meanwhile there is no link 'crate'" in answer.status_message
+    assert answer.sim_time == pytest.approx(0.6)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from bullet_gazebo.physics.description import Inertia, ModelDescription
+from bullet_gazebo.physics.description import Inertia, Link, ModelDescription
 from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Body, Twist
 from bullet_gazebo.physics.engines.bullet.contacts import (
     check_meshes,
@@ -49,6 +49,9 @@ class BulletBody(Body):
             for name, link in description.links.items()
             if name in self._links and not link.part_of
         )
+        self.touching = {
+            index: _touching(description.links[name]) for name, index in self._links.items()
+        }
         self._fixed = description.fixed_base
         dynamics = pybullet.getDynamicsInfo(body, BASE, client)
         check_meshes(client, body, self._links, description)
@@ -233,6 +236,11 @@ class BulletBody(Body):
         linear, angular = pybullet.getBaseVelocity(self.id, self._client)
         pose = com.compose(self._com.inverse())
         return pose, (add(linear, cross(angular, subtract(pose.position, com.position))), angular)
+
+
+def _touching(link: Link) -> tuple[str, tuple[str, ...]]:
+    """What of the model may touch where a link of the engine does: the model's link, and collisions."""
+    return link.part_of or link.name, tuple(shape.name for shape in link.collisions)
 
 
 def _moments(inertia: Inertia) -> Vector:

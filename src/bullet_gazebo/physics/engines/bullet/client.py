@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
-from bullet_gazebo.physics.engine import Contact
+from bullet_gazebo.physics.engine import Contact, Side
 from bullet_gazebo.physics.engines.bullet.body import BASE, BulletBody, is_plane
 from bullet_gazebo.physics.engines.bullet.contacts import collides_with_itself, contacts
 from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
@@ -51,6 +51,7 @@ class BulletClient:
         self._gravity: Vector = ZERO
         self._time_step = 0.0
         self._bodies: dict[int, BulletBody] = {}
+        self._sides: dict[tuple[int, int], Side] = {}  # by body and link
         self._weightless: set[tuple[int, int]] = set()  # body and link, where gravity doesn't act
         self._sizes: dict[int, int] = {}  # [bytes] by body
         self.waste = 0
@@ -120,6 +121,8 @@ class BulletClient:
     def _keep(self, body: BulletBody) -> BulletBody:
         body.set_time_step(self._time_step)
         self._bodies[body.id] = body
+        for index, touching in body.touching.items():
+            self._sides[body.id, index] = Side(body, *touching)
         return body
 
     def remove(self, body: int) -> None:
@@ -128,6 +131,7 @@ class BulletClient:
         self._weightless -= {key for key in self._weightless if key[0] == body}
         self.waste += self._sizes.pop(body)
         self._bodies.pop(body, None)
+        self._sides = {key: side for key, side in self._sides.items() if key[0] != body}
 
     def step(self) -> None:
         """Integrates by one time step."""
@@ -137,7 +141,7 @@ class BulletClient:
 
     def contacts(self) -> list[Contact]:
         """See `Engine.contacts`."""
-        return contacts(self._client)
+        return contacts(self._client, self._sides)
 
     def _hold_up(self) -> None:
         """PyBullet's gravity acts on everything: a weightless link is held by a force against it."""

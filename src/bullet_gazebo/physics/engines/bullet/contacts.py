@@ -1,12 +1,13 @@
 """How the links of a body touch in PyBullet: friction, and which links of a body meet each other."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import combinations
+from typing import Any
 
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription, Shape
-from bullet_gazebo.physics.engine import Contact
+from bullet_gazebo.physics.engine import Contact, Side
 from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
-from bullet_gazebo.physics.pose import scale
+from bullet_gazebo.physics.pose import Vector, add, scale
 
 
 def set_friction(
@@ -71,8 +72,23 @@ def _friction(shape: Shape, static: bool) -> float:
     return min(shape.mu, 1.0) if static else shape.mu
 
 
-def contacts(client: int) -> list[Contact]:
-    """Returns where bodies touched in the last step; not where they only are near."""
+def contacts(client: int, sides: Mapping[tuple[int, int], Side]) -> list[Contact]:
+    """Returns where bodies touched in the last step; not where they only are near.
+
+    Args:
+        client: the world.
+        sides: what the engine's bodies and links are.
+    """
     found = pybullet.getContactPoints(physicsClientId=client)
-    # 6: the point on the second body, 7: the normal towards the first one, 9: the force along it.
-    return [Contact(each[6], scale(each[7], each[9])) for each in found if each[9] > 0.0]
+    return [_contact(each, sides) for each in found if each[9] > 0.0]
+
+
+def _contact(found: Sequence[Any], sides: Mapping[tuple[int, int], Side]) -> Contact:
+    """PyBullet tells links, not shapes; the point on the second body, and the normal towards the first."""
+    _, first, second, first_link, second_link, _, point, normal, distance, force = found[:10]
+    along, direction, across, other = found[10:14]
+    friction: Vector = add(scale(direction, along), scale(other, across))
+    return Contact(
+        point, scale(normal, force), friction, normal, -distance,
+        sides[first, first_link], sides[second, second_link],
+    )  # fmt: skip

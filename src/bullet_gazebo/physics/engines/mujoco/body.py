@@ -1,6 +1,6 @@
 """A model inside MuJoCo."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,6 +63,7 @@ class MujocoBody(Body):
         """Takes its places in a newly compiled model, and puts its settings into it."""
         model, data = self._state.model, self._state.data
         self._ids = {name: body.id for name, body in elements.bodies.items()}
+        self.touching = dict(self._geoms())
         self._indices = [elements.joints[name].id for name in self.joint_names]
         self._q = model.jnt_qposadr[self._indices].tolist()
         self._v = model.jnt_dofadr[self._indices].tolist()
@@ -79,6 +80,13 @@ class MujocoBody(Body):
             self.set_damping(index, joint.damping)
             self.set_limits(index, joint.lower, joint.upper)
             self.set_motor(index, joint.speed, joint.effort)
+
+    def _geoms(self) -> Iterator[tuple[int, tuple[str, tuple[str, ...]]]]:
+        """MuJoCo's shapes by their number: those of a link follow one another, in their order."""
+        for link, index in self._ids.items():
+            first = int(self._state.model.body_geomadr[index])
+            for place, shape in enumerate(self.description.links[link].collisions):
+                yield first + place, (link, (shape.name,))
 
     def motion(self) -> BodyArrays:
         """Returns a copy of its state, joint by joint and base last."""

@@ -6,7 +6,7 @@ from itertools import count
 import mujoco
 
 from bullet_gazebo.physics.description import ModelDescription
-from bullet_gazebo.physics.engine import Body, Contact, Engine
+from bullet_gazebo.physics.engine import Body, Contact, Engine, Side
 from bullet_gazebo.physics.engines.mujoco.body import MujocoBody
 from bullet_gazebo.physics.engines.mujoco.model import Elements, ModelWriter, compile_spec
 from bullet_gazebo.physics.engines.mujoco.state import MujocoState
@@ -35,6 +35,7 @@ class MujocoEngine(Engine):
         self._time_step = DEFAULT_STEP
         self._iterations = 50
         self._bodies: dict[str, MujocoBody] = {}
+        self._sides: dict[int, Side] = {}  # by number of the geom
         self._keys = count()
         model = compile_spec(mujoco.MjSpec())
         self._state = MujocoState(model, mujoco.MjData(model))
@@ -66,7 +67,7 @@ class MujocoEngine(Engine):
         self._state.step()
 
     def contacts(self) -> list[Contact]:
-        return self._state.contacts()
+        return self._state.contacts(self._sides)
 
     def close(self) -> None:
         self._bodies.clear()
@@ -97,6 +98,11 @@ class MujocoEngine(Engine):
     def _bind(self, written: dict[str, Elements]) -> None:
         for key, elements in written.items():
             self._bodies[key].bind(elements)
+        self._sides = {
+            geom: Side(body, *touching)
+            for body in self._bodies.values()
+            for geom, touching in body.touching.items()
+        }
         if any(elements.moments for elements in written.values()):
             mujoco.mj_setConst(self._state.model, mujoco.MjData(self._state.model))
         self._configure()

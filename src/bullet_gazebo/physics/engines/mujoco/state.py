@@ -1,5 +1,6 @@
 """MuJoCo's model and data of the whole world. Both are made anew when a model comes or goes."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import hypot
 from typing import NamedTuple
@@ -7,9 +8,9 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Contact, Twist
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Contact, Side, Twist
 from bullet_gazebo.physics.engines.mujoco.model import xyzw
-from bullet_gazebo.physics.pose import Pose, scale
+from bullet_gazebo.physics.pose import Pose, Vector, add, scale
 
 FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
@@ -109,15 +110,31 @@ class MujocoState:
         ax, ay, az, vx, vy, vz = speed.tolist()
         return Pose((x, y, z), xyzw(data.xquat[index])), ((vx, vy, vz), (ax, ay, az))
 
-    def contacts(self) -> list[Contact]:
-        """Returns where bodies touched in the last step; not where they only are near."""
-        found, force = [], np.empty(6)
+    def contacts(self, sides: Mapping[int, Side]) -> list[Contact]:
+        """Returns where bodies touched in the last step; not where they only are near.
+
+        Args:
+            sides: what the geoms are, by number.
+        """
+        found, wrench = [], np.empty(6)
         for index in range(self.data.ncon):
-            mujoco.mj_contactForce(self.model, self.data, index, force)
-            if force[0] > 0.0:
+            mujoco.mj_contactForce(self.model, self.data, index, wrench)
+            force, along, across, *_ = wrench.tolist()
+            if force > 0.0:
                 contact = self.data.contact[index]
                 x, y, z = contact.pos.tolist()
-                along, across, up = contact.frame[:3].tolist()
-                normal = scale((along, across, up), float(force[0]))
-                found.append(Contact((x, y, z), normal))
+                axes = contact.frame.tolist()  # of the contact, row by row
+                normal, one, other = _vector(axes[:3]), _vector(axes[3:6]), _vector(axes[6:])
+                friction = add(scale(one, along), scale(other, across))
+                # The normal points towards the second geom, which is our first one then.
+                second, first = (sides[geom] for geom in contact.geom.tolist())
+                depth = -float(contact.dist)
+                found.append(
+                    Contact((x, y, z), scale(normal, force), friction, normal, depth, first, second)
+                )
         return found
+
+
+def _vector(numbers: Sequence[float]) -> Vector:
+    x, y, z = numbers
+    return (x, y, z)

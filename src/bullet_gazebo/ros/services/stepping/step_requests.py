@@ -10,10 +10,15 @@ from bullet_gazebo.control.controllers.base import Controller, Input
 from bullet_gazebo.control.errors import ControlError, faults
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import RUNNING
-from bullet_gazebo.physics.model import Model
+from bullet_gazebo.physics.engine import Twist
+from bullet_gazebo.physics.model import AT_REST, Model
+from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.robot import ControlledRobot
-from bullet_gazebo.ros.wire.checks import LARGEST
+from bullet_gazebo.ros.wire.checks import LARGEST, bad_number
+from bullet_gazebo.ros.wire.conversions import from_pose_msg, from_twist_msg
 from bullet_gazebo.simulator import Simulator
+from bullet_gazebo.state.names import did_you_mean, find_model
+from bullet_gazebo.state.query import LinkQuery, StateQuery
 
 MAX_TICKS = 1_000_000  # a request beyond this is a mistake, and would take minutes
 Placing = tuple[dict[str, float], dict[str, float]]
@@ -21,19 +26,36 @@ Placing = tuple[dict[str, float], dict[str, float]]
 
 
 class StepPlan:
-    """Joints to place, by model, commands to controllers, and those to joints, to be held."""
+    """Models and joints to place, commands to controllers, those to joints, to be held, and what to tell."""
 
     def __init__(self, sim: Simulator, request: StepWorldRequest) -> None:
         """The caller holds the simulator's lock.
 
         Raises:
             ControlError: if the request can't be carried out; the text says why.
+            UnknownName: for a model that there is none of.
         """
         self._sim = sim
         _check_ticks(request)
+        self.placed_models = self._models(request)
         self.placed = self._placing(request)
         self.commands = self._controllers(request)
         self.held = self._joints(request)
+        self.query = _query(request)
+
+    def _models(self, request: StepWorldRequest) -> list[tuple[Model, Pose, Twist]]:
+        names, poses, twists = request.models, request.poses, request.twists
+        _check_lengths("models", names, "poses", poses)
+        if twists:
+            _check_lengths("models", names, "twists", twists)
+        for what, messages in (("poses", poses), ("twists", twists)):
+            for index, message in enumerate(messages):
+                fault = bad_number(message)
+                if fault:
+                    raise ControlError(f"{what}[{index}].{fault}")
+        models = [find_model(self._sim.world, name) for name in names]
+        speeds = [from_twist_msg(twist) for twist in twists] or [AT_REST] * len(models)
+        return list(zip(models, map(from_pose_msg, poses), speeds, strict=True))
 
     def _placing(self, request: StepWorldRequest) -> dict[Model, Placing]:
         names, velocities = request.joints, request.velocities or [0.0] * len(request.joints)
@@ -54,10 +76,18 @@ class StepPlan:
         world = self._sim.world
         found = world.joint(name)
         if found is None or found[1] not in found[0].joint_names:
-            raise ControlError(f"there is no movable joint '{name}'")
+            raise ControlError(
+                f"there is no movable joint '{name}'{did_you_mean(name, self._joint_names())}"
+            )
         if name == found[1] and sum(name in m.joint_names for m in world.models.values()) > 1:
             raise ControlError(f"several models have a joint '{name}'; write model::{name}")
         return found
+
+    def _joint_names(self) -> list[str]:
+        """Of all movable ones, plain and scoped."""
+        models = self._sim.world.models.values()
+        pairs = [(model.name, joint) for model in models for joint in model.joint_names]
+        return [name for model, joint in pairs for name in (joint, f"{model}::{joint}")]
 
     def _controllers(self, request: StepWorldRequest) -> list[Callable[[], None]]:
         """Each controller takes as many numbers as its command topic does."""
@@ -99,14 +129,15 @@ class StepPlan:
 
     def _controller(self, name: str) -> Controller:
         """Returns the running controller of that plain or full name."""
-        found = [
-            controller
+        loaded = [
+            (controller, rospy.names.ns_join(robot.namespace, controller.name))
             for robot in self._sim.robots
             for controller in robot.manager.loaded
-            if name in (controller.name, rospy.names.ns_join(robot.namespace, controller.name))
         ]
+        found = [each for each, full in loaded if name in (each.name, full)]
         if not found:
-            raise ControlError(f"no controller named '{name}' is loaded")
+            known = [known for each, full in loaded for known in (each.name, full)]
+            raise ControlError(f"no controller named '{name}' is loaded{did_you_mean(name, known)}")
         if len(found) > 1:
             raise ControlError(
                 f"several robots have a controller '{name}'; write /namespace/{name}"
@@ -117,14 +148,17 @@ class StepPlan:
 
     def _free_joint(self, name: str) -> JointHandle:
         """Returns the controllable joint of that plain or scoped name, if no running controller has it."""
-        found = [
-            (robot, joint)
+        joints = [
+            (robot, joint, f"{robot.model.name}::{joint.name}")
             for robot in self._sim.robots
             for joint in robot.hardware.joints.values()
-            if name in (joint.name, f"{robot.model.name}::{joint.name}")
         ]
+        found = [(robot, joint) for robot, joint, full in joints if name in (joint.name, full)]
         if not found:
-            raise ControlError(f"no robot has a joint '{name}' with a transmission")
+            known = [known for _, joint, full in joints for known in (joint.name, full)]
+            raise ControlError(
+                f"no robot has a joint '{name}' with a transmission{did_you_mean(name, known)}"
+            )
         if len(found) > 1:
             raise ControlError(f"several robots have a joint '{name}'; write model::{name}")
         _check_free(*found[0])
@@ -132,7 +166,7 @@ class StepPlan:
 
 
 def _check_ticks(request: StepWorldRequest) -> None:
-    begins = request.reset != StepWorldRequest.NONE or bool(request.joints)
+    begins = request.reset != StepWorldRequest.NONE or bool(request.joints or request.models)
     if not (0 if begins else 1) <= request.ticks <= MAX_TICKS:
         raise ControlError(
             f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call"
@@ -144,12 +178,30 @@ def _check_ticks(request: StepWorldRequest) -> None:
         raise ControlError(f"seed is {request.seed}, which goes with a reset only")
 
 
+def _query(request: StepWorldRequest) -> StateQuery:
+    links, frames = request.link_states_of, request.link_frames
+    frames = frames or [""] * len(links)
+    if len(links) != len(frames):
+        raise ControlError(f"{len(links)} link_states_of but {len(frames)} link_frames")
+    return StateQuery(
+        models=tuple(request.model_states_of),
+        all_models=request.model_states,
+        links=tuple(map(LinkQuery, links, frames)),
+        contacts_of=tuple(request.contacts_of),
+        all_contacts=request.contacts,
+    )
+
+
 def _check_list(names: str, one: Sequence[str], values: str, other: Sequence[float]) -> None:
+    _check_lengths(names, one, values, other)
+    _check_numbers(values, other)
+
+
+def _check_lengths(names: str, one: Sequence[str], values: str, other: Sequence[object]) -> None:
     if len(one) != len(other):
         raise ControlError(f"{len(one)} {names} but {len(other)} {values}")
     if len(set(one)) < len(one):
         raise ControlError(f"{names} names one twice: {list(one)}")
-    _check_numbers(values, other)
 
 
 def _check_numbers(what: str, values: Sequence[float]) -> None:

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from typing import Any
 
 import rospy
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
@@ -11,9 +12,16 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.ros.services.stepping.step_requests import StepPlan
-from bullet_gazebo.ros.wire.conversions import to_pose_msg, to_time, to_twist_msg
+from bullet_gazebo.ros.wire.conversions import (
+    to_contact_state,
+    to_pose_msg,
+    to_time,
+    to_twist_msg,
+)
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.simulator import Simulator
+from bullet_gazebo.state.names import UnknownName
+from bullet_gazebo.state.query import NOTHING, StateAnswer, StateQuery, StateReader
 
 SLICE = 500  # ticks between which other services get their turn
 
@@ -33,6 +41,7 @@ class StepService:
         self._sim = sim
         self._watchdog = watchdog
         self._one_at_a_time = one_at_a_time
+        self._reader = StateReader(sim.world, NOTHING)
         self._service = rospy.Service("~step_world", StepWorld, self._step)
 
     def _step(self, request: StepWorldRequest) -> StepWorldResponse:
@@ -40,12 +49,24 @@ class StepService:
             self._sim.await_holds()
             try:
                 plan = StepPlan(self._sim, request)  # everything is checked before anything is done
+                reader = self._reader_of(plan.query)
                 self._begin(request, plan)  # what is left to fail is a user's controller
-            except ControlError as error:
-                return self._answer(request, f"StepWorld: {error}")
+            except (ControlError, UnknownName) as error:
+                return self._refusal(str(error))
             with self._watchdog:
                 self._advance(request.ticks, plan.held)
-            return self._answer(request)
+            try:
+                return self._answer(reader, request.ticks > 0)
+            except UnknownName as error:
+                return self._refusal(f"the ticks are done, but meanwhile {error}")
+
+    def _reader_of(self, query: StateQuery) -> StateReader | None:
+        """Clients ask the same again and again, so the names are looked up but once."""
+        if query == NOTHING:
+            return None
+        if query != self._reader.query or self._reader.is_stale:
+            self._reader = StateReader(self._sim.world, query)
+        return self._reader
 
     def _begin(self, request: StepWorldRequest, plan: StepPlan) -> None:
         sim = self._sim
@@ -53,6 +74,8 @@ class StepService:
             if request.seed:
                 seed_random_numbers(request.seed, tell=False)
             sim.reset(everything=request.reset == StepWorldRequest.SIMULATION)
+        for model, pose, twist in plan.placed_models:
+            sim.place_model(model, pose, twist)
         for model, (positions, velocities) in plan.placed.items():
             sim.set_joint_states(model, positions, velocities)
         for command in (*plan.commands, *plan.held):
@@ -76,16 +99,20 @@ class StepService:
                 command()
             self._sim.advance(1)
 
-    def _answer(self, request: StepWorldRequest, fault: str = "") -> StepWorldResponse:
-        response = StepWorldResponse(
-            success=not fault,
-            status_message=fault,
+    def _answer(self, reader: StateReader | None, stepped: bool) -> StepWorldResponse:
+        return StepWorldResponse(
+            success=True,
+            sim_time=self._sim.sim_time,
+            joint_states=self._joint_states(),
+            **({} if reader is None else _told(reader.read(stepped))),
+        )
+
+    def _refusal(self, fault: str) -> StepWorldResponse:
+        return StepWorldResponse(
+            status_message=f"StepWorld: {fault}",
             sim_time=self._sim.sim_time,
             joint_states=self._joint_states(),
         )
-        if request.model_states and not fault:
-            self._add_models(response)
-        return response
 
     def _joint_states(self) -> JointState:
         robots = self._sim.robots
@@ -99,9 +126,15 @@ class StepService:
             effort=[joint.effort for _, joint in joints],
         )
 
-    def _add_models(self, response: StepWorldResponse) -> None:
-        for name, model in self._sim.world.models.items():
-            pose, twist = model.state()
-            response.model_names.append(name)
-            response.model_poses.append(to_pose_msg(pose))
-            response.model_twists.append(to_twist_msg(twist))
+
+def _told(answer: StateAnswer) -> dict[str, Any]:
+    """Fields of a response."""
+    models = answer.models.values()
+    return {
+        "model_names": list(answer.models),
+        "model_poses": [to_pose_msg(pose) for pose, _ in models],
+        "model_twists": [to_twist_msg(twist) for _, twist in models],
+        "link_poses": [to_pose_msg(pose) for pose, _ in answer.links],
+        "link_twists": [to_twist_msg(twist) for _, twist in answer.links],
+        "contacts": [to_contact_state(pair) for pair in answer.contacts],
+    }
