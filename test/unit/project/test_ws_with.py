@@ -78,7 +78,8 @@ def workspace(tmp_path_factory):
     package(source / "build", "hidden")
     (source / "build/CMakeCache.txt").touch()
     (folder / "my_env.py").write_text(
-        "import gymnasium\ngymnasium.register('MyEnv-v0', 'gymnasium.envs.classic_control:CartPoleEnv', max_episode_steps=50)\n"
+        "from gymnasium import register\n"
+        "register('MyEnv-v0', 'gymnasium.envs.classic_control:CartPoleEnv', max_episode_steps=50)\n"
     )
     return folder
 
