@@ -46,6 +46,8 @@ source "$ROOT/tools/ws_ready.sh"
 source "$ROOT/tools/ws_steps.sh"
 # shellcheck source=tools/ws_environment.sh
 source "$ROOT/tools/ws_environment.sh"
+# shellcheck source=tools/ws_with.sh
+source "$ROOT/tools/ws_with.sh"
 # shellcheck source=tools/ws_check.sh
 source "$ROOT/tools/ws_check.sh"
 
@@ -54,7 +56,9 @@ NOT_FAST="rostest or slow or long or stress or extras"
 
 usage() {
     cat <<END
-usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
+usage: ws [--with FOLDER]... CMD [ARG...]
+                             make the workspace ready, then run CMD in it, where the catkin packages
+                             and Python modules in the user's FOLDERs are found, too
        ws test [ARG...]      run all tests; ARGs go to pytest, e.g. -k gazebo
        ws test --fast [ARG...]
                              run the tests of about a minute, without those through ROS (test/ros),
@@ -70,6 +74,7 @@ usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
 For example:
        ./ws rosrun cartpole pg_train.py
        ./ws roslaunch gazebo_ros empty_world.launch gui:=false
+       ./ws --with ~/my_ws roslaunch my_arm arm.launch
 
 Ready means: the packages of requirements/debian.txt are installed (apt-get, through sudo when
 not root), .ws/venv holds requirements/base.txt, and .ws is a catkin workspace built from this
@@ -79,10 +84,12 @@ Where that can't be written, it lies in ~/.cache/cartpole; CARTPOLE_WS_DIR names
 
 ROS talks over loopback only, to a master on a port of this user and checkout: $DEFAULT_MASTER
 Set ROS_MASTER_URI, ROS_IP or ROS_HOSTNAME to use another master or network.
-Packages on the caller's ROS_PACKAGE_PATH and in catkin workspaces that the caller has sourced are
-found, and go before the companions of the same name; only cartpole, gazebo_ros and
-bullet_gazebo_msgs are this checkout's. All else of PYTHONPATH and CMAKE_PREFIX_PATH, a whole ROS,
-ROS_NAMESPACE, conda and virtual environments are left out.
+FOLDERs may also stand in CARTPOLE_WITH, with colons between them; folders on ROS_PACKAGE_PATH are
+such as well. What CMake has to make of packages in them, such as messages, is built in .ws/with.
+Catkin workspaces that the caller has sourced are used as they were built. Packages of the caller go
+before this checkout's of the same name, all but cartpole and bullet_gazebo_msgs. All else of
+PYTHONPATH and CMAKE_PREFIX_PATH, a whole ROS, ROS_NAMESPACE, conda and virtual environments are left
+out.
 END
 }
 
@@ -122,6 +129,17 @@ clean() {
 }
 
 main() {
+    while [[ ${1-} == --with || ${1-} == --with=* ]]; do
+        if [[ $1 == --with ]]; then
+            add_folder --with "${2-}"
+            shift 2
+        else
+            add_folder --with "${1#*=}"
+            shift
+        fi
+        [[ $# -gt 0 ]] || fail_usage "--with needs a command behind its folder"
+    done
+    add_folders_of_the_environment
     case ${1-} in
         '' | -h | --help | help) usage; [[ -n ${1-} ]]; return ;;
         clean) choose_place; clean; return ;;

@@ -21,11 +21,13 @@ leave_other_workspaces() {
 }
 
 declare -A CALLER=()  # of each path variable, what belongs to the caller's packages
+CALLER_FOLDERS=  # folders of packages that no sourced workspace has built
 remember_callers_packages() {
     CALLER_WORKSPACES=$(filter_paths is_workspace "${CMAKE_PREFIX_PATH-}"):
+    CALLER_FOLDERS=$(filter_paths is_not_built "${ROS_PACKAGE_PATH-}")
     CALLER=(
         [CMAKE_PREFIX_PATH]=${CALLER_WORKSPACES%:}
-        [ROS_PACKAGE_PATH]=$(filter_paths is_not_ours "${ROS_PACKAGE_PATH-}")
+        [ROS_PACKAGE_PATH]=$(filter_paths is_built_elsewhere "${ROS_PACKAGE_PATH-}")
         [PYTHONPATH]=$(filter_paths in_workspace "${PYTHONPATH-}")
         [LD_LIBRARY_PATH]=$(filter_paths in_workspace "${LD_LIBRARY_PATH-}")
         [PATH]=$(filter_paths in_workspace "$PATH")
@@ -41,7 +43,21 @@ filter_paths() {  # test, a:b:c
     printf %s "$kept"
 }
 
-is_not_ours() { [[ $1/ != "$WS"/* ]]; }
+is_not_ours() { [[ $1/ != "$WS"/* && $1/ != "$STATE"/* ]]; }
+
+is_not_built() { is_not_ours "$1" && ! is_built "$1"; }
+is_built_elsewhere() { is_not_ours "$1" && is_built "$1"; }
+
+# It is what a sourced workspace was built from or has installed, or is a whole ROS.
+is_built() {  # entry of ROS_PACKAGE_PATH
+    local workspace workspaces
+    [[ ! -e $1/rospy/package.xml ]] && in_no_workspace "$1" || return 0
+    IFS=: read -ra workspaces <<<"$CALLER_WORKSPACES"
+    for workspace in "${workspaces[@]}"; do
+        [[ ";$(<"$workspace/.catkin");" != *";$1;"* ]] || return 0
+    done
+    return 1
+}
 
 # A whole ROS isn't taken: rospy and its like are Debian's.
 is_workspace() { [[ -f $1/.catkin && ! -e $1/share/rospy ]] && is_not_ours "$1"; }
@@ -87,6 +103,7 @@ bind_to_loopback() {
 
 enter_workspace() {
     leave_other_workspaces
+    make_theirs_ready "$CALLER_FOLDERS"
     bind_to_loopback
     export ROS_HOME=$STATE/ros ROS_LOG_DIR=$STATE/ros/log MPLCONFIGDIR=$STATE/matplotlib \
         HYPOTHESIS_STORAGE_DIRECTORY=$STATE/hypothesis RUFF_CACHE_DIR=$STATE/ruff \
@@ -98,6 +115,7 @@ enter_workspace() {
     set -u
     local variable
     for variable in "${!CALLER[@]}"; do put_before_companions "$variable"; done
+    enter_theirs
     # Programs of the workspaces before those that pip has put beside Python: xacro is bounded.
     export PATH=$WS/devel/bin:${CALLER[PATH]:+${CALLER[PATH]}:}$COMPANIONS/devel/bin:$VENV/bin:$PATH
 }

@@ -4,7 +4,7 @@
 # ~/.bashrc may put another Python first on PATH, or source another workspace.
 declare -A _ws_kept=()
 for _ws_name in PATH PYTHONPATH LD_LIBRARY_PATH PKG_CONFIG_PATH CMAKE_PREFIX_PATH PYTHONNOUSERSITE \
-    MPLCONFIGDIR VIRTUAL_ENV PYTHONHOME CARTPOLE_WS "${!ROS@}"; do
+    MPLCONFIGDIR VIRTUAL_ENV PYTHONHOME CARTPOLE_WS CARTPOLE_WITH "${!ROS@}"; do
     [[ -z ${!_ws_name+x} ]] || _ws_kept[$_ws_name]=${!_ws_name}
 done
 # shellcheck disable=SC1090
@@ -34,7 +34,7 @@ fi
 unset _ws_rosbash
 
 _ws_complete() {
-    local word=${COMP_WORDS[COMP_CWORD]} commands=(test check shell extras rviz clean --help)
+    local word=${COMP_WORDS[COMP_CWORD]} commands=(test check shell extras rviz clean --with --help)
     COMPREPLY=()
     if [[ $COMP_CWORD -eq 1 ]]; then
         mapfile -t COMPREPLY < <(compgen -W "${commands[*]}" -- "$word"; compgen -c -- "$word")

@@ -1,4 +1,4 @@
-"""A caller's own packages in `ws`: they win over the companions of the same name, and only over those."""
+"""A workspace that the caller has built and sourced, in `ws`: its packages win over the companions."""
 
 from __future__ import annotations
 
@@ -127,18 +127,18 @@ def test_what_stands_in_for_gazebo_stays_ours(root, workspace, way):
 
 
 def test_only_on_ros_package_path(root, workspace):
+    """Then ws builds what has to be built, in a place of its own; more in test_ws_with.py."""
+
     def ws(*command):
         environment = {"ROS_PACKAGE_PATH": str(workspace / "src")}
         return run([root / "ws", *command], env=environment).strip()
 
     assert ws("rospack", "find", "their_robot") == str(workspace / "src/their_robot")
     assert ws("rospack", "find", "control_msgs") == str(workspace / "src/control_msgs")
-    assert Path(ws("rospack", "find", "gazebo_ros")).is_relative_to(root)
-    # It isn't built, so ours has the Python module.
-    module = ws(
-        "python3", "-c", "import control_msgs.msg as m; m.JointControllerState; print(m.__file__)"
-    )
-    assert Path(module).is_relative_to(root)
+    for name in ("cartpole", "bullet_gazebo_msgs"):
+        assert Path(ws("rospack", "find", name)).is_relative_to(root)
+    module = ws("python3", "-c", "import control_msgs.msg as m; m.Theirs; print(m.__file__)")
+    assert Path(module).is_relative_to(root / ".ws/with")
 
 
 def test_a_whole_ros_is_left_out(root, tmp_path):

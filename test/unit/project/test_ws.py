@@ -174,22 +174,6 @@ def test_callers_workspaces_are_left_out(ws, tmp_path):
     assert stranger not in result.stdout.replace(str(fake.parent), "")
 
 
-def test_callers_packages_are_found_behind_ours(ws, tmp_path):
-    for name in ("their_robot", "gazebo_ros"):
-        folder = tmp_path / name
-        folder.mkdir()
-        (folder / "package.xml").write_text(
-            f'<package format="2"><name>{name}</name><version>0.0.1</version><description/>'
-            '<maintainer email="a@example.com">a</maintainer><license>BSD</license></package>'
-        )
-    code = "import rospkg; p = rospkg.RosPack(); print(p.get_path('their_robot'), p.get_path('gazebo_ros'))"
-    result = ws("python3", "-c", code, ROS_PACKAGE_PATH=str(tmp_path))
-    assert result.returncode == 0, result.stderr
-    theirs, ours = result.stdout.split()[-2:]
-    assert theirs == str(tmp_path / "their_robot")
-    assert not ours.startswith(str(tmp_path))
-
-
 def test_a_folder_in_the_root_is_no_reason_to_build(ws, root, tmp_path):
     """Trainings leave runs/ there; a build under a running one would take its files away."""
     folder = root / f"zz-{tmp_path.name}"

@@ -1,0 +1,96 @@
+"""Makes the user's own packages ready for `ws`, and prints what has to be on which path.
+
+Each line of the output is NAME=VALUE, for tools/ws_with.sh; what a person is told goes to standard error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import sys
+from pathlib import Path
+
+from tools.user_packages.build import Overlay, Tools, say
+from tools.user_packages.find import PLAIN, clashes, look_through
+
+REMEDY = "mend it, or put an empty file CATKIN_IGNORE beside its package.xml"
+
+
+def main() -> int:
+    """Reads the command line that ws gives, and returns the exit code."""
+    parser = argparse.ArgumentParser(prog="user_packages")
+    parser.add_argument("--root", type=Path, required=True, help="this checkout")
+    parser.add_argument("--place", type=Path, required=True, help="the folder for what is made")
+    parser.add_argument("--python", required=True, help="the interpreter of built scripts")
+    parser.add_argument("--prefixes", required=True, help="CMAKE_PREFIX_PATH")
+    parser.add_argument("--state", required=True, help="changes when those are made anew")
+    parser.add_argument("--also", default="", help="ROS_PACKAGE_PATH")
+    parser.add_argument("folders", nargs="*", type=Path, help="the user's folders")
+    args = parser.parse_args()
+
+    also = [Path(each) for each in args.also.split(":") if each]
+    found = look_through(args.folders, also, args.root.resolve())
+    if not found.folders:
+        for note in found.problems + found.notes:
+            say(note)
+        return 0
+    overlay = Overlay(args.place, found.folders, Tools(args.python, args.prefixes, args.state))
+    failed = overlay.make(found)
+    links = Links(overlay.links)
+    paths = {each.name: links.plain(each.path, each.name) for each in found.packages.values()}
+    overlay.offer(paths)
+
+    modules = list(found.modules)
+    for each in found.packages.values():
+        as_it_is = not each.is_made or each.name in failed
+        if as_it_is and (each.path / "src").is_dir() and each.path / "src" not in modules:
+            modules.append(each.path / "src")
+    for folder in modules:
+        found.problems += clashes(folder, args.root)
+    found.problems += [
+        f"your package {name} isn't built: {reason} (log: {overlay.log(name)}); {REMEDY}"
+        for name, reason in failed.items()
+    ]
+    for problem in found.problems:
+        say(problem)
+    if not overlay.told(found.notes):
+        for note in found.notes:
+            say(note)
+
+    python = [str(overlay.devel / "lib/python3/dist-packages")]
+    print(f"CMAKE_PREFIX_PATH={overlay.devel}")
+    print(f"ROS_PACKAGE_PATH={':'.join(paths.values())}")
+    print(f"PYTHONPATH={':'.join([*python, *map(links.plain, modules)])}")
+    print(f"LD_LIBRARY_PATH={overlay.devel / 'lib'}")
+    print(f"CARTPOLE_WITH={':'.join(map(links.plain, found.folders))}")
+    return 0
+
+
+class Links:
+    """Plain names for paths that ROS and rosrun would split."""
+
+    def __init__(self, place: Path) -> None:
+        self._place = place
+
+    def plain(self, path: Path, name: str = "folder") -> str:
+        """The path itself, or that of a link to it."""
+        if PLAIN.fullmatch(str(path)):
+            return str(path)
+        link = self._place / hashlib.sha256(bytes(path)).hexdigest()[:12] / name
+        if not link.is_symlink():
+            link.parent.mkdir(parents=True, exist_ok=True)
+            temporary = link.with_name(f"{name}.{os.getpid()}")
+            temporary.symlink_to(path)
+            temporary.replace(link)  # another ws may have just made it
+        return str(link)
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except OSError as error:
+        say(f"your packages can't be made ready: {error}")
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(130)
