@@ -42,7 +42,9 @@ def _box(shape: Shape) -> tuple[Vector, Vector]:
 
 
 def _beyond(*excess: float) -> float:
-    """Distance from a body [m] of a point that is beyond it by so much in directions at right angles; negative
-    inside."""
+    """Distance [m] from a body of a point that is beyond it by so much in directions at right angles.
+
+    Negative inside.
+    """
     outside = hypot(*(max(each, 0.0) for each in excess))
     return outside + min(max(excess), 0.0)

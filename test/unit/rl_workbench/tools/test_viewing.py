@@ -3,7 +3,6 @@
 import os
 import shutil
 import socket
-import sys
 import time
 from pathlib import Path
 
@@ -31,7 +30,7 @@ class Blind(gymnasium.Env):
 
     observation_space = gymnasium.spaces.Box(-1.0, 1.0, (2,))
     action_space = gymnasium.spaces.Discrete(2)
-    metadata = {"render_modes": []}  # noqa: RUF012
+    metadata = {"render_modes": []}
 
     def __init__(self) -> None:
         self.render_mode = None
@@ -153,7 +152,7 @@ def endless(place: Path) -> Path:
 class Endless(Blind):
     """One whose episodes don't end."""
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(self, render_mode=None) -> None:
         self.render_mode = render_mode
