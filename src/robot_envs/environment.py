@@ -201,7 +201,8 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
 
         Returns:
             What moves the robot on the page to where it is in that moment: a function, which takes a
-            caption to show above the robot, or nothing. It may raise `SimulatorError`.
+            caption to show below the robot, or nothing, and may raise `SimulatorError`. Its two halves
+            are `look()`, which tells where the robot is, and `show()`, which moves it there, then or later.
 
         Raises:
             RobotEnvError: if the robot's file can't be read.

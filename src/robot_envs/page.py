@@ -19,7 +19,7 @@ from robot_envs.robot import State
 
 WORLD = "/world"  # node
 GAP = 0.15  # between robots, as a share of what one of them can reach
-CAPTION_GAP = 0.04  # above it, as a share of the camera's distance
+LOW = 0.9  # of a caption, from the middle of what the camera sees to its lower edge
 
 logger = logging.getLogger(__name__)
 
@@ -60,18 +60,19 @@ class RobotOnPage(Generic[State]):
     ) -> None:
         self._server, self._placement, self._state = server, placement, state
         self._is_first, self._node = not beside, f"{WORLD}/{beside}"
+        self._caption_node = f"/caption{beside}"
         self._caption: viser.LabelHandle | None = None
         reach, aspect = placement.reach(), size[0] / size[1]
         looking = placement.camera(camera, aspect)
-        across = reach @ looking.axes[0]
-        width = (1.0 + GAP) * float(np.ptp(across)) if len(reach) else 0.0
-        aside = width * looking.axes[0]
+        right, up, _ = looking.axes
+        low = looking.target - LOW * looking.slope * looking.distance * up
+        aside = np.zeros(3)
         if beside:
+            aside = (1.0 + GAP) * np.ptp(reach @ right) * right
             row = [reach + number * aside for number in range(beside + 1)]
             looking = overview(np.concatenate(row), aspect, looking)
         _look(server.initial_camera, looking)
-        top = reach[:, 2].max(initial=0.0) + CAPTION_GAP * looking.distance
-        self._above = (*(reach.mean(axis=0)[:2] if len(reach) else (0.0, 0.0)), top)
+        self._foot = low + beside * aside
         scene = server.scene
         if self._is_first:
             self._world = scene.add_frame(WORLD, show_axes=False)
@@ -86,7 +87,7 @@ class RobotOnPage(Generic[State]):
         """Moves it to where it is now.
 
         Args:
-            caption: a line of text above it; empty: the one that is there stays.
+            caption: a line of text below it; empty: the one that is there stays.
 
         Raises:
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
@@ -118,7 +119,11 @@ class RobotOnPage(Generic[State]):
     def _tell(self, caption: str) -> None:
         if self._caption is None:
             self._caption = self._server.scene.add_label(
-                f"{self._node}/caption", caption, position=self._above, anchor="bottom-center"
+                self._caption_node,
+                caption,
+                position=self._foot,
+                anchor="bottom-center",
+                depth_test=False,
             )
         elif caption != self._caption.text:
             self._caption.text = caption

@@ -18,7 +18,7 @@ POLL = 0.05  # [s]
 OPTIONS = (
     "--headless=new", "--no-sandbox", "--disable-gpu-sandbox", "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader", "--remote-debugging-port=0", "--no-first-run", "--disable-extensions",
-    "--disable-dev-shm-usage", "--disable-background-networking", "--window-size=1280,800",
+    "--disable-dev-shm-usage", "--disable-background-networking",
 )  # fmt: skip
 
 
@@ -39,15 +39,17 @@ def wait_for(look, what):
 class Browser:
     """One page. A context manager."""
 
-    def __init__(self, url):
-        self._url = url
+    def __init__(self, url, offline=False, size=(1280, 800)):
+        self._url, self._offline, self._size = url, offline, size
         self._ids = itertools.count(1)
         self.log = []  # what the page wrote to its console
+        self.requests = []  # addresses that it asked for, from the moment on in which it is offline
 
     def __enter__(self):
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self._process = subprocess.Popen(
-            [find_browser(), *OPTIONS, f"--user-data-dir={self._folder.name}", "about:blank"],
+            [find_browser(), *OPTIONS, f"--window-size={self._size[0]},{self._size[1]}",
+             f"--user-data-dir={self._folder.name}", "about:blank"],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         try:
@@ -59,6 +61,10 @@ class Browser:
             self._socket = connect(page["webSocketDebuggerUrl"], max_size=None)
             self._do("Runtime.enable")
             self._do("Page.enable")
+            if self._offline:
+                self._do("Network.enable")
+                self._do("Network.emulateNetworkConditions", offline=True, latency=0,
+                         downloadThroughput=-1, uploadThroughput=-1)  # fmt: skip
             self._do("Page.navigate", url=self._url)
         except BaseException:
             self.__exit__()
@@ -77,6 +83,8 @@ class Browser:
             answer = json.loads(self._socket.recv(timeout=BOUND))
             if answer.get("method") in ("Runtime.consoleAPICalled", "Runtime.exceptionThrown"):
                 self.log.append(answer["params"])
+            if answer.get("method") == "Network.requestWillBeSent":
+                self.requests.append(answer["params"]["request"]["url"])
             if answer.get("id") == number:
                 assert "error" not in answer, answer
                 return answer["result"]
@@ -96,6 +104,17 @@ class Browser:
 
     def wait_for_text(self, text):
         wait_for(lambda: text in self.text, f"text {text!r}")
+
+    def type(self, selector, text):
+        """Types a text into the first input of a CSS selector, in place of what it has."""
+        self.run(
+            f"""(() => {{
+              const input = document.querySelector({json.dumps(selector)});
+              const value = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value");
+              value.set.call(input, {json.dumps(text)});
+              input.dispatchEvent(new Event("input", {{bubbles: true}}));
+            }})()"""
+        )
 
     def choose(self, now, wanted):
         """Chooses `wanted` in the list that shows `now`."""

@@ -84,6 +84,8 @@ def test_several_stand_beside_each_other_with_captions_and_are_all_seen(server, 
     for count, robot in enumerate(robots):
         robot(f"the {count}. one")
     robots[2]()  # keeps its caption
+    kept = robots[1].look()
+    robots[1].show(kept)
     nodes = Recording(server.get_scene_serializer().serialize()).at()
     assert [n["text"] for n in shapes(nodes, "LabelMessage")] == [
         "the 0. one", "the 1. one", "the 2. one"

@@ -40,7 +40,7 @@ def record_scene(
         seed: of the episodes.
         fastest: frames a second at most [Hz].
         longest: number of steps after which an episode is cut off; 0: never.
-        captions: tell step, return and action above the robots.
+        captions: tell step, return and action below the robots.
 
     Raises:
         WorkbenchError: if the robot can't be drawn, or the players share one robot.
