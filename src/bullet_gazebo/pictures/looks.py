@@ -1,32 +1,99 @@
-"""Mesh files as the browser gets them: with colours and textures where the file has them.
+"""Mesh files as they look: with colours and textures where the file has them.
 
-A file is read by our checked reader first. What it refuses, the page doesn't show; what it takes may be read
-once more, for what it leaves aside: materials.
+A file is read by our checked reader first. What it refuses isn't shown; what it takes may be read once more,
+for what it leaves aside: materials.
 """
 
 import os
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import trimesh
+from PIL import Image
 
+from bullet_gazebo.physics.description import Color, DescriptionError
 from bullet_gazebo.physics.elements import parse_xml
 from bullet_gazebo.physics.meshes.collada import axes_of
-from bullet_gazebo.physics.meshes.reader import FAULTS, read_mesh
+from bullet_gazebo.physics.meshes.reader import FAULTS, check_mesh, read_mesh
+
+if TYPE_CHECKING:  # imported with the first mesh: who looks at none doesn't pay for it
+    import trimesh
 
 MOST_KEPT = 32  # files
 MOST_TEXTURE = 32_000_000  # [bytes] of a model with its textures, for the browser
+MOST_COLORS = 64  # of a mesh whose faces have colours of their own, for pictures
+LARGEST_IMAGE = 1024  # [pixels] a side, for pictures
+STOPGAP = 2  # [pixels] a side of trimesh's image where there is none
+WHITE = (255, 255, 255, 255)
+PLAIN = (".stl",)  # endings of files that have no materials
+# Pillow's and pycollada's own faults beside those that were met: the shape without looks is shown.
+FAULTY = (*FAULTS, OSError, ImportError, SyntaxError)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Triangles of one look: corners (n, 3, 3), and a colour, if they have one, which a texture takes on.
+
+    `uvs` (n, 3, 2) are the corners' places in the texture, with v upwards; it repeats beyond [0, 1].
+    """
+
+    triangles: np.ndarray
+    rgba: Color | None
+    texture: Image.Image | None = None
+    uvs: np.ndarray | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class MeshLook:
-    """Triangles, and the whole file for the browser (binary glTF) where it has looks of its own."""
+    """Triangles; and the file's scene with materials, z up and in metres, where it has looks of its own."""
 
     vertices: np.ndarray
     faces: np.ndarray
-    glb: bytes | None
+    scene: "trimesh.Scene | None"
+
+    @cached_property
+    def glb(self) -> bytes | None:
+        """The whole for a browser, as binary glTF; None where it has no looks, or is too large."""
+        if self.scene is None:
+            return None
+        try:
+            content = self.scene.export(file_type="glb")
+        except FAULTY:
+            return None
+        fits = isinstance(content, bytes) and len(content) <= MOST_TEXTURE
+        return content if fits else None
+
+    @cached_property
+    def parts(self) -> list[Part]:
+        """The same for a renderer of triangles; none where the file has no looks."""
+        if self.scene is None:
+            return []
+        try:
+            return [part for node in self.scene.graph.nodes_geometry for part in self._parts(node)]
+        except FAULTY:
+            return []
+
+    def _parts(self, node: str) -> list[Part]:
+        assert self.scene is not None
+        frame, name = self.scene.graph[node]
+        mesh = self.scene.geometry[name]
+        if not hasattr(mesh, "faces"):
+            return []  # lines and points
+        points = mesh.vertices @ frame[:3, :3].T + frame[:3, 3]
+        triangles = points[mesh.faces]
+        if np.linalg.det(frame[:3, :3]) < 0.0:
+            triangles = triangles[:, ::-1]
+        visual: Any = mesh.visual
+        if visual.kind != "texture":
+            return _coloured(triangles, np.asarray(visual.face_colors))
+        if _is_stopgap(visual.material):
+            return [Part(triangles, None)]
+        rgba, image = _color(visual.material), _image(visual.material)
+        if image is None or visual.uv is None:
+            return [Part(triangles, rgba)]
+        return [Part(triangles, rgba, image, np.asarray(visual.uv, float)[mesh.faces])]
 
 
 def read_look(path: str) -> MeshLook:
@@ -34,20 +101,27 @@ def read_look(path: str) -> MeshLook:
 
     Raises:
         DescriptionError: if it can't be shown: the file, and what is wrong with it, in one line.
-        OSError: if it can't be read.
     """
-    found = os.stat(path)
+    check_mesh(Path(path))
+    try:
+        found = os.stat(path)
+    except OSError as error:
+        raise DescriptionError(f"mesh '{path}': {error.strerror}") from error
     return _read(path, found.st_mtime_ns, found.st_size)
 
 
 @lru_cache(MOST_KEPT)
 def _read(path: str, _changed: int, _size: int) -> MeshLook:
     solid = read_mesh(Path(path))
-    return MeshLook(solid.vertices, solid.faces, _glb(path))
+    return MeshLook(solid.vertices, solid.faces, _scene(path))
 
 
-def _glb(path: str) -> bytes | None:
+def _scene(path: str) -> "trimesh.Scene | None":
     """The file with its materials; None where it has none, or none that can be read."""
+    if path.lower().endswith(PLAIN):
+        return None
+    import trimesh
+
     try:
         scene = trimesh.load_scene(path)
         if not any(_has_look(part) for part in scene.geometry.values()):
@@ -59,11 +133,11 @@ def _glb(path: str) -> bytes | None:
                 element.tag = element.tag.rpartition("}")[2]
             axes[:3, :3] = axes_of(root)
             scene.apply_transform(axes)
-        content = scene.export(file_type="glb")
-    # Pillow's and pycollada's own faults beside those that were met: the shape without looks is shown.
-    except (*FAULTS, OSError, ImportError, SyntaxError):
+        for part in scene.geometry.values():
+            _brighten(getattr(getattr(part, "visual", None), "material", None))
+    except FAULTY:
         return None
-    return content if isinstance(content, bytes) and len(content) <= MOST_TEXTURE else None
+    return scene
 
 
 def _has_look(part: object) -> bool:
@@ -72,9 +146,55 @@ def _has_look(part: object) -> bool:
         return False
     if visual.kind != "texture":
         return bool(visual.kind)
-    material = visual.material
-    return getattr(material, "image", None) is not None or _colored(material)
+    return not _is_stopgap(visual.material)
 
 
-def _colored(material: object) -> bool:
-    return any(getattr(material, key, None) is not None for key in ("diffuse", "baseColorFactor"))
+def _is_stopgap(material: Any) -> bool:
+    """Whether trimesh has put it where the file names no material, or one that isn't there."""
+    image = getattr(material, "image", None)
+    return getattr(material, "kwargs", None) == {} and (image is None or max(image.size) <= STOPGAP)
+
+
+def _brighten(material: Any) -> None:
+    """A texture whose file gives it no colour is seen as it is; trimesh would have it dark."""
+    told = getattr(material, "kwargs", None)
+    if told is not None and "kd" not in told and getattr(material, "image", None) is not None:
+        material.diffuse = WHITE
+
+
+def _coloured(triangles: np.ndarray, colors: np.ndarray) -> list[Part]:
+    """Triangles by their colours (n, 4) of uint8; a few of them stand for many."""
+    found, kinds = np.unique(colors, axis=0, return_inverse=True)
+    if len(found) > MOST_COLORS:
+        coarse = (colors[:, :3] // 64).astype(int) @ (16, 4, 1)
+        _, kinds = np.unique(coarse, return_inverse=True)
+        found = np.array([colors[kinds == kind].mean(axis=0) for kind in range(kinds.max() + 1)])
+    return [
+        Part(triangles[kinds.ravel() == kind], _rgba(color)) for kind, color in enumerate(found)
+    ]
+
+
+def _color(material: Any) -> Color:
+    for key in ("baseColorFactor", "diffuse"):
+        found = getattr(material, key, None)
+        if found is not None:
+            return _rgba(found)
+    return (1.0, 1.0, 1.0, 1.0)
+
+
+def _rgba(color: Any) -> Color:
+    """A colour of trimesh's: of 0 to 255 where it has whole numbers, else of 0 to 1."""
+    numbers = np.ravel(color)
+    scale = 255.0 if np.issubdtype(numbers.dtype, np.integer) or numbers.max() > 1.0 else 1.0
+    red, green, blue, *rest = np.clip(numbers / scale, 0.0, 1.0).tolist()
+    return (red, green, blue, rest[0] if rest else 1.0)
+
+
+def _image(material: Any) -> Image.Image | None:
+    for key in ("baseColorTexture", "image"):
+        found = getattr(material, key, None)
+        if isinstance(found, Image.Image):
+            small = found.convert("RGB")
+            small.thumbnail((LARGEST_IMAGE, LARGEST_IMAGE))
+            return small
+    return None

@@ -5,26 +5,36 @@ changes a simulation, whatever engine that has, and the same poses give the same
 """
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from PIL import Image
 
 from bullet_gazebo.physics.description import DescriptionError, Shape
 from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
-from bullet_gazebo.physics.pose import Pose, is_finite
+from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.pictures.ground import Background, background
-from bullet_gazebo.pictures.solids import GREY, Solid, box_around, moved, solid_of
+from bullet_gazebo.pictures.parts import DrawnPart, Textures, drawn_parts
 
 FINER = 2  # pixels of the renderer across one of the picture: smooth edges
-MOST_CORNERS = 90_000  # of a body: PyBullet refuses more than 131072
 LIGHT = (1.0, -2.0, 4.0)  # where it comes from
 NOTHING = 0.9999  # OpenGL's depth of what is too far away to be seen
-FARTHEST = 1e6  # [m]; beyond it nothing is drawn
+
+Region = tuple[int, int, int, int]
+"""Left, top, right and bottom [pixels]."""
 
 logger = logging.getLogger(__name__)
+
+
+class Layer(NamedTuple):
+    """What the renderer has drawn of a region: colours (h, w, 3), depths and numbers of bodies (h, w)."""
+
+    colours: np.ndarray
+    depths: np.ndarray
+    bodies: np.ndarray
 
 
 class Scene:
@@ -33,7 +43,8 @@ class Scene:
     def __init__(self) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self._client)
-        self._models: dict[str, list[_Part]] = {}
+        self._models: dict[str, list[DrawnPart]] = {}
+        self._textures = Textures(self._client)
         self._background = lru_cache(maxsize=2)(background)
 
     def add(self, name: str, shapes: Iterable[tuple[str, Shape]]) -> None:
@@ -45,11 +56,9 @@ class Scene:
         self._models[name] = parts = []
         for link, shape in shapes:
             try:
-                solid = solid_of(shape)
+                parts += drawn_parts(self._client, link, shape, self._textures)
             except DescriptionError as error:
                 logger.warning("model '%s', link '%s' isn't drawn whole: %s", name, link, error)
-                continue
-            parts += [_Part(self._client, link, shape, piece) for piece in _pieces(solid)]
 
     def remove(self, name: str) -> None:
         """Takes a model out, if there is one of that name."""
@@ -76,26 +85,49 @@ class Scene:
         left, top, right, bottom = (FINER * edge for edge in region)
         if left >= right or top >= bottom:
             return whole
-        part = np.s_[top:bottom, left:right]
+        clear = [part for parts in self._models.values() for part in parts if part.alpha < 1.0]
+        nowhere = camera.eye + 2.0 * camera.far * camera.axes[2]
+        for part in clear:
+            part.hide(tuple(nowhere.tolist()))
+        try:
+            layer = self._layer(camera, width, height, region)
+        finally:
+            for part in clear:
+                part.show()
+        limit = np.minimum(behind.depth[top:bottom], NOTHING)
+        nearer = layer.depths < limit
+        colours = behind.colours[top:bottom, left:right]
+        drawn = np.where(nearer[..., np.newaxis], layer.colours, colours)
+        if clear:
+            limit = np.where(nearer, layer.depths, limit)
+            layer = self._layer(camera, width, height, region, bodies=True)
+            drawn = _through(drawn, limit, layer, clear)
+        left, top, right, bottom = region
+        whole[top:bottom, left:right] = np.asarray(Image.fromarray(drawn).reduce(FINER))
+        return whole
+
+    def _layer(
+        self, camera: Camera, width: int, height: int, region: Region, bodies: bool = False
+    ) -> Layer:
+        """Draws a region, with numbers of `bodies` where they are asked for: that takes time."""
+        left, top, right, bottom = (FINER * edge for edge in region)
         size = (right - left, bottom - top)
-        colours, depth = pybullet.getCameraImage(
+        colours, depths, numbers = pybullet.getCameraImage(
             *size,
             viewMatrix=camera.view_matrix().T.ravel().tolist(),
             projectionMatrix=camera.projection_matrix(width, height, region).T.ravel().tolist(),
             lightDirection=LIGHT,
             shadow=0,
-            flags=pybullet.ER_NO_SEGMENTATION_MASK,
+            flags=0 if bodies else pybullet.ER_NO_SEGMENTATION_MASK,
             renderer=pybullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
-        )[2:4]
-        nearer = np.reshape(depth, size[::-1]) < np.minimum(behind.depth[top:bottom], NOTHING)
+        )[2:5]
         pixels = np.reshape(colours, (*size[::-1], 4))[..., :3].astype(np.uint8)
-        drawn = np.where(nearer[..., np.newaxis], pixels, behind.colours[part])
-        left, top, right, bottom = region
-        whole[top:bottom, left:right] = np.asarray(Image.fromarray(drawn).reduce(FINER))
-        return whole
+        shape = size[::-1]
+        found = np.reshape(numbers, shape) if bodies else np.zeros((0, 0), int)
+        return Layer(pixels, np.reshape(depths, shape), found)
 
-    def _region(self, camera: Camera, width: int, height: int) -> tuple[int, int, int, int]:
+    def _region(self, camera: Camera, width: int, height: int) -> Region:
         """What of a picture the models are within [pixels]: the renderer's time goes with its size."""
         boxes = [part.corners() for parts in self._models.values() for part in parts]
         if not boxes:
@@ -121,42 +153,21 @@ class Scene:
             pybullet.disconnect(self._client)
 
 
-class _Part:
-    """Some triangles of one shape of a link."""
+def _through(
+    colours: np.ndarray, limit: np.ndarray, layer: Layer, clear: Sequence[DrawnPart]
+) -> np.ndarray:
+    """Colours (h, w, 3) behind what light passes through, of which the nearest is seen.
 
-    def __init__(self, client: int, link: str, shape: Shape, solid: Solid) -> None:
-        self.link = link
-        self._client, self._pose = client, shape.pose
-        self._box = box_around(solid)
-        visual = pybullet.createVisualShape(
-            pybullet.GEOM_MESH,
-            vertices=solid.corners.tolist(),
-            normals=solid.normals.tolist(),
-            indices=list(range(len(solid.corners))),
-            rgbaColor=shape.rgba or GREY,
-            physicsClientId=client,
-        )
-        self._body = pybullet.createMultiBody(0.0, -1, visual, physicsClientId=client)
-        self.place(Pose())
-
-    def place(self, link: Pose) -> None:
-        """Moves it with its link; what is lost in space stays where it was seen last."""
-        pose = link.compose(self._pose)
-        if is_finite(pose) and max(map(abs, pose.position)) < FARTHEST:
-            self._seen = pose
-            pybullet.resetBasePositionAndOrientation(
-                self._body, *pose, physicsClientId=self._client
-            )
-
-    def corners(self) -> np.ndarray:
-        """Corners of a box around it, in the world [m]: (8, 3)."""
-        return moved(self._box, self._seen)
-
-    def remove(self) -> None:
-        pybullet.removeBody(self._body, physicsClientId=self._client)
-
-
-def _pieces(solid: Solid) -> list[Solid]:
-    """Pieces of a solid that PyBullet takes."""
-    starts = range(0, len(solid.corners), MOST_CORNERS)
-    return [Solid(*(each[i : i + MOST_CORNERS] for each in solid)) for i in starts]
+    Args:
+        limit: depths of what is behind (h, w).
+        layer: all bodies.
+        clear: those that light passes through.
+    """
+    alphas = np.ones(layer.bodies.max() + 2)  # the last one: nothing
+    for part in clear:
+        if part.body < len(alphas):
+            alphas[part.body] = part.alpha
+    alpha = alphas[layer.bodies][..., np.newaxis]
+    seen = (layer.depths < limit)[..., np.newaxis] & (alpha < 1.0)
+    mixed = alpha * layer.colours + (1.0 - alpha) * colours
+    return np.where(seen, np.rint(mixed), colours).astype(np.uint8)

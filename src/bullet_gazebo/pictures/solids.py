@@ -1,14 +1,14 @@
 """Shapes as triangles, for whoever draws them."""
 
 import math
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from PIL import Image
 
 from bullet_gazebo.physics.description import Color, ModelDescription, Shape
-from bullet_gazebo.physics.meshes.reader import read_mesh
 from bullet_gazebo.physics.pose import Pose, rotate
+from bullet_gazebo.pictures.looks import read_look
 
 GREY: Color = (0.7, 0.7, 0.72, 1.0)  # of a shape that has no colour
 SIDES = 40  # of a cylinder
@@ -21,6 +21,15 @@ class Solid(NamedTuple):
 
     corners: np.ndarray
     normals: np.ndarray
+
+
+class Piece(NamedTuple):
+    """Triangles of one look. `uvs` (3 n, 2) are their corners' places in the texture, see `looks.Part`."""
+
+    solid: Solid
+    rgba: Color
+    texture: Image.Image | None = None
+    uvs: np.ndarray | None = None
 
 
 def visible_shapes(model: ModelDescription) -> list[tuple[str, Shape]]:
@@ -40,8 +49,8 @@ def solid_of(shape: Shape) -> Solid:
         DescriptionError: for a mesh file that can't be read.
     """
     if shape.kind == "mesh":
-        mesh = shape.solid or read_mesh(Path(shape.mesh))
-        return _flat((mesh.vertices * np.array(shape.size))[mesh.faces])
+        mesh = shape.solid or read_look(shape.mesh)
+        return _flat(_scaled(mesh.vertices[mesh.faces], shape.size))
     if shape.kind == "box":
         return _flat(_box(shape.size))
     if shape.kind == "cylinder":
@@ -54,6 +63,35 @@ def solid_of(shape: Shape) -> Solid:
     ball = creation.icosphere(subdivisions=ROUNDS, radius=shape.size[0])
     corners = ball.vertices[ball.faces].reshape(-1, 3)
     return Solid(corners, corners / shape.size[0])
+
+
+def pieces_of(shape: Shape) -> list[Piece]:
+    """The triangles of a shape as they look, in its own frame; a mesh file's own looks come first.
+
+    Raises:
+        DescriptionError: for a mesh file that can't be read.
+    """
+    rgba = shape.rgba or GREY
+    if shape.kind != "mesh" or shape.solid is not None:
+        return [Piece(solid_of(shape), rgba)]
+    order = slice(None, None, _turn(shape.size))
+    pieces = [
+        Piece(
+            _flat(_scaled(part.triangles, shape.size)), part.rgba or rgba, part.texture,
+            None if part.uvs is None else part.uvs[:, order].reshape(-1, 2),
+        )
+        for part in read_look(shape.mesh).parts
+    ]  # fmt: skip
+    return pieces or [Piece(solid_of(shape), rgba)]
+
+
+def _scaled(triangles: np.ndarray, size: tuple[float, ...]) -> np.ndarray:
+    """Triangles (n, 3, 3) of a mesh in its scale, with the same side outwards where that mirrors them."""
+    return np.asarray((triangles * np.array(size))[:, :: _turn(size)])
+
+
+def _turn(size: tuple[float, ...]) -> int:
+    return 1 if math.prod(size) > 0.0 else -1
 
 
 def box_around(solid: Solid) -> np.ndarray:

@@ -80,7 +80,7 @@ class ShapeMaker:
     ) -> None:
         try:
             mesh = read_look(shape.mesh)
-        except (DescriptionError, OSError) as error:
+        except DescriptionError as error:
             self._add_unshown(name, f"{where}: {error}", place)
             return
         x, y, z = shape.size if len(shape.size) == 3 else (1.0, 1.0, 1.0)
