@@ -1,34 +1,45 @@
-"""The command shown_joints.py: joint states for RViz, from the first moment and thirty times a second.
+"""The command shown_joints.py: where a robot is, for RViz, from the first moment and thirty times a second.
 
 RViz draws a link white, and at the wrong place, until it knows where the link is, and joint states come
-only while simulated time passes: in a paused world, and in one in lock-step, maybe never. So the joints are
-asked for once, by a service that answers while paused too. Later states are handed on, the newest first;
-those of joint_state_publisher, which only has zeros, are not. The topic is latched, for who comes later.
+only while simulated time passes: in a paused world, and in one in lock-step, maybe never; and where nothing
+publishes them, never. So until one has come the simulator is asked, by a service that answers while paused,
+too. Later states are handed on, the newest first; not those of joint_state_publisher, which only has zeros.
+
+Nobody tells tf where a robot stands that isn't fixed to the world: the simulator is asked, and it becomes a
+transform from world to its root link.
 """
 
 import contextlib
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import rospy
-from gazebo_msgs.srv import GetJointProperties
+from gazebo_msgs.srv import GetJointProperties, GetLinkState, GetWorldProperties
+from geometry_msgs.msg import Pose, Transform, TransformStamped, Vector3
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
 
-from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.description import DescriptionError, Joint, ModelDescription
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from ros_calls.service import ServiceClient, ServiceFailed
 
 NAME = "shown_joints"
+WORLD = "world"
 PERIOD = 1.0 / 30.0  # [s of wall time]
-PATIENCE = 1.0  # [s of wall time] from one question to the next, as long as the robot isn't there
+ASKING = 0.1  # [s of wall time] from one question to the next, as long as no joint states come
+PATIENCE = 1.0  # [s of wall time] for a robot that isn't there, or joint states that stay the same
 
 
 class ShownJoints:
-    """Hands joint states on from /joint_states to ~joint_states."""
+    """Hands a robot's joint states on from /joint_states to ~joint_states."""
 
-    def __init__(self) -> None:
+    def __init__(self, joints: Sequence[Joint]) -> None:
+        self._joints = joints
+        self._ask = ServiceClient(
+            "/gazebo/get_joint_properties", GetJointProperties, persistent=True
+        )
         self._newest: JointState | None = None
         self._news = threading.Event()
         self._publisher = rospy.Publisher("~joint_states", JointState, queue_size=1, latch=True)
@@ -41,48 +52,88 @@ class ShownJoints:
 
     def run(self) -> None:
         """Until the node is shut down."""
-        names = _movable()
-        self._publish(names, [0.0] * len(names))
-        while not rospy.is_shutdown() and self._newest is None:
-            asked = dict(_asked_for(names))
-            if len(asked) == len(names):
-                self._publish(names, list(asked.values()))
-                break
-            self._news.wait(PATIENCE)
+        names: Sequence[str] = [joint.name for joint in self._joints]
+        positions: Sequence[float] = [0.0] * len(names)
         while not rospy.is_shutdown():
-            if self._news.wait(PATIENCE):
+            # Again and again: RViz, or who makes tf of it, may have come just now.
+            self._publish(names, positions)
+            time.sleep(PERIOD)  # no more often; what comes meanwhile is newer
+            if self._news.wait(ASKING if self._newest is None else PATIENCE):
                 self._news.clear()
                 assert self._newest is not None
-                self._publish(self._newest.name, self._newest.position)
-                time.sleep(PERIOD)  # no more often; what comes meanwhile is newer
+                names, positions = self._newest.name, self._newest.position
+            elif self._newest is None:
+                positions = self._asked(names) or positions
+
+    def _asked(self, names: Sequence[str]) -> list[float]:
+        """Positions [rad, m] of the joints in the simulator; empty as long as it hasn't all of them."""
+        positions = []
+        with contextlib.suppress(ServiceFailed):
+            for name in names:
+                answer = self._ask(name)
+                if not answer.success:
+                    return []
+                positions.append(answer.position[0])
+        return positions if len(positions) == len(names) else []
 
     def _publish(self, names: Sequence[str], positions: Sequence[float]) -> None:
         """In wall time, in which tf and RViz live here: simulated time may stand still or go back."""
-        stamp = Header(stamp=rospy.Time.from_sec(time.time()))
-        self._publisher.publish(JointState(header=stamp, name=names, position=positions))
+        self._publisher.publish(JointState(header=_now(), name=names, position=positions))
 
 
-def _movable() -> list[str]:
+class ShownBase:
+    """Tells ~tf where the root link of a robot is that isn't fixed to the world."""
+
+    def __init__(self, root: str) -> None:
+        self._root = root
+        self._model = ""  # that has it; empty: not known yet
+        self._publisher = rospy.Publisher("~tf", TFMessage, queue_size=1)
+        self._models = ServiceClient("/gazebo/get_world_properties", GetWorldProperties)
+        self._state = ServiceClient("/gazebo/get_link_state", GetLinkState, persistent=True)
+
+    def run(self) -> None:
+        """Until the node is shut down."""
+        while not rospy.is_shutdown():
+            pose = None
+            with contextlib.suppress(ServiceFailed):
+                pose = self._pose()
+            if pose is not None:
+                self._publish(pose)
+            time.sleep(PATIENCE if pose is None else PERIOD)
+
+    def _pose(self) -> Pose | None:
+        """Where it is in the world; None as long as no model has it."""
+        for model in [self._model] if self._model else self._models().model_names:
+            answer = self._state(f"{model}::{self._root}", WORLD)
+            if answer.success:
+                self._model = model
+                return answer.link_state.pose
+        self._model = ""
+        return None
+
+    def _publish(self, pose: Pose) -> None:
+        place, turn = pose.position, pose.orientation
+        there = Transform(Vector3(place.x, place.y, place.z), turn)
+        self._publisher.publish(TFMessage([TransformStamped(_now(WORLD), self._root, there)]))
+
+
+def _now(frame: str = "") -> Header:
+    return Header(stamp=rospy.Time.from_sec(time.time()), frame_id=frame)
+
+
+def _described() -> ModelDescription | None:
     try:
-        description = parse_urdf(rospy.get_param("/robot_description", ""))
+        return parse_urdf(rospy.get_param("/robot_description", ""))
     except DescriptionError as error:
         rospy.logwarn("/robot_description: %s", error)
-        return []
-    return [joint.name for joint in description.movable_joints]
-
-
-def _asked_for(joints: list[str]) -> Iterator[tuple[str, float]]:
-    """Names and positions [rad, m] of the joints that the simulator has."""
-    service = ServiceClient("/gazebo/get_joint_properties", GetJointProperties)
-    with contextlib.suppress(ServiceFailed):
-        for name in joints:
-            answer = service(name)
-            if answer.success:
-                yield name, answer.position[0]
+        return None
 
 
 def main() -> int:
     """Runs the node; returns its exit code."""
     rospy.init_node(NAME)
-    ShownJoints().run()
+    robot = _described()
+    if robot is not None and not robot.fixed_base:
+        threading.Thread(target=ShownBase(robot.root).run, daemon=True).start()
+    ShownJoints(robot.movable_joints if robot is not None else []).run()
     return 0
