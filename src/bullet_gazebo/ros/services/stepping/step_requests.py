@@ -18,7 +18,7 @@ from bullet_gazebo.ros.wire.checks import LARGEST, bad_number
 from bullet_gazebo.ros.wire.conversions import from_pose_msg, from_twist_msg
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state.names import did_you_mean, find_model
-from bullet_gazebo.state.query import LinkQuery, StateQuery
+from bullet_gazebo.state.query import NOTHING, LinkQuery, StateQuery
 
 MAX_TICKS = 1_000_000  # a request beyond this is a mistake, and would take minutes
 Placing = tuple[dict[str, float], dict[str, float]]
@@ -45,6 +45,8 @@ class StepPlan:
 
     def _models(self, request: StepWorldRequest) -> list[tuple[Model, Pose, Twist]]:
         names, poses, twists = request.models, request.poses, request.twists
+        if not names and not poses and not twists:
+            return []
         _check_lengths("models", names, "poses", poses)
         if twists:
             _check_lengths("models", names, "twists", twists)
@@ -180,6 +182,11 @@ def _check_ticks(request: StepWorldRequest) -> None:
 
 def _query(request: StepWorldRequest) -> StateQuery:
     links, frames = request.link_states_of, request.link_frames
+    if not (
+        links or frames or request.contacts or request.contacts_of
+        or request.model_states or request.model_states_of
+    ):  # fmt: skip
+        return NOTHING
     frames = frames or [""] * len(links)
     if len(links) != len(frames):
         raise ControlError(f"{len(links)} link_states_of but {len(frames)} link_frames")
