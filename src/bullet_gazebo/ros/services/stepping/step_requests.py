@@ -36,12 +36,12 @@ class StepPlan:
             UnknownName: for a model that there is none of.
         """
         self._sim = sim
-        _check_ticks(request)
+        self.query = _query(request)
+        _check_ticks(request, self.query is not NOTHING)
         self.placed_models = self._models(request)
         self.placed = self._placing(request)
         self.commands = self._controllers(request)
         self.held = self._joints(request)
-        self.query = _query(request)
 
     def _models(self, request: StepWorldRequest) -> list[tuple[Model, Pose, Twist]]:
         names, poses, twists = request.models, request.poses, request.twists
@@ -167,12 +167,13 @@ class StepPlan:
         return found[0][1]
 
 
-def _check_ticks(request: StepWorldRequest) -> None:
+def _check_ticks(request: StepWorldRequest, asks: bool) -> None:
+    """`asks`: for more than the joints."""
     begins = request.reset != StepWorldRequest.NONE or bool(request.joints or request.models)
-    if not (0 if begins else 1) <= request.ticks <= MAX_TICKS:
+    if not (0 if begins or asks else 1) <= request.ticks <= MAX_TICKS:
         raise ControlError(
             f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call"
-            + (", or 0 with a reset" if request.ticks == 0 else "")
+            + (", or 0 with a reset, a placing or a question" if request.ticks == 0 else "")
         )
     if request.reset > StepWorldRequest.SIMULATION:
         raise ControlError(f"reset is {request.reset}: 0 (none), 1 (world) or 2 (simulation)")
