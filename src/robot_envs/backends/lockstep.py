@@ -9,11 +9,10 @@ from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldRespons
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.base_pose import base_pose
 from robot_envs.backends.bring_up import STEP_SERVICE
-from robot_envs.backends.joint_states import read_state
+from robot_envs.backends.messages import ask_for, place, read_state, told
 from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.ros_variation import RosVariation
 from robot_envs.backends.service import ServiceClient
-from robot_envs.backends.told import ask_for, place, told
 from robot_envs.errors import SimulatorError
 from robot_envs.robot import Robot, State
 from robot_envs.task import Command

@@ -13,7 +13,7 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.base_pose import base_pose
-from robot_envs.backends.joint_states import read_state
+from robot_envs.backends.messages import read_state
 from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.ros_variation import RosVariation
 from robot_envs.backends.service import ServiceClient

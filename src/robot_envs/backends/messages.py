@@ -1,14 +1,18 @@
-"""Between step_world's messages and what tasks see of a world."""
+"""Between messages and what tasks see of a robot and its world."""
 
+from __future__ import annotations
+
+import math
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
-from bullet_gazebo_msgs.srv import StepWorldRequest, StepWorldResponse
-from gazebo_msgs.msg import ContactState
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
+from sensor_msgs.msg import JointState as JointStateMsg
 
 from bullet_gazebo.physics.pose import Pose, Vector
+from robot_envs.errors import SimulatorError
+from robot_envs.robot import Robot, State
 from robot_envs.world_state import (
     ContactPair,
     JointState,
@@ -17,6 +21,31 @@ from robot_envs.world_state import (
     WorldState,
     link_keys,
 )
+
+if TYPE_CHECKING:  # a world in real time needs none of them
+    from bullet_gazebo_msgs.srv import StepWorldRequest, StepWorldResponse
+    from gazebo_msgs.msg import ContactState
+
+
+def read_state(robot: Robot[State], message: JointStateMsg) -> State:
+    """The robot's joints, as its tasks see them.
+
+    Raises:
+        SimulatorError: if a joint is missing or a value isn't finite.
+    """
+    numbers: list[float] = []
+    try:
+        for joint in robot.joints:
+            index = message.name.index(joint)
+            numbers += (message.position[index], message.velocity[index])
+    except (ValueError, IndexError):
+        raise SimulatorError(
+            f"the joint state lacks {' or '.join(robot.joints)}; it has: {list(message.name)}"
+        ) from None
+    state = robot.state_of(numbers)
+    if not math.isfinite(sum(numbers)):
+        raise SimulatorError(f"the joint state isn't finite: {state}")
+    return state
 
 
 def ask_for(request: StepWorldRequest, query: StateQuery) -> None:
@@ -64,7 +93,7 @@ def told(
     )
 
 
-def _motion(pose: Any, twist: Any) -> Motion:
+def _motion(pose: PoseMsg, twist: Twist) -> Motion:
     place, turn = pose.position, pose.orientation
     at = Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
     return Motion(at, (_vector(twist.linear), _vector(twist.angular)))
