@@ -1,11 +1,13 @@
 """What an environment needs of a robot, be it simulated here, over ROS, or real."""
 
+from collections.abc import Mapping
 from typing import Protocol
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.robot import Robot, State
 from robot_envs.task import Command
 from robot_envs.variation import Variation
+from robot_envs.world_state import Motion, StateQuery, WorldState
 
 PHYSICS_STEP = 0.001  # [s]; Gazebo's, and of a world in this process
 DEFAULT_ENGINE = "bullet"
@@ -18,15 +20,28 @@ class RobotBackend(Protocol[State]):
     deterministic: bool  # whether the same commands give the same states
     shared: bool  # whether all backends of its kind in a process move the same robot
 
-    def reset(self, state: State) -> State:
+    def reset(self, state: State, placed: Mapping[str, Motion] | None = None) -> State:
         """Puts the joints where the state says; returns the state reached.
 
         A backend that can't set velocities puts them at rest, and says so in what it returns.
+
+        Args:
+            state: of the robot.
+            placed: models to put where they are wanted, in the world, by name; the others stand
+                where they were spawned.
         """
         ...
 
     def act(self, command: Command) -> State:
         """Commands the controllers; returns the state one control period later."""
+        ...
+
+    def look(self, query: StateQuery) -> None:
+        """Has `world` tell what a query names, beside the joints, from the next reset on."""
+        ...
+
+    def world(self) -> WorldState:
+        """The world after the last reset or action; costs nothing where nobody asks for it."""
         ...
 
     def vary(self, variation: Variation) -> None:

@@ -1,7 +1,7 @@
 """A robot in a physics world of this process: no ROS, and the same bits as over ROS in lock-step."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from operator import attrgetter
 from typing import Generic
@@ -13,9 +13,10 @@ from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import STRICT, ControllerManager
 from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.engines.registry import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.pose import Pose, normalized
 from bullet_gazebo.physics.properties import (
     JointProperties,
     link_inertia,
@@ -24,12 +25,15 @@ from bullet_gazebo.physics.properties import (
 )
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.robot import ControlledRobot
-from bullet_gazebo.simulator import Simulator
+from bullet_gazebo.simulator import NANOSECONDS, Simulator
+from bullet_gazebo.state.names import UnknownName, find_model
+from bullet_gazebo.state.query import NOTHING, StateReader
 from robot_envs.backends.backend import DEFAULT_ENGINE, PHYSICS_STEP, ticks_per_action
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot, State
 from robot_envs.task import Command
 from robot_envs.variation import LinkFigures, Variation
+from robot_envs.world_state import JointState, Motion, StateQuery, WorldState, link_keys
 
 _numbers = attrgetter("position", "velocity")
 
@@ -69,7 +73,7 @@ class InProcessRobot(Generic[State]):
         try:
             pose = Pose((0.0, 0.0, height))
             self._model = self._sim.world.spawn(robot.model, parse_urdf(urdf), pose)
-            hardware = RobotHardware(read_description(urdf))
+            self._hardware = hardware = RobotHardware(read_description(urdf))
             self._joints = [_joint(hardware, name) for name in robot.joints]
             self._receivers = self._start(hardware)
         except (ControlError, DescriptionError) as error:
@@ -80,6 +84,8 @@ class InProcessRobot(Generic[State]):
             raise
         self._nominal: dict[str, LinkFigures] = {}
         self._damping: dict[str, float] = {}
+        self._reader = StateReader(self._sim.world, NOTHING)
+        self._begin = 0  # [ns] of the episode
 
     def _start(self, hardware: RobotHardware) -> list[tuple[int, Callable[[float], None]]]:
         """Starts the robot's controllers in the world; returns what takes each number of a command."""
@@ -89,10 +95,22 @@ class InProcessRobot(Generic[State]):
         manager.switch(loaded, [], STRICT)
         return [(index, _receiver(loaded[name])) for index, name in enumerate(robot.commanded)]
 
-    def reset(self, state: State) -> State:
-        """See `RobotBackend.reset`; the state asked for is the state reached, within the joints' stops."""
-        joints = self.robot.joints
+    def reset(self, state: State, placed: Mapping[str, Motion] | None = None) -> State:
+        """See `RobotBackend.reset`; the state asked for is the state reached, within the joints' stops.
+
+        Raises:
+            SimulatorError: for a model to place that isn't there.
+        """
+        joints, world = self.robot.joints, self._sim.world
+        try:
+            models = [(find_model(world, name), at) for name, at in (placed or {}).items()]
+        except UnknownName as error:
+            raise SimulatorError(str(error)) from error
         self._sim.reset(everything=False)
+        self._begin = self._sim.now
+        for model, (pose, twist) in models:
+            upright = Pose(pose.position, normalized(pose.orientation))
+            self._sim.place_model(model, upright, twist)
         self._sim.set_joint_states(
             self._model,
             dict(zip(joints, state[::2], strict=True)),
@@ -119,6 +137,32 @@ class InProcessRobot(Generic[State]):
         if not math.isfinite(sum(state)):
             raise SimulatorError(f"the joint state isn't finite: {state}")
         return state
+
+    def look(self, query: StateQuery) -> None:
+        """See `RobotBackend.look`.
+
+        Raises:
+            ValueError: for a link that is named twice.
+            SimulatorError: for a name of nothing in this world.
+        """
+        link_keys(query)
+        try:
+            self._reader = StateReader(self._sim.world, query)
+        except UnknownName as error:
+            raise SimulatorError(str(error)) from error
+
+    def world(self) -> WorldState:
+        """See `RobotBackend.world`."""
+        passed, reader = self._sim.now - self._begin, self._reader
+        answer = reader.read(stepped=passed > 0)
+        joints = self._hardware.joints.items()
+        return WorldState(
+            time=passed / NANOSECONDS,
+            joints={name: JointState(j.position, j.velocity, j.effort) for name, j in joints},
+            links=dict(zip(link_keys(reader.query), map(_motion, answer.links), strict=True)),
+            models={name: _motion(state) for name, state in answer.models.items()},
+            contacts=answer.contacts,
+        )
 
     def vary(self, variation: Variation) -> None:
         """See `RobotBackend.vary`."""
@@ -154,6 +198,10 @@ class InProcessRobot(Generic[State]):
         if not self._closed:
             self._closed = True
             self._sim.world.close()
+
+
+def _motion(state: tuple[Pose, Twist]) -> Motion:
+    return Motion(*state)
 
 
 def _joint(hardware: RobotHardware, name: str) -> JointHandle:

@@ -1,14 +1,15 @@
 """A robot in a simulator over ROS that moves in lock-step."""
 
+from collections.abc import Mapping
 from typing import Generic
 
 import genpy
-from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.base_pose import base_pose
 from robot_envs.backends.bring_up import STEP_SERVICE
-from robot_envs.backends.joint_states import read_state
+from robot_envs.backends.messages import ask_for, place, read_state, told
 from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.ros_variation import RosVariation
 from robot_envs.backends.service import ServiceClient
@@ -16,6 +17,7 @@ from robot_envs.errors import SimulatorError
 from robot_envs.robot import Robot, State
 from robot_envs.task import Command
 from robot_envs.variation import Variation
+from robot_envs.world_state import Motion, StateQuery, WorldState, link_keys
 from ros_utils.step_client import time_of
 
 
@@ -35,13 +37,23 @@ class LockstepRobot(Generic[State]):
         self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True)
         self._begin = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=list(robot.joints))
         self._advance = StepWorldRequest(ticks=ticks, controllers=list(robot.commanded))
+        self._look = StepWorldRequest()
         self._step.timeout += time_of(ticks)
+        self._query = StateQuery()
+        self._begun = self._answer = StepWorldResponse()
         self._variation = RosVariation(robot)
 
-    def reset(self, state: State) -> State:
-        """See `RobotBackend.reset`; the state asked for is the state reached, exactly."""
+    def reset(self, state: State, placed: Mapping[str, Motion] | None = None) -> State:
+        """See `RobotBackend.reset`; the state asked for is the state reached, exactly.
+
+        Raises:
+            SimulatorError: if it is refused or the simulator doesn't answer.
+        """
         self._begin.positions, self._begin.velocities = state[::2], state[1::2]
-        return self._call(self._begin)
+        place(self._begin, placed or {})
+        reached = self._call(self._begin)
+        self._begun = self._answer
+        return reached
 
     def act(self, command: Command) -> State:
         """See `RobotBackend.act`.
@@ -57,7 +69,29 @@ class LockstepRobot(Generic[State]):
             answer = self._step(request)
             if not answer.success:
                 raise SimulatorError(f"{STEP_SERVICE}: {answer.status_message}")
+            self._answer = answer
             return read_state(self.robot, answer.joint_states)
+
+    def look(self, query: StateQuery) -> None:
+        """See `RobotBackend.look`.
+
+        Raises:
+            ValueError: for a link that is named twice.
+            SimulatorError: for a name of nothing in the simulator's world, or if it doesn't answer.
+        """
+        link_keys(query)
+        ask_for(self._look, query)
+        if query == StateQuery():
+            self._answer = StepWorldResponse(joint_states=self._answer.joint_states)
+        else:
+            self._call(self._look)  # no ticks: it only looks
+        for request in (self._begin, self._advance):
+            ask_for(request, query)
+        self._query = query
+
+    def world(self) -> WorldState:
+        """See `RobotBackend.world`."""
+        return told(self._answer, self._begun, self._query, self.robot.model)
 
     def vary(self, variation: Variation) -> None:
         """See `RobotBackend.vary`."""

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Generic
 
 import rospy
@@ -13,19 +13,21 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.base_pose import base_pose
-from robot_envs.backends.joint_states import read_state
+from robot_envs.backends.messages import read_state
 from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.ros_variation import RosVariation
 from robot_envs.backends.service import ServiceClient
-from robot_envs.errors import SimulatorError
+from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot, State
 from robot_envs.task import Command
 from robot_envs.variation import Variation
+from robot_envs.world_state import Motion, StateQuery, WorldState
 
 STATE_TIMEOUT = 5.0  # [s] of wall time without a joint state
 RESET_WAIT = 0.5  # [s] of wall time for the joint state that a reset publishes
 _SAME = 1e-6  # [m], [rad]
 _EARLY = 1e-6  # [s]; of rounding
+_ONLY_JOINTS = "a world in real time gives the joints alone (backend 'ros-realtime')"
 
 
 class _Resetter:
@@ -130,12 +132,17 @@ class RealtimeRobot(Generic[State]):
                 self._newest = (message, time.monotonic())
                 self._arrived.notify_all()
 
-    def reset(self, state: State) -> State:
+    def reset(self, state: State, placed: Mapping[str, Motion] | None = None) -> State:
         """See `RobotBackend.reset`; leaves the world paused.
 
         Waits for the joint state that the reset publishes. A simulator that is silent while
         paused is believed to have done what it said.
+
+        Raises:
+            RobotEnvError: for models to place.
         """
+        if placed:
+            raise RobotEnvError(f"{_ONLY_JOINTS}: models can't be placed in it")
         positions = state[::2]
         with self._simulator:
             for topic in self._topics:
@@ -194,6 +201,23 @@ class RealtimeRobot(Generic[State]):
         if self._newest is None:
             return False
         return due is None or self._newest[0].header.stamp.to_sec() > due - _EARLY
+
+    def look(self, query: StateQuery) -> None:
+        """See `RobotBackend.look`.
+
+        Raises:
+            RobotEnvError: in any case but for a query of nothing.
+        """
+        if query != StateQuery():
+            raise RobotEnvError(f"{_ONLY_JOINTS}: links, models and contacts aren't told")
+
+    def world(self) -> WorldState:
+        """See `RobotBackend.world`.
+
+        Raises:
+            RobotEnvError: in any case.
+        """
+        raise RobotEnvError(f"{_ONLY_JOINTS}, as its state")
 
     def vary(self, variation: Variation) -> None:
         """See `RobotBackend.vary`."""

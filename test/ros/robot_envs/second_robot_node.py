@@ -19,8 +19,11 @@ from environment_conformance import rollout
 from gymnasium.utils.env_checker import data_equivalence as same
 from pendulum import FILES, PACKAGE, PENDULUM, PendulumState, make_pendulum
 
+from bullet_gazebo.physics.pose import Pose
+from robot_envs.backends.in_process import InProcessRobot
 from robot_envs.backends.session import RosSession
-from robot_envs.errors import RobotEnvError
+from robot_envs.errors import RobotEnvError, SimulatorError
+from robot_envs.world_state import LinkQuery, Motion, StateQuery
 from ros_utils import ros_gazebo
 
 BACKEND = next((argument for argument in sys.argv if argument in ("ros", "ros-realtime")), "ros")
@@ -102,6 +105,44 @@ class Lockstep(SecondRobot):
             with self.subTest(options):
                 self.assertTrue(all(same(a, b, exact=True) for a, b in zip(*runs, strict=True)))
 
+    def test_what_is_told_of_the_world_has_the_bits_of_the_robot_in_process(self):
+        query = StateQuery(
+            links=(LinkQuery("rod"), LinkQuery("pendulum::rod")), models=("pendulum",)
+        )
+        turned = {"pendulum": Motion(Pose((0.1, -0.2, 0.4), (0.1, 0.0, 2.0, 0.3)))}
+        runs = []
+        for backend in (self.session.connect(0.01), InProcessRobot(PENDULUM, 0.01, height=0.3)):
+            self.addCleanup(backend.close)
+            backend.reset(PendulumState(0.0, 0.0))  # what it told before isn't told any more
+            backend.look(query)
+            run = []
+            for placed in (turned, None):
+                run.append((backend.reset(PendulumState(0.3, -0.5), placed), backend.world()))
+                run += [(backend.act((0.1 * n,)), backend.world()) for n in range(20)]
+            runs.append(run)
+        self.assertEqual(runs[0], runs[1])
+        self.assertEqual(runs[0][-1][1].time, 0.2)
+
+    def test_a_question_is_answered_at_once_and_taken_back(self):
+        robot = self.session.connect(0.01)
+        self.addCleanup(robot.close)
+        robot.reset(PendulumState(0.3, 0.0))
+        self.assertEqual(robot.world().links, {})
+        robot.look(StateQuery(links=(LinkQuery("rod"),)))
+        self.assertEqual(list(robot.world().links), ["rod"])
+        robot.look(StateQuery())
+        self.assertEqual(robot.world().links, {})
+        self.assertEqual(robot.world().joints["hinge"].position, 0.3)
+
+    def test_wrong_names_are_refused_at_once(self):
+        robot = self.session.connect(0.01)
+        self.addCleanup(robot.close)
+        with self.assertRaisesRegex(SimulatorError, "no link 'rood'; did you mean 'rod'"):
+            robot.look(StateQuery(links=(LinkQuery("rood"),)))
+        with self.assertRaisesRegex(SimulatorError, "no model 'ball'"):
+            robot.reset(PendulumState(0.0, 0.0), {"ball": Motion(Pose())})
+        robot.reset(PendulumState(0.0, 0.0))
+
     def test_it_is_given_back_with_its_own_friction(self):
         def spun_down():
             robot = self.session.connect(0.01)
@@ -119,6 +160,18 @@ class Lockstep(SecondRobot):
 
 @unittest.skipUnless(REALTIME, "time moves when asked to")
 class Realtime(SecondRobot):
+    def test_links_are_told_in_lock_step_only(self):
+        robot = self.session.connect(0.01)
+        self.addCleanup(robot.close)
+        robot.look(StateQuery())
+        for call in (
+            lambda: robot.look(StateQuery(models=("pendulum",))),
+            lambda: robot.reset(PendulumState(0.0, 0.0), {"pendulum": Motion(Pose())}),
+            robot.world,
+        ):
+            with self.assertRaisesRegex(RobotEnvError, "in real time gives the joints alone"):
+                call()
+
     def test_without_a_control_period_it_takes_the_newest_state_and_never_repeats_itself(self):
         env = make_pendulum("ros-realtime", control_period=None)
         self.assertFalse(env.backend.deterministic)

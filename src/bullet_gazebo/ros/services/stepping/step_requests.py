@@ -18,7 +18,7 @@ from bullet_gazebo.ros.wire.checks import LARGEST, bad_number
 from bullet_gazebo.ros.wire.conversions import from_pose_msg, from_twist_msg
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state.names import did_you_mean, find_model
-from bullet_gazebo.state.query import LinkQuery, StateQuery
+from bullet_gazebo.state.query import NOTHING, LinkQuery, StateQuery
 
 MAX_TICKS = 1_000_000  # a request beyond this is a mistake, and would take minutes
 Placing = tuple[dict[str, float], dict[str, float]]
@@ -36,15 +36,17 @@ class StepPlan:
             UnknownName: for a model that there is none of.
         """
         self._sim = sim
-        _check_ticks(request)
+        self.query = _query(request)
+        _check_ticks(request, self.query is not NOTHING)
         self.placed_models = self._models(request)
         self.placed = self._placing(request)
         self.commands = self._controllers(request)
         self.held = self._joints(request)
-        self.query = _query(request)
 
     def _models(self, request: StepWorldRequest) -> list[tuple[Model, Pose, Twist]]:
         names, poses, twists = request.models, request.poses, request.twists
+        if not names and not poses and not twists:
+            return []
         _check_lengths("models", names, "poses", poses)
         if twists:
             _check_lengths("models", names, "twists", twists)
@@ -165,12 +167,13 @@ class StepPlan:
         return found[0][1]
 
 
-def _check_ticks(request: StepWorldRequest) -> None:
+def _check_ticks(request: StepWorldRequest, asks: bool) -> None:
+    """`asks`: for more than the joints."""
     begins = request.reset != StepWorldRequest.NONE or bool(request.joints or request.models)
-    if not (0 if begins else 1) <= request.ticks <= MAX_TICKS:
+    if not (0 if begins or asks else 1) <= request.ticks <= MAX_TICKS:
         raise ControlError(
             f"ticks is {request.ticks}: 1 to {MAX_TICKS} can be done in one call"
-            + (", or 0 with a reset" if request.ticks == 0 else "")
+            + (", or 0 with a reset, a placing or a question" if request.ticks == 0 else "")
         )
     if request.reset > StepWorldRequest.SIMULATION:
         raise ControlError(f"reset is {request.reset}: 0 (none), 1 (world) or 2 (simulation)")
@@ -180,6 +183,11 @@ def _check_ticks(request: StepWorldRequest) -> None:
 
 def _query(request: StepWorldRequest) -> StateQuery:
     links, frames = request.link_states_of, request.link_frames
+    if not (
+        links or frames or request.contacts or request.contacts_of
+        or request.model_states or request.model_states_of
+    ):  # fmt: skip
+        return NOTHING
     frames = frames or [""] * len(links)
     if len(links) != len(frames):
         raise ControlError(f"{len(links)} link_states_of but {len(frames)} link_frames")

@@ -62,7 +62,7 @@ class StepService:
 
     def _reader_of(self, query: StateQuery) -> StateReader | None:
         """Clients ask the same again and again, so the names are looked up but once."""
-        if query == NOTHING:
+        if query is NOTHING:
             return None
         if query != self._reader.query or self._reader.is_stale:
             self._reader = StateReader(self._sim.world, query)

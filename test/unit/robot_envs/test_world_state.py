@@ -1,0 +1,94 @@
+"""What a backend tells of the world beside the robot's state; over ROS it is the same (second_robot.test)."""
+
+import math
+
+import pytest
+from pendulum import PENDULUM, PendulumState
+
+from bullet_gazebo.physics.pose import Pose
+from robot_envs.backends.in_process import InProcessRobot
+from robot_envs.errors import SimulatorError
+from robot_envs.world_state import LinkQuery, Motion, StateQuery
+
+HINGE, PERIOD = 1.0, 0.01  # [m] above the model, [s]
+ROD = StateQuery(links=(LinkQuery("rod"),), models=("pendulum",), all_contacts=True)
+
+
+@pytest.fixture
+def backend():
+    made = InProcessRobot(PENDULUM, PERIOD)
+    yield made
+    made.close()
+
+
+def test_joints_and_time_are_told_without_a_question(backend):
+    state = backend.reset(PendulumState(0.3, -0.5))
+    world = backend.world()
+    assert (world.time, world.joints) == (0.0, {"hinge": (state.angle, state.rate, 0.0)})
+    assert (world.links, world.models, world.contacts) == ({}, {}, [])
+    state = backend.act((0.2,))
+    world = backend.world()
+    assert world.time == PERIOD
+    assert world.joints["hinge"] == (state.angle, state.rate, 0.2)
+    backend.reset(PendulumState(0.0, 0.0))
+    assert backend.world().time == 0.0
+
+
+def test_links_and_models_are_told_when_asked_for(backend):
+    backend.look(ROD)
+    state = backend.reset(PendulumState(0.3, -0.5))
+    for _ in range(2):
+        world = backend.world()
+        rod = world.links["rod"]
+        assert rod.pose.position == pytest.approx((0.0, 0.0, HINGE), abs=1e-6)
+        half = (0.0, math.sin(state.angle / 2), 0.0, math.cos(state.angle / 2))
+        assert rod.pose.orientation == pytest.approx(half, abs=1e-6)
+        assert rod.twist[1] == pytest.approx((0.0, state.rate, 0.0), abs=1e-6)
+        assert world.models["pendulum"].pose == Pose()
+        assert world.contacts == []
+        state = backend.act((0.1,))
+
+
+def test_a_model_is_placed_for_the_episode(backend):
+    """An orientation needn't have the length of 1, as over ROS."""
+    backend.look(ROD)
+    backend.reset(
+        PendulumState(0.0, 0.0), {"pendulum": Motion(Pose((1.0, 2.0, 0.0), (0.0, 0.0, 2.0, 0.0)))}
+    )
+    world = backend.world()
+    assert world.models["pendulum"].pose.position == pytest.approx((1.0, 2.0, 0.0))
+    assert world.links["rod"].pose.position == pytest.approx((1.0, 2.0, HINGE), abs=1e-6)
+    back = world.links["rod"].seen_from(world.models["pendulum"]).pose
+    assert back.position == pytest.approx((0.0, 0.0, HINGE), abs=1e-6)
+    assert back.orientation == pytest.approx((0.0, 0.0, 0.0, 1.0), abs=1e-6)
+    backend.reset(PendulumState(0.0, 0.0))
+    assert backend.world().models["pendulum"].pose == Pose()
+
+
+def test_asking_changes_no_bit(backend):
+    runs = []
+    for query in (StateQuery(), ROD):
+        backend.look(query)
+        run = [backend.reset(PendulumState(0.1, 0.2))]
+        for step in range(50):
+            run.append(backend.act((0.1 * math.sin(step),)))
+            backend.world()
+        runs.append(run)
+    assert runs[0] == runs[1]
+
+
+def test_wrong_names_are_refused_at_once_and_the_old_question_stays(backend):
+    backend.look(ROD)
+    for query, text in (
+        (StateQuery(links=(LinkQuery("rood"),)), "no link 'rood'; did you mean 'rod'"),
+        (StateQuery(models=("pendulun",)), "did you mean 'pendulum'"),
+        (StateQuery(contacts_of=("rod",)), "link 'rod' has no collision"),
+    ):
+        with pytest.raises(SimulatorError, match=text):
+            backend.look(query)
+    with pytest.raises(ValueError, match="links names 'rod' twice"):
+        backend.look(StateQuery(links=(LinkQuery("rod"), LinkQuery("rod", "rod"))))
+    with pytest.raises(SimulatorError, match="no model 'ball'"):
+        backend.reset(PendulumState(0.0, 0.0), {"ball": Motion(Pose())})
+    backend.reset(PendulumState(0.0, 0.0))
+    assert list(backend.world().links) == ["rod"]
