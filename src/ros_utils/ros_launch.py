@@ -104,12 +104,12 @@ def ros_launch_from_path(
             return False
         if not wait:
             return Started(handle)
-        deadline = time.monotonic() + timeout
+        begin = time.monotonic()
         readiness = wait_until_ready(
             lambda: _roslaunch.list_processes(handle) is not None, handle, timeout
         )
         started = _report(handle, readiness, timeout)
-        return started and wait_for_world(started, ready, handle, deadline)
+        return started and wait_for_world(started, ready, handle, begin, timeout)
 
 
 def ros_kill_launch_process() -> bool:

@@ -101,13 +101,13 @@ def ros_node_from_pkg(
             return False
         if not wait:
             return Started(handle)
-        deadline = time.monotonic() + timeout
+        begin = time.monotonic()
         full_name = rosgraph.names.ns_join(_global(ns), name) if name else None
         readiness = wait_until_ready(
             lambda: _is_registered(handle, full_name, before), handle, timeout
         )
         started = _report(handle, readiness, timeout)
-        return started and wait_for_world(started, ready, handle, deadline)
+        return started and wait_for_world(started, ready, handle, begin, timeout)
 
 
 def ros_kill_node(node_name: str) -> bool:

@@ -115,14 +115,14 @@ def launch_Gazebo(
         "extra_gazebo_args": extra_gazebo_args or None,
     }
     with _master.using(master_uri):
-        deadline = time.monotonic() + timeout
+        begin = time.monotonic()
         answering = f"{gazebo_ns.rstrip('/')}/{READY}"
         if service_answers(answering):
             _log.warn(
                 f"{LABEL} runs already under {_master.uri()}: using it as it is"
                 " (ros_kill_all_processes ends it)"
             )
-            return wait_for_world(Started(), ready, None, deadline)
+            return wait_for_world(Started(), ready, None, begin, timeout)
         try:
             asked["world_name"] = _world(custom_world_path, custom_world_pkg, custom_world_name)
             switches.update({name: value for name, value in asked.items() if value is not None})
@@ -136,7 +136,7 @@ def launch_Gazebo(
             return False
         readiness = wait_until_ready(lambda: service_answers(answering), handle, timeout)
         started = _report(handle, readiness, answering, timeout)
-        return started and wait_for_world(started, ready, handle, deadline)
+        return started and wait_for_world(started, ready, handle, begin, timeout)
 
 
 def close_Gazebo(*, master_uri: str | None = None) -> bool:

@@ -45,7 +45,11 @@ def wait_until_ready(ready: Callable[[], bool], handle: Handle, timeout: float) 
 
 
 def wait_for_world(
-    started: Started | bool, ready: Ready | None, handle: Handle | None, deadline: float
+    started: Started | bool,
+    ready: Ready | None,
+    handle: Handle | None,
+    begin: float,
+    timeout: float,
 ) -> Started | bool:
     """Wait until a world is ready after something was started; if it isn't, end what was started.
 
@@ -53,7 +57,8 @@ def wait_for_world(
         started: what is returned if all is well.
         ready: what has to be there; None for nothing.
         handle: what was started; None if it ran before.
-        deadline: by time.monotonic() [s].
+        begin: when it was started, by time.monotonic() [s].
+        timeout: bound of the wait, from then on [s].
 
     Returns:
         `started`, or False, with what is missing as an error in the log.
@@ -74,12 +79,12 @@ def wait_for_world(
         missing = ready.missing()
         return ended or not missing
 
-    begin = time.monotonic()
-    wait_until(look, max(0.0, deadline - begin), "a world that is ready")
+    left = begin + timeout - time.monotonic()
+    wait_until(look, max(0.0, left), "a world that is ready")
     if not missing:
         return started
     label = handle.entry.label if handle else "the world"
-    what = f"not ready after {time.monotonic() - begin:.1f} s"
+    what = f"not ready after {timeout:g} s"
     if handle and ended:
         what = f"ended with exit code {handle.exit_code()} before it was ready: {handle.reason()}"
     _log.error(f"{label}: {what}: {missing}{handle.where() if handle else ''}")
