@@ -60,13 +60,6 @@ ROBOT = Robot(
     commanded=(CONTROLLER,),
     urdf_file=_urdf,
     parameters_file=_parameters,
-    ros=OverRos(
-        urdf_package="cartpole_gazebo",
-        urdf_name="cartpole_v1.urdf",
-        urdf_folder="/robots",
-        parameters_package="cartpole_controller",
-        parameters_name="joint_position_control.yaml",
-        rviz=("cartpole", "rviz.launch"),
-    ),
+    ros=OverRos(rviz=("cartpole", "rviz.launch")),
     height=max(task.height for task in TASKS.values()),  # a robot there can do every task
 )

@@ -14,24 +14,14 @@ State = TypeVar("State", bound=tuple[float, ...])
 
 @dataclass(frozen=True)
 class OverRos:
-    """What brings a robot up over ROS, where files are known by their package (see `ros_utils`).
+    """What a robot is called over ROS; its files are the same as in this process.
 
     Args:
-        urdf_package: the package of its URDF or xacro file.
-        urdf_name: that file's name.
-        urdf_folder: its folder in the package.
-        parameters_package: the package whose folder config has its controllers' parameters.
-        parameters_name: the name of that YAML file.
         description: the parameter that holds the URDF.
         publisher: the controller that publishes its joint states.
         rviz: package and name of the launch file that shows it in RViz; None: there is none.
     """
 
-    urdf_package: str
-    urdf_name: str
-    urdf_folder: str
-    parameters_package: str
-    parameters_name: str
     description: str = "robot_description"
     publisher: str = "joint_state_controller"
     rviz: tuple[str, str] | None = None

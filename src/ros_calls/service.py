@@ -8,6 +8,7 @@ from typing import Any
 import rospy
 
 from ros_calls import master, tcpros
+from ros_calls.absence import why_absent
 from ros_calls.xmlrpc import NoAnswer, Refused
 
 TIMEOUT = 5.0  # [s] of wall time
@@ -101,9 +102,10 @@ class ServiceClient:
 
     def _address(self) -> str:
         try:
-            return str(master.call("lookupService", self.name))
-        except Refused as fault:
-            raise ServiceGone(f"{self.name}: nobody offers this service") from fault
+            try:
+                return str(master.call("lookupService", self.name))
+            except Refused as fault:
+                raise ServiceGone(f"{self.name}: {why_absent(self.name)}") from fault
         except NoAnswer as fault:
             raise ServiceGone(f"{self.name}: the master at {master.uri()}: {fault}") from fault
 

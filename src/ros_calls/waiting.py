@@ -11,6 +11,7 @@ import rosgraph
 import rospy
 
 from ros_calls import master
+from ros_calls.absence import why_not_up
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceMissing
 from ros_calls.xmlrpc import CALLER, NoAnswer, Refused
 
@@ -105,7 +106,7 @@ def wait_for_service(name: str, timeout: float = TIMEOUT) -> str:
         raise ServiceMissing(f"service {resolved}: {fault}") from fault
     if not found:
         raise ServiceMissing(
-            f"service {resolved} didn't come up within {timeout:g} s: does its node run?"
+            f"service {resolved} didn't come up within {timeout:g} s: {why_not_up(resolved)}"
         )
     return resolved
 

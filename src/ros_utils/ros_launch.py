@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Mapping, Sequence
 
 from ros_calls import master as _master
@@ -11,8 +12,13 @@ from ros_utils._internal import packages as _packages
 from ros_utils._internal.processes import processes as _processes
 from ros_utils._internal.processes import roslaunch as _roslaunch
 from ros_utils._internal.processes.program import CannotStart, Handle
-from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
+from ros_utils._internal.processes.readiness import (
+    Readiness,
+    wait_for_world,
+    wait_until_ready,
+)
 from ros_utils._internal.processes.started import Started
+from ros_utils.readiness import Ready
 
 
 def ros_launch_from_pkg(
@@ -27,6 +33,7 @@ def ros_launch_from_pkg(
     log_file: str | None = None,
     env: Mapping[str, str] | None = None,
     master_uri: str | None = None,
+    ready: Ready | None = None,
 ) -> Started | bool:
     """Launch ``<pkg_name>/launch/<launch_file>``. Starts a master if there is none.
 
@@ -42,12 +49,15 @@ def ros_launch_from_pkg(
         log_file: the file for the output; None for one of its own in ROS's log folder.
         env: variables on top of this process's.
         master_uri: the master to launch under; None for this process's.
+        ready: what has to be there besides, such as models and controllers that run, within
+            `timeout`; None for nothing.
 
     Returns:
         A handle that is true, once roslaunch has started its nodes (or has ended by itself without
-        an error). A node that dies at once is named in a warning: the rest of the launch file goes
-        on. False, with an error in the log, if the package or file is missing, no master can be
-        used, or roslaunch fails.
+        an error) and what `ready` names is there. A node that dies at once is named in a warning:
+        the rest of the launch file goes on. False, with an error in the log, if the package or file
+        is missing, no master can be used, roslaunch fails, or something isn't ready in time (the
+        launch is ended then).
     """
     try:
         path = _packages.file(pkg_name, "launch", launch_file)
@@ -64,6 +74,7 @@ def ros_launch_from_pkg(
         log_file=log_file,
         env=env,
         master_uri=master_uri,
+        ready=ready,
     )
 
 
@@ -78,6 +89,7 @@ def ros_launch_from_path(
     log_file: str | None = None,
     env: Mapping[str, str] | None = None,
     master_uri: str | None = None,
+    ready: Ready | None = None,
 ) -> Started | bool:
     """Launch a file by its path. See `ros_launch_from_pkg`."""
     label = f"roslaunch {os.path.basename(launch_file_path)}"
@@ -92,10 +104,12 @@ def ros_launch_from_path(
             return False
         if not wait:
             return Started(handle)
+        begin = time.monotonic()
         readiness = wait_until_ready(
             lambda: _roslaunch.list_processes(handle) is not None, handle, timeout
         )
-        return _report(handle, readiness, timeout)
+        started = _report(handle, readiness, timeout)
+        return started and wait_for_world(started, ready, handle, begin, timeout)
 
 
 def ros_kill_launch_process() -> bool:

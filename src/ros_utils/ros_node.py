@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import time
 from collections.abc import Mapping, Sequence
 
 import rosgraph
@@ -16,8 +17,13 @@ from ros_utils._internal import packages as _packages
 from ros_utils._internal.processes import nodes as _nodes
 from ros_utils._internal.processes import processes as _processes
 from ros_utils._internal.processes.program import CannotStart, Handle
-from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
+from ros_utils._internal.processes.readiness import (
+    Readiness,
+    wait_for_world,
+    wait_until_ready,
+)
 from ros_utils._internal.processes.started import Started
+from ros_utils.readiness import Ready
 
 
 def ros_node_from_pkg(
@@ -36,6 +42,7 @@ def ros_node_from_pkg(
     log_file: str | None = None,
     env: Mapping[str, str] | None = None,
     master_uri: str | None = None,
+    ready: Ready | None = None,
 ) -> Started | bool:
     """Start a node, as rosrun does, and wait until it is registered at the master.
 
@@ -55,12 +62,13 @@ def ros_node_from_pkg(
         log_file: the file for the output; None for one of its own in ROS's log folder.
         env: variables on top of this process's.
         master_uri: the master to register at; None for this process's.
+        ready: see `ros_launch.ros_launch_from_pkg`.
 
     Returns:
         A handle that is true, once the node is registered, or if it has done its work and ended
-        with exit code 0. False, with an error in the log, if the package or executable is missing,
-        no master answers, or the node ends with another exit code or doesn't register in time (it
-        is ended then).
+        with exit code 0, and what `ready` names is there. False, with an error in the log, if the
+        package or executable is missing, no master answers, or the node ends with another exit
+        code, doesn't register or something isn't ready in time (it is ended then).
     """
     label = f"node {pkg_name}/{node_name}"
     with _master.using(master_uri):
@@ -93,11 +101,13 @@ def ros_node_from_pkg(
             return False
         if not wait:
             return Started(handle)
+        begin = time.monotonic()
         full_name = rosgraph.names.ns_join(_global(ns), name) if name else None
         readiness = wait_until_ready(
             lambda: _is_registered(handle, full_name, before), handle, timeout
         )
-        return _report(handle, readiness, timeout)
+        started = _report(handle, readiness, timeout)
+        return started and wait_for_world(started, ready, handle, begin, timeout)
 
 
 def ros_kill_node(node_name: str) -> bool:

@@ -11,6 +11,7 @@ from ros_calls import master as _master
 from ros_utils import ros_controllers, ros_gazebo, ros_node, ros_params, ros_urdf
 from ros_utils._internal import log as _log
 from ros_utils._internal import params as _params
+from ros_utils.readiness import NotReady, Ready
 
 
 def init_robot_state_pub(
@@ -65,6 +66,7 @@ def spawn_model_in_gazebo(
     timeout: float = ros_gazebo.TIMEOUT,
     gazebo_ns: str = ros_gazebo.GAZEBO,
     verify: bool = False,
+    ready: bool = False,
 ) -> bool:
     """Load a robot's description, start its state publisher, spawn it, and load and start its
     controllers.
@@ -87,6 +89,8 @@ def spawn_model_in_gazebo(
         controllers_pkg: package of `controllers_file`; None for `pkg_name`.
         timeout, gazebo_ns: see `ros_gazebo`.
         verify: go on only once the model is in the world's list.
+        ready: return only once the model is there and each controller of the list runs, within
+            `timeout` after it was started.
 
     Returns:
         True if every stage succeeded. The first failure ends it; earlier stages stay as they are.
@@ -120,10 +124,21 @@ def spawn_model_in_gazebo(
     )
     if not spawned:
         return False
-    if controllers_file is None:
-        return True
-    if not ros_params.ros_load_yaml_from_pkg(controllers_pkg or pkg_name, controllers_file, ns):
+    running: Sequence[str] = ()
+    if controllers_file is not None:
+        package = controllers_pkg or pkg_name
+        if not ros_params.ros_load_yaml_from_pkg(package, controllers_file, ns):
+            return False
+        if not ros_controllers.spawn_controllers_srv(controllers_list, ns, service_timeout=timeout):
+            return False
+        running = controllers_list
+    return not ready or _is_ready(Ready([gazebo_name], running, ns, gazebo_ns), timeout)
+
+
+def _is_ready(ready: Ready, timeout: float) -> bool:
+    try:
+        ready.wait(timeout)
+    except NotReady as fault:
+        _log.error(f"spawn_model_in_gazebo: {fault}")
         return False
-    return bool(
-        ros_controllers.spawn_controllers_srv(controllers_list, ns, service_timeout=timeout)
-    )
+    return True

@@ -15,7 +15,6 @@ from robot_envs.task import Command, Task
 from robot_envs.variation import LinkScale, Variation
 
 FILES = Path(__file__).resolve().parents[1] / "data" / "robots"
-PACKAGE = "pendulum_robot"  # that a test over ROS has to make of the files
 STRONGEST = 0.5  # [N m]
 
 
@@ -34,7 +33,7 @@ PENDULUM = Robot(
     commanded=("hinge_effort_controller",),
     urdf_file=lambda: FILES / "pendulum.urdf",
     parameters_file=lambda: FILES / "pendulum.yaml",
-    ros=OverRos(PACKAGE, "pendulum.urdf", "/urdf", PACKAGE, "pendulum.yaml"),
+    ros=OverRos(),
 )
 
 

@@ -15,10 +15,12 @@ from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorHangs
 from robot_envs.robot import Robot, State
 from ros_calls.waiting import wait_until
 from ros_utils import ros_controllers, ros_gazebo, ros_params, ros_urdf
+from ros_utils.readiness import NotReady, Ready
 
 WORLD_SERVICE = "/gazebo/get_world_properties"
 STEP_SERVICE = "/gazebo/step_world"  # of a simulator in lock-step
 SIMULATOR_TIMEOUT = 60.0  # [s]
+READY_TIMEOUT = 30.0  # [s] for controllers that were started to run
 _ROUNDING = 1e-6  # [m]
 Say = Callable[[str], None]
 Undo = Callable[[], object]
@@ -55,7 +57,17 @@ def bring_up(robot: Robot[State], say: Say, height: float = 0.0) -> list[Undo]:
     Raises:
         RobotEnvError: if something can't be loaded, spawned or started.
     """
-    return [*_bring_model(robot, say, height), *_bring_controllers(robot, say)]
+    changes = [*_bring_model(robot, say, height), *_bring_controllers(robot, say)]
+    try:
+        ready(robot).wait(READY_TIMEOUT)
+    except NotReady as error:
+        raise RobotEnvError(f"the robot is {error}") from error
+    return changes
+
+
+def ready(robot: Robot[State]) -> Ready:
+    """What has to be there for a robot to be used."""
+    return Ready([robot.model], [robot.over_ros.publisher, *robot.controllers])
 
 
 def _models() -> list[str]:
@@ -67,10 +79,8 @@ def _bring_model(robot: Robot[State], say: Say, height: float) -> list[Undo]:
         return []
     say("spawning the robot")
     known = robot.over_ros
-    loaded = ros_urdf.urdf_load_from_pkg(
-        known.urdf_package, known.urdf_name, known.description, folder=known.urdf_folder, ns="/"
-    )
-    if not loaded:
+    # By path: packages of the user's may have the names of this checkout's.
+    if not ros_urdf.urdf_load_from_path(str(robot.urdf_file()), known.description, ns="/"):
         raise RobotEnvError("the robot's URDF can't be loaded; see the messages above")
     answer = ros_gazebo.gazebo_spawn_urdf_param(
         known.description, model_name=robot.model, pos_z=height
@@ -117,10 +127,7 @@ def _bring_controllers(robot: Robot[State], say: Say) -> list[Undo]:
 
 
 def _load_controllers(robot: Robot[State], names: list[str]) -> None:
-    known = robot.over_ros
-    if not ros_params.ros_load_yaml_from_pkg(
-        known.parameters_package, known.parameters_name, ns="/"
-    ):
+    if not ros_params.ros_load_yaml_from_path(str(robot.parameters_file()), ns="/"):
         raise RobotEnvError("the controllers' parameters can't be loaded; see the messages above")
     if not ros_controllers.spawn_controllers_srv(names):
         raise RobotEnvError(f"can't start the controllers {', '.join(names)}")

@@ -8,7 +8,7 @@ from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldRespons
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.base_pose import base_pose
-from robot_envs.backends.bring_up import STEP_SERVICE
+from robot_envs.backends.bring_up import STEP_SERVICE, ready
 from robot_envs.backends.messages import ask_for, place, read_state, told
 from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.ros_variation import RosVariation
@@ -68,7 +68,10 @@ class LockstepRobot(Generic[State]):
         with self._simulator:
             answer = self._step(request)
             if not answer.success:
-                raise SimulatorError(f"{STEP_SERVICE}: {answer.status_message}")
+                missing = ready(self.robot).missing()
+                raise SimulatorError(
+                    f"{STEP_SERVICE}: {answer.status_message}" + (f"; {missing}" if missing else "")
+                )
             self._answer = answer
             return read_state(self.robot, answer.joint_states)
 

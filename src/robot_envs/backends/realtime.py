@@ -3,7 +3,7 @@
 import threading
 import time
 from collections.abc import Mapping, Sequence
-from typing import Generic
+from typing import Any, Generic
 
 import rospy
 from gazebo_msgs.srv import SetModelConfiguration
@@ -13,6 +13,7 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.base_pose import base_pose
+from robot_envs.backends.bring_up import ready
 from robot_envs.backends.messages import read_state
 from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.ros_variation import RosVariation
@@ -50,10 +51,12 @@ class _CommandTopic:
     """Where one controller listens for its commands.
 
     Args:
+        robot: the robot.
         controller: its name.
     """
 
-    def __init__(self, controller: str) -> None:
+    def __init__(self, robot: Robot[Any], controller: str) -> None:
+        self._robot = robot
         self._controller = controller
         self._publisher = self._offer()
 
@@ -79,7 +82,7 @@ class _CommandTopic:
         self._publisher = self._offer()
         if not self._is_linked(STATE_TIMEOUT / 2):
             raise SimulatorError(
-                f"nobody listens on {self._publisher.resolved_name}; is {self._controller} started?"
+                f"nobody listens on {self._publisher.resolved_name}: {ready(self._robot).missing()}"
             )
 
     def _is_linked(self, bound: float) -> bool:
@@ -118,7 +121,7 @@ class RealtimeRobot(Generic[State]):
         self._reset = _Resetter(robot)
         self._pause = ServiceClient("/gazebo/pause_physics", Empty)
         self._unpause = ServiceClient("/gazebo/unpause_physics", Empty)
-        self._topics = [_CommandTopic(name) for name in robot.commanded]
+        self._topics = [_CommandTopic(robot, name) for name in robot.commanded]
         self._newest: tuple[JointState, float] | None = None  # with its wall time [s]
         self._arrived = threading.Condition()
         self._subscriber = rospy.Subscriber(
@@ -185,8 +188,8 @@ class RealtimeRobot(Generic[State]):
             newest = self._newest
             if newest is None or time.monotonic() - newest[1] > STATE_TIMEOUT:
                 raise SimulatorError(
-                    f"no joint state on /joint_states for {STATE_TIMEOUT:g} s; is the world running "
-                    f"and {self.robot.over_ros.publisher} started?"
+                    f"no joint state on /joint_states for {STATE_TIMEOUT:g} s: "
+                    f"{ready(self.robot).missing() or 'is the world running?'}"
                 )
             if there:
                 return newest[0]

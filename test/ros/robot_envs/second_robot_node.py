@@ -1,10 +1,7 @@
 #!/usr/bin/env python3
 """The pendulum over ROS, by a session that its user starts and ends: in lock-step, or in real time."""
 
-import os
-import shutil
 import sys
-import tempfile
 import unittest
 import xmlrpc.client
 from pathlib import Path
@@ -17,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
 
 from environment_conformance import rollout
 from gymnasium.utils.env_checker import data_equivalence as same
-from pendulum import FILES, PACKAGE, PENDULUM, PendulumState, make_pendulum
+from pendulum import PENDULUM, PendulumState, make_pendulum
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.in_process import InProcessRobot
@@ -28,17 +25,6 @@ from ros_utils import ros_gazebo
 
 BACKEND = next((argument for argument in sys.argv if argument in ("ros", "ros-realtime")), "ros")
 REALTIME = BACKEND == "ros-realtime"
-MANIFEST = """<package format="3"><name>{name}</name><version>1.0.0</version><description>A robot.
-</description><maintainer email="a@example.com">a</maintainer><license>BSD</license></package>"""
-
-
-def make_package(folder: Path) -> None:
-    """A ROS package with the robot's files, where ROS looks for packages."""
-    for name, place in (("pendulum.urdf", "urdf"), ("pendulum.yaml", "config")):
-        (folder / PACKAGE / place).mkdir(parents=True)
-        shutil.copy(FILES / name, folder / PACKAGE / place)
-    (folder / PACKAGE / "package.xml").write_text(MANIFEST.format(name=PACKAGE))
-    os.environ["ROS_PACKAGE_PATH"] = f"{folder}:{os.environ['ROS_PACKAGE_PATH']}"
 
 
 def simulator() -> int | None:
@@ -55,9 +41,6 @@ class SecondRobot(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory(prefix="second_robot_")
-        cls.addClassCleanup(folder.cleanup)
-        make_package(Path(folder.name))
         cls.said = []
         cls.session = RosSession(
             PENDULUM, "/learner", [], realtime=REALTIME, gui=False, seed=0, height=0.3

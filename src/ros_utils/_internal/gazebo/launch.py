@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Mapping
 
 from ros_calls import master as _master
@@ -13,8 +14,13 @@ from ros_utils._internal.processes import nodes as _nodes
 from ros_utils._internal.processes import processes as _processes
 from ros_utils._internal.processes import roslaunch as _roslaunch
 from ros_utils._internal.processes.program import CannotStart, Handle
-from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
+from ros_utils._internal.processes.readiness import (
+    Readiness,
+    wait_for_world,
+    wait_until_ready,
+)
 from ros_utils._internal.processes.started import Started
+from ros_utils.readiness import Ready
 
 LABEL = "Gazebo"
 NODES = ("/gazebo", "/gazebo_gui")
@@ -46,6 +52,7 @@ def launch_Gazebo(
     log_file: str | None = None,
     env: Mapping[str, str] | None = None,
     master_uri: str | None = None,
+    ready: Ready | None = None,
 ) -> Started | bool:
     """Run ``roslaunch gazebo_ros empty_world.launch`` and wait until the simulator answers. Starts
     a master if needed.
@@ -79,11 +86,12 @@ def launch_Gazebo(
         log_file: the file for its output; None for the terminal or one of its own.
         env: variables on top of this process's.
         master_uri: the master to run under; None for this process's.
+        ready: see `ros_launch.ros_launch_from_pkg`, for a world that brings models along.
 
     Returns:
-        A handle that is true, once it answers. False, with an error in the log, if package or world
-        are missing, no master can be used, the simulator ends, or it doesn't answer in time (it is
-        ended then).
+        A handle that is true, once it answers and what `ready` names is there. False, with an error
+        in the log, if package or world are missing, no master can be used, the simulator ends, or
+        it doesn't answer or isn't ready in time (it is ended then, if it was started here).
     """
     switches = {
         "paused": paused,
@@ -107,13 +115,14 @@ def launch_Gazebo(
         "extra_gazebo_args": extra_gazebo_args or None,
     }
     with _master.using(master_uri):
-        ready = f"{gazebo_ns.rstrip('/')}/{READY}"
-        if service_answers(ready):
+        begin = time.monotonic()
+        answering = f"{gazebo_ns.rstrip('/')}/{READY}"
+        if service_answers(answering):
             _log.warn(
                 f"{LABEL} runs already under {_master.uri()}: using it as it is"
                 " (ros_kill_all_processes ends it)"
             )
-            return Started()
+            return wait_for_world(Started(), ready, None, begin, timeout)
         try:
             asked["world_name"] = _world(custom_world_path, custom_world_pkg, custom_world_name)
             switches.update({name: value for name, value in asked.items() if value is not None})
@@ -125,8 +134,9 @@ def launch_Gazebo(
         except (_packages.NotFound, CannotStart, _master.MasterDown) as fault:
             _log.error(f"launch_Gazebo: {fault}")
             return False
-        readiness = wait_until_ready(lambda: service_answers(ready), handle, timeout)
-        return _report(handle, readiness, ready, timeout)
+        readiness = wait_until_ready(lambda: service_answers(answering), handle, timeout)
+        started = _report(handle, readiness, answering, timeout)
+        return started and wait_for_world(started, ready, handle, begin, timeout)
 
 
 def close_Gazebo(*, master_uri: str | None = None) -> bool:
@@ -174,13 +184,13 @@ def _world(path: str | None, package: str | None, name: str | None) -> str | Non
     return None
 
 
-def _report(handle: Handle, readiness: Readiness, ready: str, timeout: float) -> Started | bool:
+def _report(handle: Handle, readiness: Readiness, answering: str, timeout: float) -> Started | bool:
     if readiness is Readiness.READY:
         return Started(handle)
     if readiness is Readiness.ENDED:
         what = f"ended with exit code {handle.exit_code()} before it answered"
     else:
-        what = f"service {ready} doesn't answer after {timeout:g} s; ended it"
+        what = f"service {answering} doesn't answer after {timeout:g} s; ended it"
     _processes.end([handle.entry])
     _log.error(f"{LABEL}: {what}: {handle.reason()}{handle.where()}")
     return False

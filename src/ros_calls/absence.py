@@ -1,0 +1,68 @@
+"""Why nobody offers a service, in words that say what to start."""
+
+from __future__ import annotations
+
+from ros_calls import master
+from ros_calls.xmlrpc import NoAnswer, Refused
+
+START = "roslaunch gazebo_ros empty_world.launch"
+WORLD = "get_world_properties"  # every simulator has it
+LOCKSTEP = ("step_world", "advance_world")
+MANAGER = "controller_manager"
+OF_A_WORLD = (
+    *(WORLD, "pause_physics", "unpause_physics", "reset_world", "reset_simulation", "delete_model"),
+    *(
+        "spawn_urdf_model",
+        "spawn_sdf_model",
+        "get_model_state",
+        "set_model_state",
+        "get_link_state",
+    ),
+    *("set_model_configuration", "get_physics_properties", "set_physics_properties"),
+)
+
+
+def is_offered(service: str) -> bool:
+    """Whether the master knows somebody who offers the service of that full name, be it a dead node.
+
+    Raises:
+        NoAnswer: the master doesn't.
+    """
+    try:
+        master.call("lookupService", service)
+    except Refused:
+        return False
+    return True
+
+
+def why_absent(service: str) -> str:
+    """What is missing, and the command that mends it.
+
+    Args:
+        service: the full name of a service that nobody offers.
+
+    Raises:
+        NoAnswer: from the master.
+    """
+    parent, _, name = service.rpartition("/")
+    above, _, last = parent.rpartition("/")
+    if name in LOCKSTEP and is_offered(f"{parent}/{WORLD}"):
+        return f"the simulator isn't in lock-step; start it with: {START} lockstep:=true"
+    if name in LOCKSTEP:
+        return f"no simulator runs at {master.uri()}; start one with: {START} lockstep:=true"
+    if name in OF_A_WORLD:
+        return f"no simulator runs at {master.uri()}; start one with: {START}"
+    if last == MANAGER:
+        return (
+            f"there is no controller manager in the namespace {above or '/'}: spawn a robot there whose URDF "
+            f"has the plugin libgazebo_ros_control.so, and is the parameter {above}/robot_description, too"
+        )
+    return "nobody offers this service"
+
+
+def why_not_up(service: str) -> str:
+    """The same of a service that was waited for: its node may be there and not answer."""
+    try:
+        return "its node doesn't answer" if is_offered(service) else why_absent(service)
+    except NoAnswer as fault:
+        return f"the master at {master.uri()}: {fault}"

@@ -1,0 +1,141 @@
+"""What has to be there before a world can be used, and waiting for it.
+
+ready = Ready(models=["arm"], controllers=["joint_state_controller", "arm_controller"])
+ros_launch.ros_launch_from_pkg("my_arm", "arm.launch", ready=ready, timeout=120.0)
+"""
+
+from __future__ import annotations
+
+import difflib
+import time
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+import rosgraph
+from controller_manager_msgs.srv import ListControllers
+from gazebo_msgs.srv import GetWorldProperties
+
+from ros_calls import master as _master
+from ros_calls.absence import LOCKSTEP, WORLD, why_absent
+from ros_calls.absence import is_offered as _is_offered
+from ros_calls.service import TIMEOUT as _CALL_TIMEOUT
+from ros_calls.service import ServiceClient, ServiceFailed
+from ros_calls.waiting import TIMEOUT, wait_until
+from ros_calls.xmlrpc import NoAnswer
+
+RUNNING = "running"
+
+
+class NotReady(Exception):
+    """Something is missing; the text says what, and the command that mends it."""
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A world that answers, with models in it and controllers that run.
+
+    Args:
+        models: names of models that have to be in the world.
+        controllers: names of controllers that have to run; one that begins with a slash is in the
+            namespace that it names.
+        ns: the namespace of the other controllers' manager.
+        gazebo_ns: the simulator's node, whose name its services begin with.
+        lockstep: the world has to move in lock-step.
+    """
+
+    models: Sequence[str] = ()
+    controllers: Sequence[str] = ()
+    ns: str = "/"
+    gazebo_ns: str = "/gazebo"
+    lockstep: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("models", "controllers"):
+            if isinstance(getattr(self, name), str):  # a list of letters otherwise
+                object.__setattr__(self, name, (getattr(self, name),))
+
+    def missing(self, timeout: float = _CALL_TIMEOUT) -> str:
+        """The first thing that is missing, and the command that mends it; nothing if all is there.
+
+        Args:
+            timeout: bound of each question [s].
+        """
+        try:
+            _master.require(timeout)
+            return next(self._faults(timeout), "")
+        except (ServiceFailed, _master.MasterDown) as fault:
+            return str(fault)
+        except NoAnswer as fault:
+            return f"the master at {_master.uri()}: {fault}"
+
+    def wait(self, timeout: float = TIMEOUT) -> None:
+        """Waits until all is there.
+
+        Args:
+            timeout: bound of the wait [s].
+
+        Raises:
+            NotReady: something is still missing then.
+            rospy.ROSInterruptException: the caller's node was shut down meanwhile.
+        """
+        deadline = time.monotonic() + timeout
+        missing = ""
+
+        def look() -> bool:
+            nonlocal missing
+            left = min(max(deadline - time.monotonic(), 1.0), _CALL_TIMEOUT)
+            missing = self.missing(left)
+            return not missing
+
+        if not wait_until(look, timeout, "a world that is ready"):
+            raise NotReady(f"not ready after {timeout:g} s: {missing}")
+
+    def _faults(self, timeout: float) -> Iterator[str]:
+        gazebo = "/" + self.gazebo_ns.strip("/")
+        world = ServiceClient(f"{gazebo}/{WORLD}", GetWorldProperties, timeout=timeout)
+        models = world().model_names
+        step = f"{gazebo}/{LOCKSTEP[0]}"
+        if self.lockstep and not _is_offered(step):
+            yield why_absent(step)
+        for name in self.models:
+            if name not in models:
+                yield (
+                    f"there is no model '{name}' in the world{_nearest(name, models)}; spawn it with: rosrun "
+                    f"gazebo_ros spawn_model -urdf -param robot_description -model {name}"
+                )
+        for namespace, names in self._managers().items():
+            yield from _faults_of_manager(namespace, names, timeout)
+
+    def _managers(self) -> dict[str, list[str]]:
+        """The names of controllers, by the namespace of their manager."""
+        found: dict[str, list[str]] = {}
+        for each in self.controllers:
+            full = rosgraph.names.ns_join("/" + self.ns.strip("/"), each)
+            namespace, _, name = full.rpartition("/")
+            found.setdefault(namespace, []).append(name)
+        return found
+
+
+def _faults_of_manager(namespace: str, names: Sequence[str], timeout: float) -> Iterator[str]:
+    service = f"{namespace}/controller_manager/list_controllers"
+    answer = ServiceClient(service, ListControllers, timeout=timeout)()
+    states = {each.name: each.state for each in answer.controller}
+    option = f" __ns:={namespace}" if namespace else ""
+    for name in names:
+        if name not in states:
+            yield (
+                f"the controller '{namespace}/{name}' isn't loaded{_nearest(name, states)}; load and start "
+                f"it with: rosrun controller_manager spawner {name}{option}"
+            )
+        elif states[name] != RUNNING:
+            yield (
+                f"the controller '{namespace}/{name}' is {states[name]}, not running; start it with: rosrun "
+                f"controller_manager controller_manager start {name}{option}"
+            )
+
+
+def _nearest(name: str, known: Collection[str]) -> str:
+    near = difflib.get_close_matches(name, known, 1)
+    if near:
+        return f" (did you mean '{near[0]}'?)"
+    return f" (there are: {', '.join(known)})" if known else " (there are none)"
