@@ -40,7 +40,6 @@ class Player:
         self._is_playing = True
         self._drawn: tuple[Episode, int] | None = None
         self._told = ""
-        self._about = gui.add_html("")
         self._button = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
         self._slider = gui.add_slider("Step", 0, 1, 1, 0)
         self._speed = gui.add_dropdown("Speed", list(SPEEDS), initial_value=AS_IT_IS)
@@ -50,7 +49,8 @@ class Player:
             "Newest by itself", True, hint="plays a checkpoint as soon as it is written"
         )
         newest = gui.add_button("Play the newest now", icon=viser.Icon.REFRESH)
-        self._button.on_click(lambda _: self._toggle())
+        self._about = gui.add_html("")  # below what is clicked, which stays where it is
+        self._button.on_click(lambda _: self.toggle())
         self._slider.on_update(self._go)
         for choice in (self._which, self._seed):
             choice.on_update(self._choose)
@@ -73,7 +73,8 @@ class Player:
         if event.client is not None:
             self._begin()
 
-    def _toggle(self) -> None:
+    def toggle(self) -> None:
+        """Plays, or pauses."""
         with self._lock:
             self._is_playing = not self._is_playing
             if self._is_playing and self._is_at_end():
@@ -95,7 +96,7 @@ class Player:
         """Shows what is due `period` [s] after the last tick."""
         with self._lock:
             episode = self._episode
-            if self._is_playing:
+            if self._is_playing or not episode.frames:
                 self._advance(period)
             if episode.frames:
                 index = min(int(self._place), episode.length)
@@ -138,7 +139,7 @@ class Player:
         if episode.frames:
             index = min(int(self._place), episode.length)
             frame = episode.frames[index]
-            total = f"of {episode.length}" if episode.is_over else f"of {episode.length} so far"
+            total = f"of {episode.length}" if episode.is_over else f"of {episode.length}+"
             lines.append(f"step {index} {total}, return {frame.total_reward:.1f}")
             lines.append(f"action {frame.action or '-'}")
         if episode.note:

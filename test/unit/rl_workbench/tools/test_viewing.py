@@ -248,10 +248,13 @@ def test_a_newer_checkpoint_is_played_after_the_end(server) -> None:
     assert len(shelf.played) == 2
 
 
-def test_one_that_comes_after_a_failure_is_played_at_once(server) -> None:
+@pytest.mark.parametrize("paused", [False, True])
+def test_one_that_comes_after_a_failure_is_shown_at_once(server, paused) -> None:
     shelf = Shelf(length=-1)
     shelf.checkpoint = ()
     player = Player(server.gui, shelf, ("last",), seed=0)
+    if paused:
+        player.toggle()
     tick(player, 3.0)
     assert len(shelf.played) == 1 and not shelf.shown
     shelf.length, shelf.checkpoint = 10, (1,)

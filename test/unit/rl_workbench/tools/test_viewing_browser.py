@@ -1,0 +1,175 @@
+"""A run's page in a real browser: its curves, its robot, its player; afterwards, and while it trains."""
+
+import io
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import BOUND, Browser, find_browser, wait_for
+from PIL import Image
+from workbench_runs import policy_gradient
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not find_browser(), reason="no Chromium: apt-get install chromium"),
+]
+WORKBENCH = (sys.executable, "-m", "cartpole.workbench")
+SRC = Path(__file__).resolve().parents[4] / "src"
+# The lengths of all charts' data, as viser's page offers them to tests.
+DATA = """Object.values((window.__viserTestpoints || {}).uplots || {})
+  .map(each => each.chart.data[0].length)"""
+SIZE = (900, 650)  # [pixels]: it is drawn without a graphics card
+BLUE, ORANGE = (20, 90, 190), (230, 140, 40)  # cart and pole of our robot
+BLACK, BROWN = (0, 0, 0), (202, 152, 101)  # and of the pictures of CartPole-v1
+CANVASES = "document.querySelectorAll('.uplot canvas').length"
+
+
+class Command:
+    """A command that serves a page."""
+
+    def __init__(self, *words: str) -> None:
+        self.lines: list[str] = []
+        self._process = subprocess.Popen(
+            [*WORKBENCH, *words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env={**os.environ, "PYTHONPATH": str(SRC)},
+        )  # fmt: skip
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            self.lines.append(line.rstrip())
+
+    def url(self) -> str:
+        return wait_for(self._url, f"address in {self.lines}")
+
+    def _url(self) -> str:
+        return next(
+            (found[0] for line in self.lines if (found := re.search("http://[0-9.:]+/", line))), ""
+        )
+
+    def children(self) -> list[int]:
+        pid = self._process.pid
+        return [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+    def interrupt(self) -> int:
+        self._process.send_signal(signal.SIGINT)
+        code = self._process.wait(BOUND)
+        self._reader.join(BOUND)
+        return code
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
+
+
+@pytest.fixture
+def start():
+    commands = []
+
+    def started(*words: str) -> Command:
+        commands.append(Command(*words))
+        return commands[-1]
+
+    yield started
+    for each in commands:
+        each.kill()
+
+
+def is_seen(page: Browser, *colours: tuple[int, int, int]) -> bool:
+    """Whether something of about each of the colours is left of the panel, below notices."""
+    pixels = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"), int)[160:, :550]
+    return all((abs(pixels - colour).max(axis=-1) < 45).sum() > 50 for colour in colours)
+
+
+def pause(page: Browser) -> None:
+    """What moves is drawn without a graphics card here, and keeps the page from all else."""
+    wait_for(lambda: step_of(page) >= 0, "episode")
+    page.click("Pause")
+    page.wait_for_text("Play\n")
+
+
+def step_of(page: Browser) -> int:
+    found = re.search(r"step (\d+) of", page.text)
+    return int(found[1]) if found else -1
+
+
+def is_served(url: str) -> bool:
+    try:
+        urllib.request.urlopen(url, timeout=BOUND).close()
+    except (urllib.error.URLError, ConnectionError):
+        return False
+    return True
+
+
+def test_a_run_is_seen_and_played(start, tmp_path) -> None:
+    run = policy_gradient(tmp_path / "run", env_id="cartpole/Balance-v0", episodes=30, seed=1)
+    viewing = start("view", str(run), "--port", "0", "--checkpoint", "best", "random")
+    with Browser(viewing.url(), size=SIZE) as page:
+        page.wait_for_text("30 episodes")
+        wait_for(lambda: page.run(CANVASES) >= 3, "charts")
+        assert 30 in page.run(DATA)
+        page.wait_for_text("best, of step")
+        pause(page)
+        wait_for(lambda: is_seen(page, BLUE, ORANGE), "robot in 3-D")
+        page.press_keys("[role=slider]", "Home", 1)
+        page.wait_for_text("step 0 of")
+        page.press_keys("[role=slider]", "ArrowRight", 3)
+        page.wait_for_text("step 3 of")
+        page.choose("1 ×", "0.1 ×")
+        assert "step 3 of" in page.text, "it is paused"
+        page.click("Play")
+        wait_for(lambda: step_of(page) > 3, "step")
+        page.choose("best", "random")
+        page.wait_for_text("random, seed 0")
+    assert viewing.interrupt() == 130
+    assert len(viewing.lines) == 2
+
+
+def test_a_training_is_seen_while_it_learns(start, tmp_path) -> None:
+    training = start(
+        "train", "--algo=reinforce", "--env-id=CartPole-v1", f"--run-dir={tmp_path / 'run'}",
+        "--total-timesteps=100000000", "--stop-at-length=0", "--checkpoint-frequency=2000", "--gui",
+    )  # fmt: skip
+    url = training.url()
+    with Browser(url, size=SIZE) as page:
+        pause(page)
+        wait_for(lambda: page.run(CANVASES) >= 3, "charts")
+        before = max(page.run(DATA))
+        wait_for(lambda: max(page.run(DATA)) > before + 5, "more episodes")
+        wait_for(lambda: is_seen(page, BLACK, BROWN), "picture of the robot")
+        learned = tmp_path / "run" / "checkpoints"
+        wait_for(lambda: len(list(learned.glob("*.pt"))) > 1, "checkpoint that has learned")
+        page.click("Play the newest now")
+        wait_for(lambda: re.search(r"last, of step [1-9]", page.text), "its episode")
+    (child,) = training.children()
+    os.kill(child, signal.SIGKILL)
+    table = tmp_path / "run" / "scalars.csv"
+    size = table.stat().st_size
+    wait_for(lambda: table.stat().st_size > size + 5000, "training that goes on")
+    assert not is_served(url)
+    assert training.interrupt() == 130
+    assert any("interrupted" in line for line in training.lines)
+
+
+def test_the_page_ends_with_its_training_whatever_ends_it(start, tmp_path) -> None:
+    training = start(
+        "train",
+        "--algo=dqn",
+        f"--run-dir={tmp_path / 'run'}",
+        "--total-timesteps=100000000",
+        "--gui",
+    )
+    url = training.url()
+    assert is_served(url)
+    training.kill()
+    wait_for(lambda: not is_served(url), "end of the page")
