@@ -47,7 +47,8 @@ class PgTrain(unittest.TestCase):
 
     def test_from_nothing(self):
         place = self.place()
-        output = self.trained(place, "--episodes=5", "--seed=1", "--save-every=4")
+        output = self.trained(place, "--episodes=5", "--seed=1", "--save-every=4", "--gui")
+        self.assertIn("the window is the page http://127.0.0.1:", output)
         self.assertEqual(place.left_after(), {})
         self.assertIn("trained 5 episodes", output)
         self.assertIn(str(place.run), output)
@@ -116,7 +117,9 @@ class PgTrain(unittest.TestCase):
         world.wait_for("process[gazebo-2]: started")
         self.wait_for_service(place, "/gazebo/step_world")
         before = set(place.processes())
-        self.trained(place, "--episodes=2")
+        output = self.trained(place, "--episodes=2", "--gui")  # it has no window: one is opened
+        self.assertIn("opening the simulator's window", output)
+        self.assertIn("the window is the page http://127.0.0.1:", output)
         self.assertEqual(set(place.processes()), before)
         self.assertEqual(self.models(place), [])
         world.interrupt()

@@ -132,9 +132,6 @@ def test_a_training_runs(command: Command, tmp_path: Path, monkeypatch, capsys) 
         with pytest.raises(SystemExit, match="^0$"):
             TRAININGS[program](flags)
         return
-    if "--gui" in flags:  # of a simulator over ROS alone
-        pg_train.choose(flags, {})
-        flags.remove("--gui")
     flags += SHORT
     if not any(flag.startswith("--env-id") for flag in flags):
         flags.append("--backend=bullet")

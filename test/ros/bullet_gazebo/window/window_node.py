@@ -35,6 +35,9 @@ BALL = """<robot name="ball"><link name="ball">
 <visual><geometry><mesh filename="file://{mesh}"/></geometry></visual></link></robot>"""
 NOTICES = 160  # [pixels] from above that notices may take, and give back
 STATES = "joint_state_controller"
+# The lengths of all charts' data, as viser's page offers them to tests.
+CHARTS = """Object.values((window.__viserTestpoints || {}).uplots || {})
+  .map(each => each.chart.data[0].length)"""
 ODD = "<b>ö\t\"&'/x"
 
 
@@ -181,6 +184,24 @@ class WindowTest(unittest.TestCase):
         plain = self.view()
         self.page.click("Collision shapes")
         wait_for(lambda: (self.view() != plain).any(axis=0).sum() > 200, "collision shapes")
+
+    def test_the_curves_of_a_training_beside_the_robot(self):
+        with tempfile.TemporaryDirectory() as folder:
+            rospy.set_param("/gazebo_gui/curves", folder)
+            with Path(folder, "scalars.csv").open("w") as table:
+                table.write("step,tag,value,wall_time\n")
+                for episodes in (3, 30):
+                    table.writelines(
+                        f"{10 * step},charts/episodic_return,{step}.5,0\n"
+                        for step in range(episodes // 10 * 3, episodes)
+                    )
+                    table.flush()
+                    self.page.wait_for_text("Training")
+                    self.page.click("Training")
+                    self.page.wait_for_text(f"{episodes} episodes")
+            wait_for(lambda: self.page.run(CHARTS) == [30], "chart")
+            rospy.delete_param("/gazebo_gui/curves")
+        self.page.wait_for_text("the table is gone")
 
     def test_what_somebody_else_does_is_shown(self):
         self.page.click("World")
