@@ -10,7 +10,8 @@ import pytest
 import workbench_runs
 from training_runs import SMALL, flags, summary
 
-from rl_workbench.cli import COMMANDS, PROGRAM, main
+from rl_workbench.cli import COMMANDS, main
+from rl_workbench.training.cli import PROGRAM
 
 pytestmark = pytest.mark.usefixtures("signals")
 

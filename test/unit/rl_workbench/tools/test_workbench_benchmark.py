@@ -14,7 +14,6 @@ import pytest
 import workbench_runs
 
 from rl_workbench import cli
-from rl_workbench.cli import PROGRAM
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.benchmark import trainings
 from rl_workbench.tools.benchmark.results import RunResult, examine
@@ -30,6 +29,7 @@ from rl_workbench.tools.benchmark.tables import BENCHMARK_SUMMARY, grouped, summ
 from rl_workbench.tools.benchmark.trainings import Job, Trainings
 from rl_workbench.tools.commands import benchmarking
 from rl_workbench.tools.runs.runs import cost_file, cost_of, open_run
+from rl_workbench.training.cli import PROGRAM
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.interrupt import Interrupt
 
