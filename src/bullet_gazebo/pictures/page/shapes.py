@@ -82,7 +82,7 @@ class ShapeMaker:
             way = rotate(turn, (axis[0], axis[1], axis[2]))
             self._add_rod(where, corner, way, (0.0, AXES), AXES / 25, color)
         axis = rotate(turn, joint.axis)
-        self._add_rod(where, corner, axis, (-AXES, 2.0 * AXES), AXES / 30, AXIS_COLOR)
+        self._add_rod(where, corner, axis, (-AXES, 2.0 * AXES), AXES / 20, AXIS_COLOR)
         if self._names <= MOST_NAMES:
             end = np.array(corner) + 2.0 * AXES * np.array(axis)
             label = self._scene.add_label(self._singles.name(), shown(joint.name))

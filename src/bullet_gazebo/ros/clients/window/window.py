@@ -146,6 +146,7 @@ class Window:
         picture = client.get_render(
             camera.image_height, camera.image_width, transport_format="png", timeout=RENDERING
         )
-        content = io.BytesIO()
-        Image.fromarray(picture[..., :3]).save(content, "PNG")
-        client.send_file_download("gzclient.png", content.getvalue())
+        seen, content = Image.fromarray(picture), io.BytesIO()
+        paper = Image.new("RGBA", seen.size, "white")  # where nothing is, it is clear
+        Image.alpha_composite(paper, seen).convert("RGB").save(content, "PNG")
+        client.send_file_download("gzclient.png", content.getvalue(), save_immediately=True)
