@@ -157,7 +157,8 @@ class Browser:
             f"""(() => {{
               const kinds = "button, label, input, [role=tab], [role=option], p";
               const found = [...document.querySelectorAll(kinds)]
-                .filter(e => e.offsetParent && ({condition}));
+                .filter(e => e.offsetParent && ({condition}))
+                .filter((e, _, all) => !all.some(other => other !== e && e.contains(other)));
               const moving = document.getAnimations().filter(
                 a => a.playState === "running" && a.effect.target.contains(found[0]));
               if (!found.length || moving.length) return null;

@@ -149,9 +149,7 @@ class ModelPanel:
             way = place - self._before
             if np.abs(way).max() > 1e-6:
                 for client in self._server.get_clients().values():
-                    with client.atomic():
-                        client.camera.look_at = client.camera.look_at + way
-                        client.camera.position = client.camera.position + way
+                    client.camera.position = client.camera.position + way  # takes along what it looks at
         self._before = place
 
 
