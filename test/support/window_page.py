@@ -127,9 +127,7 @@ class WindowCase(unittest.TestCase):
         """Sets the real-time factor that is aimed at; 0 is as fast as possible."""
         now = self.physics()
         rate = factor / now.time_step
-        self.assertTrue(
-            self.set_physics(now.time_step, rate, now.gravity, now.ode_config).success
-        )
+        self.assertTrue(self.set_physics(now.time_step, rate, now.gravity, now.ode_config).success)
 
     def view(self):
         """Red, green and blue (3, n) of the picture's pixels, without the panel beside it and notices."""
@@ -138,7 +136,9 @@ class WindowCase(unittest.TestCase):
 
     def wait_until_seen(self, color, pixels):
         """Waits until more than `pixels` of the picture have a colour."""
-        wait_for(lambda: count(self.view(), color) > pixels, f"{color} of more than {pixels} pixels")
+        wait_for(
+            lambda: count(self.view(), color) > pixels, f"{color} of more than {pixels} pixels"
+        )
 
     def wait_until_gone(self, color):
         """Waits until nothing of the picture has a colour."""

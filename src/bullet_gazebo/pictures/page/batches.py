@@ -148,7 +148,7 @@ class _Batch:
 
     @property
     def _colors(self) -> np.ndarray:
-        """As light: the page takes the colours of batches for that, where it takes others as a screen does."""
+        """As light: the page takes the colours of batches for that, others as a screen does."""
         screen = np.array([each.part.color for each in self.entries]) / 255.0
         light = np.where(screen <= 0.04045, screen / 12.92, ((screen + 0.055) / 1.055) ** 2.4)
         return np.rint(255.0 * light).astype(np.uint8)

@@ -37,7 +37,7 @@ def ball() -> Geometry:
 
 @cache
 def cylinder() -> Geometry:
-    """A cylinder around z with a radius and a length of 1 m. Its ends have corners of their own: they are flat."""
+    """A cylinder around z, radius and length 1 m. Its ends have corners of their own: they are flat."""
     angles = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     low, high = (np.column_stack([circle, np.full(SIDES, z)]) for z in (-0.5, 0.5))

@@ -23,6 +23,7 @@ SMALLEST = 1e-6  # [m]; nothing is drawn of size 0
 BOX = 0.1  # [m] of an unshown mesh
 AXES = 0.15  # [m] of a joint's frame
 AXIS_COLOR = (250, 200, 0)
+OWN_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 AXES_COLORS = ((225, 0, 0), (0, 190, 0), (0, 0, 225))
 MOST_NAMES = 200  # of joints; each is an object of its own
 MOST_FILES = 32
@@ -72,15 +73,16 @@ class ShapeMaker:
         elif shape.kind == "mesh":
             self._add_mesh(where, shape, told, rgba, collision)
         else:
-            self._add_unshown(where, f"{told}: a shape '{shown(shape.kind)}' is not known", shape.pose)
+            self._add_unshown(
+                where, f"{told}: a shape '{shown(shape.kind)}' is not known", shape.pose
+            )
 
     def add_joint(self, where: Where, joint: SeenJoint) -> None:
         """Adds a joint's frame, its axis and its name; `where` is the link that it moves."""
         self._names += 1
         corner, turn = joint.frame
-        for axis, color in zip(np.eye(3).tolist(), AXES_COLORS, strict=True):
-            way = rotate(turn, (axis[0], axis[1], axis[2]))
-            self._add_rod(where, corner, way, (0.0, AXES), AXES / 25, color)
+        for own, color in zip(OWN_AXES, AXES_COLORS, strict=True):
+            self._add_rod(where, corner, rotate(turn, own), (0.0, AXES), AXES / 25, color)
         axis = rotate(turn, joint.axis)
         self._add_rod(where, corner, axis, (-AXES, 2.0 * AXES), AXES / 20, AXIS_COLOR)
         if self._names <= MOST_NAMES:
@@ -113,7 +115,9 @@ class ShapeMaker:
         )  # fmt: skip
         self._singles.add(*where, _numbers(pose), plane)
 
-    def _add_mesh(self, where: Where, shape: Shape, told: str, rgba: Color, collision: bool) -> None:
+    def _add_mesh(
+        self, where: Where, shape: Shape, told: str, rgba: Color, collision: bool
+    ) -> None:
         try:
             mesh = read_look(shape.mesh)
         except DescriptionError as error:

@@ -149,7 +149,9 @@ class ModelPanel:
             way = place - self._before
             if np.abs(way).max() > 1e-6:
                 for client in self._server.get_clients().values():
-                    client.camera.position = client.camera.position + way  # takes along what it looks at
+                    client.camera.position = (
+                        client.camera.position + way
+                    )  # takes along what it looks at
         self._before = place
 
 

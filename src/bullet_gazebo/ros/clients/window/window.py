@@ -13,7 +13,8 @@ import viser
 from bullet_gazebo_msgs.msg import SceneContacts, ScenePoses
 from PIL import Image
 
-from bullet_gazebo.pictures.page.picture import NUMBERS, Picture
+from bullet_gazebo.pictures.page.batches import NUMBERS
+from bullet_gazebo.pictures.page.picture import Picture
 from bullet_gazebo.ros.clients.window.commands import Commands
 from bullet_gazebo.ros.clients.window.controllers import Controllers
 from bullet_gazebo.ros.clients.window.model_panel import ModelPanel
