@@ -83,7 +83,7 @@ def view(address: str) -> None:
         begin, moves = time.monotonic(), 0
         print("open", flush=True)
         while True:
-            moves += b"SetOrientationMessage" in told(page, 1.0)
+            moves += b"batched_wxyzs" in told(page, 1.0)
             if time.monotonic() - begin >= 1.0:
                 print(moves, flush=True)
                 begin, moves = time.monotonic(), 0

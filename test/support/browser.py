@@ -116,12 +116,23 @@ class Browser:
             }})()"""
         )
 
+    def wait_for_value(self, value):
+        """Waits until a field or a list shows `value`."""
+        wait_for(lambda: self._middle(f"e.value === {json.dumps(value)}"), f"value {value!r}")
+
+    def download_to(self, folder):
+        """Has the page's downloads go to a folder; each is there as soon as it is whole."""
+        self._do("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
+
     def choose(self, now, wanted):
         """Chooses `wanted` in the list that shows `now`."""
         self._press(
             wait_for(lambda: self._middle(f"e.value === {json.dumps(now)}"), f"list {now!r}")
         )
         self.click(wanted)
+        self.wait_for_value(wanted)
+        open_lists = "[...document.querySelectorAll('[role=option]')].some(e => e.offsetParent)"
+        wait_for(lambda: not self.run(open_lists), "closed list")
 
     def click(self, text):
         """Clicks the element with that text, in the middle, as a mouse does."""
@@ -141,13 +152,16 @@ class Browser:
             self._do("Input.dispatchMouseEvent", type=kind, button="left", clickCount=1, **place)
 
     def _middle(self, condition):
-        """Where the first visible element is that a JavaScript condition on `e` holds for."""
+        """Where the first visible element is that a JavaScript condition on `e` holds for, once it rests."""
         return self.run(
             f"""(() => {{
               const kinds = "button, label, input, [role=tab], [role=option], p";
               const found = [...document.querySelectorAll(kinds)]
-                .filter(e => e.offsetParent && ({condition}));
-              if (!found.length) return null;
+                .filter(e => e.offsetParent && ({condition}))
+                .filter((e, _, all) => !all.some(other => other !== e && e.contains(other)));
+              const moving = document.getAnimations().filter(
+                a => a.playState === "running" && a.effect.target.contains(found[0]));
+              if (!found.length || moving.length) return null;
               found[0].scrollIntoView({{block: "center"}});
               const box = found[0].getBoundingClientRect();
               return {{x: box.x + box.width / 2, y: box.y + box.height / 2}};

@@ -4,7 +4,10 @@ import base64
 import re
 
 import msgspec
+import numpy as np
 import zstandard
+
+ALIGNED = 8  # [bytes]; where an array begins
 
 
 def of_page(text):
@@ -20,7 +23,19 @@ class Recording:
         length = int.from_bytes(whole[:8], "little")
         found = msgspec.msgpack.decode(whole[8 : 8 + length])
         self.duration = found["durationSeconds"]  # [s]
-        self.messages = found["messages"]
+        self._arrays, start = [], 8 + length
+        for size in found["binaryBufferLengths"]:
+            start += -start % ALIGNED
+            self._arrays.append(whole[start : start + size])
+            start += size
+        self.messages = [(when, self._with_arrays(each)) for when, each in found["messages"]]
+
+    def _with_arrays(self, value):
+        if isinstance(value, dict) and "__binary_index" in value:
+            return np.frombuffer(self._arrays[value["__binary_index"]], value["dtype"])
+        if isinstance(value, dict):
+            return {key: self._with_arrays(each) for key, each in value.items()}
+        return value
 
     def of(self, kind):
         """The messages of a type, without their times."""
@@ -49,3 +64,16 @@ class Recording:
             elif kind == "SceneNodeUpdateMessage":
                 nodes[name].update(message["updates"])
         return nodes
+
+    def parts(self, time=float("inf")):
+        """What the batches of shapes are made of at a time [s], each with position, wxyz and scale."""
+        found = []
+        for node in self.at(time).values():
+            if node.get("kind") == "BatchedMeshesMessage":
+                columns = [
+                    np.reshape(node[f"batched_{key}s"], (-1, width)).tolist()
+                    for key, width in (("position", 3), ("wxyz", 4), ("scale", 3))
+                ]
+                keys = ("position", "wxyz", "scale")
+                found += [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
+        return found

@@ -99,6 +99,10 @@ class Body(ABC):
     def link_state(self, name: str) -> tuple[Pose, Twist]:
         """Returns pose and twist of the frame of link `name`, in the world."""
 
+    def link_poses(self) -> dict[str, Pose]:
+        """Returns the poses of all links' frames, in the world, in the order of `link_names`."""
+        return {name: self.link_state(name)[0] for name in self.link_names}
+
     @abstractmethod
     def set_link_gravity(self, name: str, on: bool) -> None:
         """Lets gravity act on link `name`, or not."""

@@ -72,6 +72,10 @@ class Model:
         """Returns pose and twist of the frame of link `name`, in world axes."""
         return self.body.link_state(name)
 
+    def link_poses(self) -> list[Pose]:
+        """Returns the poses of the frames of all links in `link_names`, in world axes."""
+        return [pose for name, pose in self.body.link_poses().items() if name != WORLD]
+
     def root_state(self) -> tuple[Pose, Twist]:
         """Returns pose and twist of the canonical (first) link's frame, in world axes."""
         return self.body.link_state(self.description.root)
@@ -146,8 +150,7 @@ class Model:
         damped = {name for name, damping in dampings.items() if damping > 0.0}
         if not damped | set(self._damped):
             return
-        poses = {name: self.body.link_state(name)[0] for name in self.body.link_names}
-        inertias = effective_inertias(self.description, poses)
+        inertias = effective_inertias(self.description, self.body.link_poses())
         for name in damped | set(self._damped):
             most = GENTLEST * inertias[name] / time_step
             self._damped[name] = min(dampings[name], most)

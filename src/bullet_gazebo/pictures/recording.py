@@ -111,8 +111,7 @@ class Recorder:
             self._send(CAST, lambda: json.dumps([_looks(model) for model in models]).encode())
         poses = array("d")
         for model in models:
-            for name in model.link_names:
-                position, orientation = model.link_state(name)[0]
+            for position, orientation in model.link_poses():
                 poses.extend((*position, *orientation))
         self._send(PICTURE, poses.tobytes)
 

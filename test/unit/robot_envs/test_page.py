@@ -35,20 +35,19 @@ def test_the_cart_pole_stands_on_the_page_and_follows_the_environment(server):
     move()
     env.close()
     found = Recording(recording.serialize())
-    nodes, before = found.at(), found.at(0.5)
-    assert len(shapes(nodes, "BoxMessage")) > 3  # rails, posts, cart
+    nodes, before, parts = found.at(), found.parts(0.5), found.parts()
+    assert len(parts) == 8  # two rails, four posts, cart, pole
     (ground,) = shapes(nodes, "GridMessage")
     assert ground["infinite_grid"]
     assert shapes(nodes, "DirectionalLightMessage")
-    turned = [
-        name for name in nodes if name in before and nodes[name]["wxyz"] != before[name]["wxyz"]
-    ]
-    (pole,) = [name for name in turned if nodes[name]["kind"] == "FrameMessage"]
-    x, _, z = nodes[pole]["position"]
-    assert x == pytest.approx(float(observation[0]), abs=1e-5)
-    assert z > 0.5  # the robot of this task stands on a height
-    w, _, y, _ = nodes[pole]["wxyz"]
-    assert (-2.0 * w * y, w * w - y * y) == pytest.approx(tuple(observation[2:4]), abs=1e-5)
+    (turned,) = [at for at, was in zip(parts, before, strict=True) if at["wxyz"] != was["wxyz"]]
+    assert turned["scale"] == pytest.approx([0.01, 0.01, 0.5])  # the pole
+    x, _, z = turned["position"]
+    w, _, y, _ = turned["wxyz"]
+    up = w * w - y * y
+    assert x == pytest.approx(float(observation[0]) + 0.25 * 2.0 * w * y, abs=1e-5)
+    assert z - 0.25 * up > 0.5  # the robot of this task stands on a height
+    assert (-2.0 * w * y, up) == pytest.approx(tuple(observation[2:4]), abs=1e-5)
 
 
 def test_the_page_is_seen_as_the_pictures_are(server, tmp_path):
@@ -69,10 +68,11 @@ def test_the_world_goes_by_a_robot_that_drives_away(server, tmp_path):
     recording = server.get_scene_serializer()
     place[0] = Pose((7.0, -2.0, 0.1))
     robot()
-    nodes = Recording(recording.serialize()).at()
-    away = [n for n in nodes.values() if n.get("position") == pytest.approx([7.0, -2.0, 0.1])]
-    assert len(away) == 2  # hull and mast, in the world
-    assert nodes["/world"]["position"] == pytest.approx([-7.0, 2.0, -0.1])
+    found = Recording(recording.serialize())
+    hull, mast = found.parts()
+    assert hull["position"] == pytest.approx([7.0, -2.0, 0.1])  # in the world
+    assert mast["position"] == pytest.approx([7.0, -2.0, 0.3])
+    assert found.at()["/world"]["position"] == pytest.approx([-7.0, 2.0, -0.1])
 
 
 def test_several_stand_beside_each_other_with_captions_and_are_all_seen(server, tmp_path):

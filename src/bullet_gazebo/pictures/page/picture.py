@@ -1,4 +1,4 @@
-"""The world as it stands on the page: a frame for each link, and its shapes below it."""
+"""The world as it stands on the page."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -9,22 +9,22 @@ import viser
 from bullet_gazebo.physics.description import Light
 from bullet_gazebo.physics.elements import shown
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.pictures.page.seen import SeenJoint, SeenModel
-from bullet_gazebo.pictures.page.shapes import ShapeMaker, color_bytes, wxyz
+from bullet_gazebo.pictures.page.batches import NUMBERS, Batches
+from bullet_gazebo.pictures.page.seen import SeenModel
+from bullet_gazebo.pictures.page.shapes import ShapeMaker, color_bytes
+from bullet_gazebo.pictures.page.singles import Singles
 
-NUMBERS = 7  # of a pose
 STILL = 1e-6  # [m], and of a quaternion's parts: what moves by less isn't drawn anew
-AXES = 0.15  # [m] of a joint's frame
+NOWHERE = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 CONTACT = 0.02  # [m]; how large a contact point is
 RED = (220, 30, 30)
 
 
 @dataclass
 class DrawnModel:
-    """A model on the page; `frames` are the nodes of its links."""
+    """A model on the page."""
 
     seen: SeenModel
-    frames: list[viser.FrameHandle]
 
     def pose(self, links: np.ndarray) -> Pose:
         """Returns where the model's frame is, from the poses (n, 7) of its links."""
@@ -46,77 +46,73 @@ class Picture:
         self, server: viser.ViserServer, warn: Callable[[str], None], below: str = ""
     ) -> None:
         self._server = server
-        self._below = below
-        self._shapes = ShapeMaker(server.scene, warn)
+        self._batches = Batches(server.scene, below)
+        self._singles = Singles(below)
+        self._shapes = ShapeMaker(server.scene, self._batches, self._singles, warn)
         self.models: dict[int, DrawnModel] = {}  # in the scene's order
+        self._first: dict[int, int] = {}  # row of each model in the poses
         self._lights: list[viser.SceneNodeHandle] = []
-        self._frames: list[viser.FrameHandle] = []
+        self._lit: list[Light] | None = None
         self._last = np.zeros((0, NUMBERS))
-        # Counts: a node of a name that was just taken away may go in the browser, too.
-        self._drawings = 0
+        self._new = False  # since the last move
         self._contacts: viser.PointCloudHandle | None = None
 
     def draw(
         self, models: Sequence[SeenModel], lights: Iterable[Light], joint_frames: bool = False
     ) -> None:
-        """Adds what is new, and takes away what is gone; of what is drawn already the number will do."""
-        wanted = {model.number for model in models}
+        """Adds what is new, and takes away what is gone; of what is drawn already the number will do.
+
+        What is new is seen from the next `move` on.
+        """
         with self._server.atomic():
-            for number in [each for each in self.models if each not in wanted]:
-                for frame in self.models.pop(number).frames:
-                    frame.remove()
+            self._remove(set(self.models) - {model.number for model in models})
+            for model in models:
+                if model.number not in self.models:
+                    self._add(model, joint_frames)
             drawn = self.models
             self.models = {
-                model.number: drawn.get(model.number) or self._add(model, joint_frames)
-                for model in models
+                model.number: drawn.get(model.number) or DrawnModel(model) for model in models
             }
-            self._light(lights)
-        self._frames = [frame for model in self.models.values() for frame in model.frames]
-        self._last = np.full((len(self._frames), NUMBERS), np.nan)
+            self._light(list(lights))
+        counts = [len(model.seen.links) for model in self.models.values()]
+        starts = np.cumsum([0, *counts]).tolist()
+        self._first = dict(zip(self.models, starts, strict=False))
+        self._batches.settle(self._first)
+        self._singles.settle(self._first)
+        self._last = np.full((starts[-1], NUMBERS), np.nan)
+        self._new = True
 
     def clear(self) -> None:
         """Takes all away, for a scene that is drawn otherwise."""
         with self._server.atomic():
-            for model in self.models.values():
-                for frame in model.frames:
-                    frame.remove()
-        self.models, self._frames = {}, []
-        self._drawings += 1
+            self._remove(set(self.models))
+        self.models = {}
+        self._last = np.zeros((0, NUMBERS))
+        self._shapes.clear()
 
-    def _add(self, model: SeenModel, joint_frames: bool) -> DrawnModel:
-        frames = []
+    def _remove(self, numbers: set[int]) -> None:
+        if numbers:
+            self._batches.remove(numbers)
+            self._singles.remove(numbers)
+
+    def _add(self, model: SeenModel, joint_frames: bool) -> None:
+        places = {}
         for index, link in enumerate(model.links):
-            # Names may hold anything, so nodes are named by numbers.
-            node = f"{self._below}/m{model.number}_{index}_{self._drawings}"
-            frames.append(self._server.scene.add_frame(node, show_axes=False))
-            where = f"model '{shown(model.name)}', link '{shown(link.name)}'"
-            for count, shape in enumerate(link.visuals):
-                self._shapes.add(f"{node}/v{count}", shape, f"{where}, visual", collision=False)
-            for count, shape in enumerate(link.collisions):
-                self._shapes.add(f"{node}/c{count}", shape, f"{where}, collision", collision=True)
-        if joint_frames:
-            nodes = {link.name: frame.name for link, frame in zip(model.links, frames, strict=True)}
-            for count, joint in enumerate(model.joints):
-                if joint.child in nodes:
-                    self._add_joint(f"{nodes[joint.child]}/j{count}", joint)
-        return DrawnModel(model, frames)
+            places[link.name] = where = (model.number, index)
+            told = f"model '{shown(model.name)}', link '{shown(link.name)}'"
+            for shape in link.visuals:
+                self._shapes.add(where, shape, f"{told}, visual", collision=False)
+            for shape in link.collisions:
+                self._shapes.add(where, shape, f"{told}, collision", collision=True)
+        for joint in model.joints if joint_frames else ():
+            if joint.child in places:
+                self._shapes.add_joint(places[joint.child], joint)
 
-    def _add_joint(self, node: str, joint: SeenJoint) -> None:
-        axis = np.array(joint.axis)
-        self._server.scene.add_frame(
-            node, axes_length=AXES, axes_radius=AXES / 25, position=joint.frame.position,
-            wxyz=wxyz(joint.frame.orientation),
-        )  # fmt: skip
-        ends = np.stack([-AXES * axis, 2 * AXES * axis])[None].astype(np.float32)
-        self._server.scene.add_line_segments(
-            f"{node}/axis", ends, (250, 200, 0), thickness=AXES / 15
-        )
-        self._server.scene.add_label(
-            f"{node}/name", shown(joint.name), position=tuple((2 * AXES * axis).tolist())
-        )
-
-    def _light(self, lights: Iterable[Light]) -> None:
+    def _light(self, lights: list[Light]) -> None:
         """Roughly: directional and point lights of their colour, and an even one so that nothing is dark."""
+        if lights == self._lit:
+            return
+        self._lit = lights
         for node in self._lights:
             node.remove()
         scene, self._lights = self._server.scene, []
@@ -141,23 +137,27 @@ class Picture:
 
     def move(self, poses: np.ndarray) -> None:
         """Moves the links: position [m] and quaternion x y z w of each, in the models' order (n, 7)."""
-        if len(poses) != len(self._frames):
+        if poses.shape != self._last.shape:
             return
         still = (np.abs(poses - self._last) <= STILL).all(axis=1)
-        moved = np.flatnonzero(~still & np.isfinite(poses).all(axis=1))
-        with self._server.atomic():
-            for index in moved:
-                frame, pose = self._frames[index], poses[index]
-                frame.position, frame.wxyz = pose[:3], wxyz(pose[3:])
+        finite = np.isfinite(poses).all(axis=1)
+        moved = finite & ~still
         self._last[moved] = poses[moved]
+        # A link that was never anywhere is shown at the origin.
+        places = np.where(np.isnan(self._last), NOWHERE, self._last)
+        moved |= self._new
+        self._new = False
+        with self._server.atomic():
+            self._batches.move(places, moved)
+            self._singles.move(places, moved)
 
     @property
     def links(self) -> dict[str, np.ndarray]:
         """Poses (n, 7) of the links, by model; of those that have been told."""
-        found, first = {}, 0
-        for model in self.models.values():
-            rows = self._last[first : first + len(model.frames)]
-            first += len(model.frames)
+        found = {}
+        for number, model in self.models.items():
+            first = self._first[number]
+            rows = self._last[first : first + len(model.seen.links)]
             if len(rows) and np.isfinite(rows[model.seen.root]).all():
                 found[model.seen.name] = rows
         return found

@@ -110,7 +110,7 @@ class SceneTopics:
 
     def _copy_poses(self) -> Copy:
         models = self._sim.world.models.values()
-        poses = [model.link_state(link)[0] for model in models for link in model.link_names]
+        poses = [pose for model in models for pose in model.link_poses()]
         joints = [model.joint_states() for model in models if model.joint_names]
         return Copy(self._numbers.version, self._sim.paused, poses, joints)
 

@@ -2,145 +2,70 @@
 """The window in a real browser: the page shows what happens, and what is clicked there happens."""
 
 import io
-import subprocess
 import sys
 import tempfile
-import threading
-import unittest
 from pathlib import Path
 
 import numpy as np
 import rospy
 import rostest
-from controller_manager_msgs.srv import LoadController, SwitchController
-from gazebo_msgs.srv import (
-    DeleteModel,
-    GetJointProperties,
-    GetPhysicsProperties,
-    GetWorldProperties,
-    SpawnModel,
-    SpawnModelRequest,
-)
+from gazebo_msgs.msg import ModelState
+from gazebo_msgs.srv import GetModelState, SetModelState
 from PIL import Image
-from std_srvs.srv import Empty
 
 sys.path.append(str(Path(__file__).resolve().parents[3] / "support"))
 
-from browser import BOUND, Browser, find_browser, wait_for
+from browser import wait_for
+from window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
 
-BALL = """<robot name="ball"><link name="ball">
-<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>
-  <material name="r"><color rgba="1 0 0 1"/></material></visual>
-<visual><geometry><mesh filename="file://{mesh}"/></geometry></visual></link></robot>"""
-NOTICES = 160  # [pixels] from above that notices may take, and give back
-STATES = "joint_state_controller"
+  <material name="r"><color rgba="1 0 0 1"/></material></visual></link></robot>"""
+BROKEN = BALL.replace(
+    "</link>", '<visual><geometry><mesh filename="file://{}"/></geometry></visual></link>'
+)
+DOOR = f"""<robot name="door"><link name="world"/><link name="frame">{INERTIAL}
+<visual><geometry><box size="0.1 0.1 0.8"/></geometry>
+  <material name="b"><color rgba="0 0 1 1"/></material></visual></link>
+<link name="leaf">{INERTIAL}
+<collision><origin xyz="0 0 -0.5"/><geometry><box size="0.6 0.6 1"/></geometry></collision></link>
+<joint name="fixed" type="fixed"><parent link="world"/><child link="frame"/><origin xyz="0 0 0.4"/></joint>
+<joint name="hinge" type="continuous"><parent link="frame"/><child link="leaf"/><origin xyz="0 0 0.5"/>
+<axis xyz="0 0 1"/></joint>
+</robot>"""
+CRATE = f"""<robot name="crate"><link name="crate">{INERTIAL}
+<collision><geometry><box size="0.4 0.4 0.2"/></geometry></collision></link></robot>"""
+ODD = "<b>ö\t\"&'/x"
 # The lengths of all charts' data, as viser's page offers them to tests.
 CHARTS = """Object.values((window.__viserTestpoints || {}).uplots || {})
   .map(each => each.chart.data[0].length)"""
-ODD = "<b>ö\t\"&'/x"
+AWAY = (3.0, -4.0, 0.6)  # [m]; behind the camera
 
 
-def proxy(name, kind):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)
+class WindowTest(WindowCase):
+    def place(self, name, position):
+        state = ModelState(model_name=name)
+        point = state.pose.position
+        point.x, point.y, point.z = position
+        state.pose.orientation.w = 1.0
+        self.assertTrue(proxy("/gazebo/set_model_state", SetModelState)(state).success)
 
-
-class Output:
-    """What a program writes, line by line."""
-
-    def __init__(self, *command):
-        self._process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
-        )
-        self.lines = []
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self):
-        for line in self._process.stdout:
-            self.lines.append(line.rstrip())
-
-    def line(self, text):
-        """Returns the first line with `text` in it, once it is there."""
-        found = wait_for(
-            lambda: (
-                [each for each in self.lines if text in each] or self._process.poll() is not None
-            ),
-            f"line {text!r}",
-        )
-        assert found is not True, self.lines
-        return found[0]
-
-    def close(self):
-        self._process.terminate()
-        code = self._process.wait(BOUND)
-        self._reader.join(BOUND)
-        self._process.stdout.close()
-        return code
-
-
-@unittest.skipUnless(find_browser(), "there is no Chromium here: apt-get install chromium")
-class WindowTest(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.spawn = staticmethod(proxy("/gazebo/spawn_urdf_model", SpawnModel))
-        cls.delete = staticmethod(proxy("/gazebo/delete_model", DeleteModel))
-        cls.physics = staticmethod(proxy("/gazebo/get_physics_properties", GetPhysicsProperties))
-        cls.world = staticmethod(proxy("/gazebo/get_world_properties", GetWorldProperties))
-        xml = rospy.get_param("/robot_description")
-        request = SpawnModelRequest(model_name="cartpole", model_xml=xml, robot_namespace="/")
-        assert cls.spawn(request).success
-        cls.window = Output("rosrun", "gazebo_ros", "gzclient", "--no-browser")
-        url = cls.window.line("is the page").rpartition(" ")[2]
-        cls.page = Browser(url)
-        cls.page.__enter__()
-        cls.page.wait_for_text("One step")
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.page.__exit__()
-        assert cls.window.close() == 0, cls.window.lines
-
-    def view(self):
-        """Red, green and blue (3, n) of the picture's pixels, without the panel beside it and notices."""
-        pixels = np.asarray(Image.open(io.BytesIO(self.page.screenshot())).convert("RGB")).astype(
-            int
-        )
-        return pixels[NOTICES:, : pixels.shape[1] * 2 // 3].reshape(-1, 3).T
-
-    def red(self):
-        """How many pixels are those of the ball."""
-        red, green, blue = self.view()
-        return int(((red > 120) & (np.maximum(green, blue) < red / 3)).sum())
-
-    def yellow(self):
-        """How many pixels are those of joints' axes."""
-        red, green, blue = self.view()
-        return int(((red > 180) & (green > 150) & (blue < 110)).sum())
+    def height(self, name):
+        return proxy("/gazebo/get_model_state", GetModelState)(name, "").pose.position.z
 
     def test_models_come_and_go(self):
-        self.page.click("Models")
-        self.page.wait_for_text("cartpole")
-        self.assertLess(self.red(), 50)
+        self.wait_until_gone(RED)
         with tempfile.TemporaryDirectory() as folder:
             mesh = Path(folder, "broken.stl")
             mesh.write_bytes(b"solid nothing of the kind")
             for name in ("ball", ODD):
-                self.comes_and_goes(name, mesh)
-
-    def comes_and_goes(self, name, mesh):
-        told = " ".join(name.split())
-        request = SpawnModelRequest(model_name=name, model_xml=BALL.format(mesh=mesh))
-        request.initial_pose.position.z = 0.6
-        answer = self.spawn(request)
-        self.assertTrue(answer.success, answer.status_message)
-        self.page.wait_for_text(told)
-        wait_for(lambda: self.red() > 1000, "ball in the picture")
-        self.assertIn("broken.stl", self.window.line(f"'{told}', link 'ball', visual"))
-        self.assertTrue(self.delete(name).success)
-        wait_for(lambda: told not in self.page.text, "deletion")
-        wait_for(lambda: self.red() < 50, "picture without the ball")
+                told = " ".join(name.split())
+                self.spawn(name, BROKEN.format(mesh), z=0.6)
+                self.wait_until_seen(RED, 1000)
+                self.assertIn("broken.stl", self.window.line(f"'{told}', link 'ball', visual"))
+                self.assertTrue(self.delete(name).success)
+                wait_for(lambda told=told: told not in self.page.text, "deletion")
+                self.wait_until_gone(RED)
 
     def test_time_is_moved_by_clicks(self):
         self.page.click("World")
@@ -156,34 +81,90 @@ class WindowTest(unittest.TestCase):
         wait_for(lambda: round(self.world().sim_time, 6) == 0.101, "hundred steps")
         self.page.wait_for_text("0.101 s")
 
-    def test_a_slider_places_a_joint_of_a_paused_world(self):
-        self.page.click("Models")
-        self.page.choose("(none)", "cartpole")
-        joint = proxy("/gazebo/get_joint_properties", GetJointProperties)
-        self.page.wait_for_text("stand_cart")
-        self.page.press_keys("[role=slider]", "ArrowRight", 20)
-        wait_for(lambda: joint("stand_cart").position[0] > 0.03, "joint that was placed")
-        self.page.choose("cartpole", "(none)")
-
-    def test_controllers_are_shown_with_their_state(self):
-        self.page.click("Controllers")
-        self.page.wait_for_text("/controller_manager")
-        self.assertTrue(proxy("/controller_manager/load_controller", LoadController)(STATES).ok)
-        self.page.wait_for_text(f"{STATES}: initialized")
-        switch = proxy("/controller_manager/switch_controller", SwitchController)
-        self.assertTrue(switch([STATES], [], 2, False, 0.0).ok)
-        self.page.wait_for_text(f"{STATES}: running")
-
-    def test_shapes_and_frames_on_demand(self):
+    def test_reset_world_puts_models_back_and_lets_time_go_on(self):
+        self.spawn("ball", BALL, z=0.6)
         self.page.click("World")
-        before = self.yellow()  # the pole is nearly of that colour
+        self.page.click("Do these steps")
+        wait_for(lambda: round(self.world().sim_time, 6) == 0.1, "hundred steps")
+        self.assertLess(self.height("ball"), 0.56)
+        self.page.click("Reset world")
+        wait_for(lambda: self.height("ball") == 0.6, "ball where it was")
+        self.assertEqual(round(self.world().sim_time, 6), 0.1)
+
+    def test_speed_is_chosen_and_shown(self):
+        self.set_speed(1.0)
+        self.page.click("World")
+        for before, after, factor in (
+            ("1 ×", "0.5 ×", 0.5), ("0.5 ×", "unlimited", 0.0), ("unlimited", "1 ×", 1.0)
+        ):  # fmt: skip
+            self.page.choose(before, after)
+            wait_for(lambda factor=factor: self.factor() == factor, f"speed {after}")
+        for factor, shown in ((2.0, "2 ×"), (1.3, "other"), (1.0, "1 ×")):  # somebody else sets it
+            self.set_speed(factor)
+            self.page.wait_for_value(shown)
+
+    def factor(self):
+        now = self.physics()
+        return round(now.max_update_rate * now.time_step, 6)
+
+    def test_frames_and_shapes_on_demand(self):
+        self.spawn("door", DOOR)
+        self.page.click("World")
+        self.wait_until_seen(BLUE, 500)
+        self.wait_until_gone(YELLOW)
         self.page.click("Joint frames")
-        wait_for(lambda: self.yellow() > before + 40, "axes of joints")
+        self.wait_until_seen(YELLOW, 40)
         self.page.click("Joint frames")
-        wait_for(lambda: self.yellow() < before + 20, "picture without axes")
-        plain = self.view()
+        self.wait_until_gone(YELLOW)
         self.page.click("Collision shapes")
-        wait_for(lambda: (self.view() != plain).any(axis=0).sum() > 200, "collision shapes")
+        self.wait_until_gone(BLUE)  # it is within the other one
+        self.page.click("Collision shapes")
+        self.wait_until_seen(BLUE, 500)
+
+    def test_contact_points_on_demand(self):
+        self.spawn("crate", CRATE, z=0.1)
+        self.page.click("World")
+        self.page.click("Do these steps")
+        wait_for(lambda: round(self.world().sim_time, 6) == 0.1, "hundred steps")
+        self.wait_until_gone(RED)
+        self.page.click("Contact points")
+        self.wait_until_seen(RED, 20)
+        self.page.click("Contact points")
+        self.wait_until_gone(RED)
+
+    def test_a_model_is_followed(self):
+        self.spawn("ball", BALL, z=0.6)
+        self.page.choose("(none)", "ball")
+        self.addCleanup(self.page.choose, "ball", "(none)")
+        self.page.click("Follow it")
+        self.page.wait_for_text("ball (followed)")
+        self.addCleanup(self.place, "ball", (0.0, 0.0, 0.6))
+        self.place("ball", AWAY)
+        self.page.wait_for_text("-4.000")
+        self.wait_until_seen(RED, 1000)
+        self.place("ball", (0.0, 0.0, 0.6))
+        self.page.wait_for_text("0.600")
+        self.page.click("Follow it")
+        wait_for(lambda: "(followed)" not in self.page.text, "end of following")
+        self.place("ball", AWAY)
+        self.wait_until_gone(RED)
+
+    def test_a_screenshot_is_what_the_page_shows(self):
+        self.spawn("ball", BALL, z=0.6)
+        self.page.click("World")
+        self.wait_until_seen(RED, 1000)
+        with tempfile.TemporaryDirectory() as folder:
+            self.page.download_to(folder)
+            self.page.click("Screenshot")
+            told = Path(folder, "gzclient.png")
+            wait_for(told.is_file, "gzclient.png")
+            picture = np.asarray(Image.open(io.BytesIO(told.read_bytes())))
+        height, width, parts = picture.shape
+        self.assertEqual(parts, 3)
+        self.assertEqual([width, height], self.page.run(CANVAS))
+        self.assertEqual(picture[0, 0].tolist(), [255, 255, 255])  # the sky
+        red = count(picture.reshape(-1, 3).T, RED)
+        self.assertAlmostEqual(red / count(self.view(), RED), 1.0, delta=0.1)
 
     def test_the_curves_of_a_training_beside_the_robot(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -205,10 +186,16 @@ class WindowTest(unittest.TestCase):
 
     def test_what_somebody_else_does_is_shown(self):
         self.page.click("World")
-        proxy("/gazebo/unpause_physics", Empty)()
+        self.unpause()
         self.page.wait_for_text("real-time factor")
-        proxy("/gazebo/pause_physics", Empty)()
+        self.page.wait_for_text("Pause")
+        self.pause()
         self.page.wait_for_text("paused")
+        self.page.wait_for_text("Go on")
+
+
+CANVAS = """(() => { const canvas = document.querySelector("canvas");
+  return [canvas.clientWidth, canvas.clientHeight]; })()"""
 
 
 if __name__ == "__main__":

@@ -38,6 +38,8 @@ def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(run: Path, tmp_path:
     labels = {when: found.at(when)["/caption0"]["text"] for when in (0.0, found.duration)}
     assert labels[0.0].startswith("step 0   return 0.0")
     assert labels[found.duration].startswith(f"step {steps}   return {steps:.1f}   action ")
+    before, after = ([part["wxyz"] for part in found.parts(when)] for when in (0.0, 9e9))
+    assert before != after
 
 
 def test_several_are_seen_beside_each_other(run: Path, tmp_path: Path, capsys):

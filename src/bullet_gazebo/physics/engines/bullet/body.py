@@ -231,6 +231,20 @@ class BulletBody(Body):
         arm = subtract(pose.position, state[0])
         return pose, (add(state[6], cross(state[7], arm)), state[7])
 
+    def link_poses(self) -> dict[str, Pose]:
+        names = [name for name in self.link_names if self._links[name] != BASE]
+        poses = dict.fromkeys(self.link_names, Pose()) | {
+            name: self._base_state()[0] for name in self.link_names if name not in names
+        }
+        if names:  # one call for all: each looks at the whole body
+            states = pybullet.getLinkStates(
+                self.id, [self._links[name] for name in names], 0, 1, physicsClientId=self._client
+            )
+            for name, state in zip(names, states, strict=True):
+                pose, offset = Pose(state[4], state[5]), self._offsets.get(name)
+                poses[name] = pose if offset is None else pose.compose(offset)
+        return poses
+
     def _base_state(self) -> tuple[Pose, Twist]:
         com = Pose(*pybullet.getBasePositionAndOrientation(self.id, self._client))
         linear, angular = pybullet.getBaseVelocity(self.id, self._client)

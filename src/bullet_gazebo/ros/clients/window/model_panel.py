@@ -115,8 +115,9 @@ class ModelPanel:
         for name, model in list(self._models.items())[:MOST_SHOWN]:
             if name in links:
                 x, y, z = model.pose(links[name]).position
+                follows = self._before is not None and name == self._choice.value
                 rows.append(
-                    f"<tr><td>{html.escape(shown(name))}</td>"
+                    f"<tr><td>{html.escape(shown(name))}{' (followed)' if follows else ''}</td>"
                     + "".join(f"<td align='right'>{each:.3f}</td>" for each in (x, y, z))
                     + "</tr>"
                 )
@@ -148,9 +149,9 @@ class ModelPanel:
             way = place - self._before
             if np.abs(way).max() > 1e-6:
                 for client in self._server.get_clients().values():
-                    with client.atomic():
-                        client.camera.look_at = client.camera.look_at + way
-                        client.camera.position = client.camera.position + way
+                    client.camera.position = (
+                        client.camera.position + way
+                    )  # takes along what it looks at
         self._before = place
 
 

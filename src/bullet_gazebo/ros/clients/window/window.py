@@ -13,7 +13,8 @@ import viser
 from bullet_gazebo_msgs.msg import SceneContacts, ScenePoses
 from PIL import Image
 
-from bullet_gazebo.pictures.page.picture import NUMBERS, Picture
+from bullet_gazebo.pictures.page.batches import NUMBERS
+from bullet_gazebo.pictures.page.picture import Picture
 from bullet_gazebo.ros.clients.window.commands import Commands
 from bullet_gazebo.ros.clients.window.controllers import Controllers
 from bullet_gazebo.ros.clients.window.model_panel import ModelPanel
@@ -146,6 +147,7 @@ class Window:
         picture = client.get_render(
             camera.image_height, camera.image_width, transport_format="png", timeout=RENDERING
         )
-        content = io.BytesIO()
-        Image.fromarray(picture[..., :3]).save(content, "PNG")
-        client.send_file_download("gzclient.png", content.getvalue())
+        seen, content = Image.fromarray(picture), io.BytesIO()
+        paper = Image.new("RGBA", seen.size, "white")  # where nothing is, it is clear
+        Image.alpha_composite(paper, seen).convert("RGB").save(content, "PNG")
+        client.send_file_download("gzclient.png", content.getvalue(), save_immediately=True)
