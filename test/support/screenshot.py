@@ -34,7 +34,7 @@ def main():
     with Browser(args.address, size=size) as page:
         for text in args.click:
             page.click(text)
-        wait_for(lambda: page.text.strip(), "text on the page")
+        wait_for(lambda: bool(page.text.strip()), "text on the page")
         time.sleep(args.settle)
         page.run(f"document.querySelectorAll('{NOTICE}').forEach(e => e.click())")
         time.sleep(args.settle / 5.0)
