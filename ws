@@ -56,9 +56,9 @@ NOT_FAST="rostest or slow or long or stress or extras"
 
 usage() {
     cat <<END
-usage: ws [--with FOLDER]... CMD [ARG...]
-                             make the workspace ready, then run CMD in it, where the catkin packages
-                             and Python modules in the user's FOLDERs are found, too
+usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
+       ws --with FOLDER [--with FOLDER]... CMD [ARG...]
+                             the same, with the catkin packages and Python modules in the user's FOLDERs
        ws test [ARG...]      run all tests; ARGs go to pytest, e.g. -k gazebo
        ws test --fast [ARG...]
                              run the tests of about a minute, without those through ROS (test/ros),

@@ -54,6 +54,7 @@ is_built() {  # entry of ROS_PACKAGE_PATH
     [[ ! -e $1/rospy/package.xml ]] && in_no_workspace "$1" || return 0
     IFS=: read -ra workspaces <<<"$CALLER_WORKSPACES"
     for workspace in "${workspaces[@]}"; do
+        [[ -n $workspace ]] || continue
         [[ ";$(<"$workspace/.catkin");" != *";$1;"* ]] || return 0
     done
     return 1

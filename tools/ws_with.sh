@@ -7,6 +7,7 @@ declare -A THEIRS=()  # of each path variable, what their packages and modules n
 add_folder() {  # option or variable, folder
     [[ -n $2 ]] || fail_usage "$1 needs a folder"
     [[ -d $2 ]] || fail_usage "$1: there is no folder '$2'"
+    [[ ! $2 -ef / ]] || fail_usage "$1: '$2' is the whole disk; name the folder of your packages"
     [[ -r $2 && -x $2 ]] || fail_usage "$1: the folder '$2' can't be read"
     WITH+=("$2")
 }

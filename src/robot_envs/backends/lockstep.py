@@ -69,9 +69,7 @@ class LockstepRobot(Generic[State]):
             answer = self._step(request)
             if not answer.success:
                 missing = ready(self.robot).missing()
-                raise SimulatorError(
-                    f"{STEP_SERVICE}: {answer.status_message}" + (f"; {missing}" if missing else "")
-                )
+                raise SimulatorError(f"{STEP_SERVICE}: {missing or answer.status_message}")
             self._answer = answer
             return read_state(self.robot, answer.joint_states)
 

@@ -27,7 +27,7 @@ from ros_utils import (
 from ros_utils.readiness import NotReady, Ready
 from ros_utils.service_client import ServiceGone
 from ros_utils.simulation import Simulation, reserved_port
-from ros_utils.step_client import StepClient
+from ros_utils.step_client import StepClient, StepRefused
 
 PATIENCE = 180.0  # [s]
 CART = "stand_cart_position_controller"
@@ -160,6 +160,10 @@ class Readiness(unittest.TestCase):
         mend = f"rosrun controller_manager controller_manager start {CART}"
         with self.assertRaisesRegex(SimulatorError, mend):
             env.step(0)
+        with self.assertRaisesRegex(StepRefused, mend):
+            StepClient().step(1, {CART: 0.0})
+        with self.assertRaisesRegex(StepRefused, "is loaded.*rosrun controller_manager spawner no"):
+            StepClient().step(1, {"no": 0.0})
         self.assertTrue(ros_controllers.start_controllers_srv([CART]))
         self.assertTrue(ros_gazebo.gazebo_delete_model("cartpole"))
         with self.assertRaisesRegex(SimulatorError, "there is no model 'cartpole'"):

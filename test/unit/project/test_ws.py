@@ -27,7 +27,15 @@ def variable(ws, name, **environment):
 def test_help(ws, option):
     result = ws(option)
     assert result.returncode == 0
-    for word in ("test --fast", "check", "shell", "clean", "ROS_MASTER_URI", "http://127.0.0.1:2"):
+    for word in (
+        "--with FOLDER",
+        "test --fast",
+        "check",
+        "shell",
+        "clean",
+        "ROS_MASTER_URI",
+        "http://127.0.0.1:2",
+    ):
         assert word in result.stdout
 
 

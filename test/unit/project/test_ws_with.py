@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import socket
 import subprocess
 import tempfile
 from pathlib import Path
@@ -105,6 +106,7 @@ def test_packages_and_modules_are_found(ws, root, workspace, how):
     else:
         done = ws(*command, **{how: str(workspace)})
     assert (done.returncode, done.stdout) == (0, "1\n"), done.stderr
+    assert all(line.startswith("ws: ") for line in done.stderr.splitlines()), done.stderr
 
 
 def test_the_commands_of_the_page(ws, root, workspace, tmp_path):
@@ -141,6 +143,20 @@ def test_names_of_ours_do_not_hide_theirs(ws, workspace):
         assert Path(found).resolve().is_relative_to(workspace)
 
 
+def test_ours_over_ros_needs_no_package_that_is_theirs(ws, tmp_path):
+    package(tmp_path, "cartpole_gazebo")
+    package(tmp_path, "cartpole_controller")
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        master = f"http://127.0.0.1:{free.getsockname()[1]}"
+    done = ws(
+        *("--with", ".", "rosrun", "cartpole", "pg_train.py", "--episodes=2", "--eval-episodes=1"),
+        *("--env-kwargs=max_steps=20", "--run-dir=run"), cwd=tmp_path, ROS_MASTER_URI=master,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    for name in ("cartpole_gazebo", "cartpole_controller"):
+        assert f"ws: {name} is yours" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -148,6 +164,7 @@ def test_names_of_ours_do_not_hide_theirs(ws, workspace):
         (["--with", ""], "--with needs a folder"),
         (["--with", "no such"], "there is no folder 'no such'"),
         (["--with", "file"], "there is no folder 'file'"),
+        (["--with", "/"], "the whole disk"),
         (["--with", "."], "needs a command"),
     ],
 )

@@ -139,13 +139,19 @@ class StepPlan:
         found = [each for each, full in loaded if name in (each.name, full)]
         if not found:
             known = [known for each, full in loaded for known in (each.name, full)]
-            raise ControlError(f"no controller named '{name}' is loaded{did_you_mean(name, known)}")
+            raise ControlError(
+                f"no controller named '{name}' is loaded{did_you_mean(name, known)}; load and start it with: "
+                f"rosrun controller_manager spawner {name}"
+            )
         if len(found) > 1:
             raise ControlError(
                 f"several robots have a controller '{name}'; write /namespace/{name}"
             )
         if found[0].state != RUNNING:
-            raise ControlError(f"controller '{name}' is {found[0].state}, not running")
+            raise ControlError(
+                f"controller '{name}' is {found[0].state}, not running; start it with: "
+                f"rosrun controller_manager controller_manager start {name}"
+            )
         return found[0]
 
     def _free_joint(self, name: str) -> JointHandle:
