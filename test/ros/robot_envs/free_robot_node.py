@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """A robot that isn't fixed to the world, over ROS: its pictures are those of the robot in this process."""
 
-import os
 import sys
 import tempfile
 import unittest
@@ -18,39 +17,26 @@ from pendulum import FILES, PENDULUM, Upright
 from robot_envs.backends.choice import make_backend
 from robot_envs.backends.session import RosSession
 from robot_envs.environment import RobotEnv
-from robot_envs.robot import OverRos
 
-PACKAGE = "free_robot"
-MANIFEST = f"""<package format="3"><name>{PACKAGE}</name><version>1.0.0</version><description>A robot.
-</description><maintainer email="a@example.com">a</maintainer><license>BSD</license></package>"""
 HULL = """<link name="hull">
   <inertial><mass value="0.3"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
   <visual><geometry><box size="0.3 0.2 0.1"/></geometry></visual></link>"""
 
 
 def make_robot(folder):
-    """The pendulum on a hull that hangs on nothing, as a ROS package and as files."""
+    """The pendulum on a hull that hangs on nothing."""
     text = (FILES / "pendulum.urdf").read_text()
     text = text.replace('<link name="world"/>', HULL)
     text = text.replace('<parent link="world"/>', '<parent link="hull"/>')
     text = text.replace('<origin xyz="0 0 1"/>', '<origin xyz="0 0 0.05"/>')
-    urdf, parameters = folder / "urdf/free.urdf", folder / "config/free.yaml"
-    for path in (urdf, parameters):
-        path.parent.mkdir(parents=True)
-    urdf.write_text(text)
-    parameters.write_text((FILES / "pendulum.yaml").read_text())
-    (folder / "package.xml").write_text(MANIFEST)
-    return replace(
-        PENDULUM, model="free", urdf_file=lambda: urdf, parameters_file=lambda: parameters,
-        ros=OverRos(PACKAGE, "free.urdf", "/urdf", PACKAGE, "free.yaml"),
-    )  # fmt: skip
+    path = folder / "free.urdf"
+    path.write_text(text)
+    return replace(PENDULUM, model="free", urdf_file=lambda: path)
 
 
 class FreeRobot(unittest.TestCase):
     def test_its_pictures_are_those_of_the_robot_in_process(self):
-        folder = Path(self.enterContext(tempfile.TemporaryDirectory()), PACKAGE)
-        robot = make_robot(folder)
-        os.environ["ROS_PACKAGE_PATH"] = f"{folder}:{os.environ['ROS_PACKAGE_PATH']}"
+        robot = make_robot(Path(self.enterContext(tempfile.TemporaryDirectory())))
         session = RosSession(robot, "/learner", [], realtime=False, gui=False, seed=0)
         self.addCleanup(session.close)
         session.start(lambda _: None)
