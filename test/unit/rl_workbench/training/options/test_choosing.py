@@ -84,7 +84,7 @@ def test_every_option_of_dqn_is_a_flag(empty: str) -> None:
         --start-e 0.9 --end-e 0.1 --exploration-fraction 0.3 --learning-starts 6
         --train-frequency 5 --gradient-steps 4 --no-double --dueling --hidden-sizes 8,9
         --exp-name mine --run-dir out --eval-frequency 0 --checkpoint-frequency 2"""
-    _, run, dqn, resume = choose(DQN, [empty, *text.split()])
+    _, run, dqn, resume, _ = choose(DQN, [empty, *text.split()])
     assert (run.env_id, run.seed, run.exp_name, run.run_dir) == ("Acrobot-v1", 3, "mine", "out")
     assert (run.eval_frequency, run.checkpoint_frequency, resume) == (0, 2, None)
     assert run.total_timesteps == 20_000
@@ -147,7 +147,7 @@ def test_a_file_without_sections_counts_everywhere(tmp_path: Path) -> None:
 
 def test_parameters_as_roslaunch_has_them(empty: str) -> None:
     parameters = {"params": "gamma=0.9 n-step=2", "dueling": True, "seed": "4"}
-    _, run, dqn, _ = choose(DQN, [empty], parameters)
+    _, run, dqn, *_ = choose(DQN, [empty], parameters)
     assert (dqn.gamma, dqn.n_step, dqn.dueling, run.seed) == (0.9, 2, True, 4)
     nothing = {"seed": "", "resume": "", "config": "", "env_id": "", "dueling": False, "tau": ""}
     assert choose(DQN, [empty], nothing) == choose(DQN, [empty])
@@ -155,7 +155,7 @@ def test_parameters_as_roslaunch_has_them(empty: str) -> None:
 
 def test_a_preset_may_name_the_environment_and_a_flag_another() -> None:
     assert choose(DQN, ["--preset=tutorial"]).run.env_id == "CartPole-v1"
-    _, run, dqn, _ = choose(DQN, ["--preset=tutorial", "--env-id=Acrobot-v1"])
+    _, run, dqn, *_ = choose(DQN, ["--preset=tutorial", "--env-id=Acrobot-v1"])
     assert run.env_id == "Acrobot-v1" and dqn.target_network_frequency == 10
     assert "unknown preset 'tutoral'; did you mean tutorial" in refusal(DQN, "--preset=tutoral")
 

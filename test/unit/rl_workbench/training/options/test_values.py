@@ -159,7 +159,7 @@ def test_the_robots_section_is_the_defaults() -> None:
 
 
 def test_the_tutorials_settings() -> None:
-    _, run, dqn, _ = choose(DQN, ["--preset", "tutorial"])
+    _, run, dqn, *_ = choose(DQN, ["--preset", "tutorial"])
     assert (run.env_id, run.episodes) == ("CartPole-v1", 500)
     assert dqn == DQNSettings(
         total_timesteps=250_000, learning_rate=1e-3, buffer_size=10_000, learning_starts=0,
