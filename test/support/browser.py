@@ -139,13 +139,25 @@ class Browser:
         found = f"e.innerText && e.innerText.trim() === {json.dumps(text)}"
         self._press(wait_for(lambda: self._middle(found), f"element {text!r}"))
 
-    def press_keys(self, selector, key, count):
-        """Presses a key on the first element of a CSS selector."""
-        found = f"document.querySelector({json.dumps(selector)})"
-        wait_for(lambda: self.run(f"!!{found} && ({found}.focus(), true)"), selector)
+    def push_slider(self, label, key, count):
+        """Presses a key some times on the slider beside a label."""
+        found = self._slider(label)
+        wait_for(lambda: self.run(f"!!{found} && ({found}.focus(), true)"), f"slider {label!r}")
         for _ in range(count):
             for kind in ("keyDown", "keyUp"):
                 self._do("Input.dispatchKeyEvent", type=kind, key=key, code=key)
+
+    def is_off(self, label):
+        """Whether the slider beside a label is switched off."""
+        return self.run(f"{self._slider(label)}?.ariaDisabled") == "true"
+
+    def _slider(self, label):
+        return f"""(() => {{
+          let e = [...document.querySelectorAll("label")]
+            .find(e => e.innerText.trim() === {json.dumps(label)});
+          while (e && !e.querySelector("[role=slider]")) e = e.parentElement;
+          return e && e.querySelector("[role=slider]");
+        }})()"""
 
     def _press(self, place):
         for kind in ("mousePressed", "mouseReleased"):

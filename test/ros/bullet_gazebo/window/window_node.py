@@ -10,8 +10,15 @@ import numpy as np
 import rospy
 import rostest
 from gazebo_msgs.msg import ModelState
-from gazebo_msgs.srv import GetModelState, SetModelState
+from gazebo_msgs.srv import GetLinkState, GetModelState, SetModelConfiguration, SetModelState
 from PIL import Image
+
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.pictures.camera import Camera
+from bullet_gazebo.pictures.scene import Scene
+from bullet_gazebo.pictures.solids import visible_shapes
+from bullet_gazebo.ros.clients.window.opened import CAMERA, LOOK_AT
+from bullet_gazebo.ros.wire.conversions import from_pose_msg
 
 sys.path.append(str(Path(__file__).resolve().parents[3] / "support"))
 
@@ -39,6 +46,8 @@ ODD = "<b>ö\t\"&'/x"
 # The lengths of all charts' data, as viser's page offers them to tests.
 CHARTS = """Object.values((window.__viserTestpoints || {}).uplots || {})
   .map(each => each.chart.data[0].length)"""
+VIEW = 75.0  # [degrees]; what the page's camera sees from top to bottom
+FEW = 3  # [pixels]
 AWAY = (3.0, -4.0, 0.6)  # [m]; behind the camera
 
 
@@ -149,16 +158,21 @@ class WindowTest(WindowCase):
         self.place("ball", AWAY)
         self.wait_until_gone(RED)
 
-    def test_a_screenshot_is_what_the_page_shows(self):
-        self.spawn("ball", BALL, z=0.6)
+    def screenshot(self):
+        """What the page's button saves."""
         self.page.click("World")
-        self.wait_until_seen(RED, 1000)
         with tempfile.TemporaryDirectory() as folder:
             self.page.download_to(folder)
             self.page.click("Screenshot")
             told = Path(folder, "gzclient.png")
             wait_for(told.is_file, "gzclient.png")
-            picture = np.asarray(Image.open(io.BytesIO(told.read_bytes())))
+            return np.asarray(Image.open(io.BytesIO(told.read_bytes())))
+
+    def test_a_screenshot_is_what_the_page_shows(self):
+        self.spawn("ball", BALL, z=0.6)
+        self.page.click("World")
+        self.wait_until_seen(RED, 1000)
+        picture = self.screenshot()
         height, width, parts = picture.shape
         self.assertEqual(parts, 3)
         self.assertEqual([width, height], self.page.run(CANVAS))
@@ -184,6 +198,29 @@ class WindowTest(WindowCase):
             rospy.delete_param("/gazebo_gui/curves")
         self.page.wait_for_text("the table is gone")
 
+    def test_the_page_shows_what_pictures_without_a_display_show(self):
+        xml = rospy.get_param("/robot_description")
+        self.spawn("cartpole", xml)
+        place = proxy("/gazebo/set_model_configuration", SetModelConfiguration)
+        self.assertTrue(place("cartpole", "", ["stand_cart", "cart_pole"], [0.2, 0.4]).success)
+        link = proxy("/gazebo/get_link_state", GetLinkState)
+        model = parse_urdf(xml)
+        poses = {
+            name: from_pose_msg(link(f"cartpole::{name}", "world").link_state.pose)
+            for name in ("stand", "cart", "pole")
+        }
+        scene = Scene()
+        self.addCleanup(scene.close)
+        scene.add("cartpole", visible_shapes(model))
+        scene.place("cartpole", poses)
+        width, height = self.page.run(CANVAS)
+        wanted = boxes(scene.picture(page_camera(), width, height))
+        self.assertGreater(wanted[3] - wanted[1], 60)  # the pole's height
+        # As soon as the page has heard of the joints' positions
+        wait_for(
+            lambda: np.abs(boxes(self.screenshot()) - wanted).max() <= FEW, f"picture with {wanted}"
+        )
+
     def test_what_somebody_else_does_is_shown(self):
         self.page.click("World")
         self.unpause()
@@ -192,6 +229,28 @@ class WindowTest(WindowCase):
         self.pause()
         self.page.wait_for_text("paused")
         self.page.wait_for_text("Go on")
+
+
+def page_camera():
+    """The page's camera as one that takes pictures."""
+    way = np.subtract(LOOK_AT, CAMERA)
+    distance = float(np.linalg.norm(way))
+    x, y, z = way / distance
+    yaw, pitch = np.degrees([np.arctan2(-x, y), np.arcsin(z)]).tolist()
+    return Camera(LOOK_AT, distance, yaw, pitch, VIEW)
+
+
+def boxes(picture):
+    """Left, top, right and bottom [pixels] of what is orange, the pole, and of what is blue, the cart."""
+    red, green, blue = np.moveaxis(picture.astype(int), 2, 0)
+    edges = []
+    for part in (
+        (red > green + 20) & (green > blue + 20),
+        (blue > green + 20) & (green > red + 20),
+    ):
+        rows, columns = np.nonzero(part)
+        edges += [columns.min(), rows.min(), columns.max(), rows.max()] if len(rows) else [0] * 4
+    return np.array(edges)
 
 
 CANVAS = """(() => { const canvas = document.querySelector("canvas");

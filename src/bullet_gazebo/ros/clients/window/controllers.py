@@ -27,7 +27,7 @@ MOST_SHOWN = 100  # controllers
 
 @dataclass(frozen=True)
 class Holder:
-    """A running controller that takes positions; `joints` are all that it claims."""
+    """A running controller; `joints` are all that it claims."""
 
     topic: str
     kind: str
@@ -70,18 +70,26 @@ class Controllers:
             lines.append(f"<li>and {rest} more</li></ul>" if rest > 0 else "</ul>")
         return "".join(lines)
 
-    def holder(self, joint: str) -> Holder | None:
-        """Returns the running controller that takes positions of `joint`, if there is one."""
-        return next((each for each in self._holders() if joint in each.joints), None)
+    def holder(self, joint: str) -> Holder | str:
+        """Returns the running controller that takes positions of `joint`, or why there is none."""
+        claims = [each for each in self._running() if joint in each.joints]
+        holders = [each for each in claims if each.kind in MESSAGES]
+        if len(holders) == 1:
+            return holders[0]
+        if holders:  # robots may have joints of the same name
+            topics = " and ".join(each.topic for each in holders)
+            return f"it may be the one of {topics}"
+        if claims:
+            return f"{claims[0].topic} takes {_taken(claims[0].kind)}"
+        return "no running controller takes positions of it"
 
-    def _holders(self) -> Iterator[Holder]:
+    def _running(self) -> Iterator[Holder]:
         for manager, controllers in self._found.items():
             space = manager.removesuffix(MANAGER)
             for each in controllers:
-                kind = each.type.rpartition("/")[2]
-                if each.state == "running" and kind in MESSAGES:
-                    topic = f"{space}{each.name}/command"
-                    yield Holder(topic, kind, tuple(_claimed(each)))
+                if each.state == "running":
+                    kind = each.type.rpartition("/")[2]
+                    yield Holder(f"{space}{each.name}/command", kind, tuple(_claimed(each)))
 
     def command(self, holder: Holder, joint: str, positions: dict[str, float]) -> None:
         """Sends `joint` to its position [rad, m] in `positions`, which has those of all others, too.
@@ -109,6 +117,12 @@ class Controllers:
                 positions=targets, time_from_start=rospy.Duration.from_sec(MOVE_TIME)
             )
             publisher.publish(JointTrajectory(joint_names=order, points=[point]))
+
+
+def _taken(kind: str) -> str:
+    """What a controller of another kind takes."""
+    found = [each for each in ("effort", "velocity") if each in kind.lower()]
+    return {"effort": "efforts", "velocity": "velocities"}[found[0]] if found else "no positions"
 
 
 def _claimed(controller: ControllerState) -> list[str]:

@@ -24,6 +24,7 @@ REACH = {"revolute": math.pi, "continuous": math.pi, "prismatic": 2.0}  # [rad, 
 NO_STOP = 1e15
 HANDS_OFF = 2.0  # [s] after somebody moved a slider
 PARTS = 500  # of a slider's way
+UNMOVED = "Sliders that move nothing until the world is paused:"
 
 
 class ModelPanel:
@@ -50,6 +51,7 @@ class ModelPanel:
         self._choice = server.gui.add_dropdown("Model", [NONE], initial_value=NONE)
         self._follow = server.gui.add_checkbox("Follow it", False)
         self._joints = server.gui.add_folder("Joints", visible=False)
+        self._unmoved = server.gui.add_html("", visible=False)  # joints whose sliders move nothing
         self._list = server.gui.add_html("")
         self._choice.on_update(lambda _: self._choose())
 
@@ -99,10 +101,8 @@ class ModelPanel:
             self._commands.place_joint(model, joint, position)
             return
         holder = self._controllers.holder(joint)
-        if holder is None:
-            raise ServiceFailed(
-                f"no running controller takes positions of {joint}; pause the world to place it"
-            )
+        if isinstance(holder, str):
+            raise ServiceFailed(f"{joint}: {holder}; pause the world to place it")
         names = [each.name for each in self._models[model].seen.joints]
         positions = dict(zip(names, self._positions.get(model, []), strict=False))
         self._controllers.command(holder, joint, positions | {joint: position})
@@ -131,12 +131,33 @@ class ModelPanel:
     def _show_joints(self, positions: list[float]) -> None:
         """Has the sliders follow their joints, but for those that somebody has just moved."""
         now = time.monotonic()
+        self._show_unmoved()
         for (name, slider), position in zip(list(self._sliders.items()), positions, strict=False):
             if not math.isfinite(position) or now - self._touched.get(name, -math.inf) < HANDS_OFF:
                 continue
             shown_at = min(max(position, slider.min), slider.max)
             if abs(shown_at - slider.value) > slider.step:
                 slider.value = shown_at  # type: ignore[misc]
+
+    def _show_unmoved(self) -> None:
+        """Leaves sliders alone that would move nothing, and says why."""
+        reasons = {}
+        for joint in self._sliders if not self._paused() else ():
+            holder = self._controllers.holder(joint)
+            if isinstance(holder, str):
+                reasons[joint] = holder
+        for joint, slider in self._sliders.items():
+            if slider.disabled != (joint in reasons):
+                slider.disabled = joint in reasons
+        lines = "".join(
+            f"<li>{html.escape(shown(joint))}: {html.escape(reason)}</li>"
+            for joint, reason in reasons.items()
+        )
+        inner = f"{UNMOVED}<ul style='margin: 0; padding-left: 1.2em'>{lines}</ul>"
+        text = f"<div style='padding: 0 0.8em'><small>{inner}</small></div>" if lines else ""
+        if self._unmoved.content != text:
+            self._unmoved.content = text
+            self._unmoved.visible = bool(text)
 
     def follow(self, links: dict[str, np.ndarray]) -> None:
         """Moves all cameras along with the chosen model."""

@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+"""Sliders of the window's page: they place joints of a paused world, and command running controllers."""
+
+import sys
+from pathlib import Path
+
+import rospy
+import rostest
+from controller_manager_msgs.srv import LoadController, SwitchController
+from gazebo_msgs.srv import GetJointProperties
+from std_msgs.msg import Float64
+from trajectory_msgs.msg import JointTrajectory
+
+sys.path.append(str(Path(__file__).resolve().parents[3] / "support"))
+
+from browser import wait_for
+from window_page import WindowCase, proxy
+
+HELD = ["position_hold", "effort_arm", "velocity_drive"]
+PRESSES = 20  # of a key, each of which moves a slider by a five hundredth of its way
+WAY = 0.3  # [m] that they come to at least: of 10 m
+
+
+class JointsTest(WindowCase):
+    keep = ("ground_plane", "slides")
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        xml = rospy.get_param("/slides/robot_description")
+        cls.spawn(cls("test_a_slider_places_a_joint_of_a_paused_world"), "slides", xml)
+        cls.joint = staticmethod(proxy("/gazebo/get_joint_properties", GetJointProperties))
+        cls.switch = staticmethod(
+            proxy("/slides/controller_manager/switch_controller", SwitchController)
+        )
+        load = proxy("/slides/controller_manager/load_controller", LoadController)
+        assert all(load(name).ok for name in HELD)
+        cls.page.click("Models")
+        cls.page.choose("(none)", "slides")
+        cls.page.wait_for_text("position_a")
+
+    def setUp(self):
+        super().setUp()
+        self.page.click("Models")
+
+    def run_controllers(self):
+        """Starts all, has time pass, and waits until the page knows what its sliders can't do."""
+        self.assertTrue(self.switch(HELD, [], 2, False, 0.0).ok)
+        self.addCleanup(self.switch, [], HELD, 2, False, 0.0)
+        self.unpause()
+        self.page.wait_for_text("velocity_a: /slides/velocity_drive/command takes velocities")
+        self.page.wait_for_text("velocity_b: no running controller takes positions of it")
+        self.assertNotIn("position_a: ", self.page.text)
+        self.assertNotIn("effort_a: ", self.page.text)
+
+    def push(self, joint):
+        """Moves the slider of a joint to the right."""
+        self.page.push_slider(joint, "ArrowRight", PRESSES)
+
+    def heard(self, topic, kind):
+        """What has been said on a topic of commands."""
+        said = []
+        subscriber = rospy.Subscriber(topic, kind, said.append)
+        self.addCleanup(subscriber.unregister)
+        return said
+
+    def wait_until_at(self, joint, position):
+        wait_for(lambda: self.joint(joint).position[0] > position, f"{joint} beyond {position}")
+
+    def test_a_slider_places_a_joint_of_a_paused_world(self):
+        wait_for(lambda: not self.page.is_off("velocity_b"), "slider of a paused world")
+        self.push("velocity_b")
+        self.wait_until_at("velocity_b", WAY)
+        self.assertEqual(self.world().sim_time, 0.0)
+
+    def test_a_slider_commands_a_running_position_controller(self):
+        said = self.heard("/slides/position_hold/command", Float64)
+        self.run_controllers()
+        self.push("position_a")
+        self.wait_until_at("position_a", WAY)
+        wait_for(lambda: any(each.data > WAY for each in said), "command")
+
+    def test_a_slider_commands_a_running_trajectory_controller(self):
+        said = self.heard("/slides/effort_arm/command", JointTrajectory)
+        self.run_controllers()
+        self.push("effort_a")
+        self.wait_until_at("effort_a", WAY)
+        wait_for(lambda: said, "command")
+        self.assertEqual(set(said[-1].joint_names), {"effort_a", "effort_b"})
+        self.assertLess(abs(self.joint("effort_b").position[0]), 0.05)
+
+    def test_a_slider_that_would_move_nothing_is_switched_off(self):
+        self.run_controllers()
+        for joint, off in (("velocity_a", True), ("velocity_b", True), ("position_a", False)):
+            wait_for(lambda j=joint, o=off: self.page.is_off(j) == o, f"{joint}: {off=}")
+        self.pause()
+        wait_for(lambda: not self.page.is_off("velocity_b"), "slider of a paused world")
+        self.assertNotIn("takes velocities", self.page.text)
+
+    def test_controllers_are_shown_with_their_state(self):
+        self.page.click("Controllers")
+        self.page.wait_for_text("/slides/controller_manager")
+        self.assertTrue(self.switch(["effort_arm"], [], 2, False, 0.0).ok)
+        self.page.wait_for_text("effort_arm: running")
+        self.assertTrue(self.switch([], ["effort_arm"], 2, False, 0.0).ok)
+        self.page.wait_for_text("effort_arm: stopped")
+
+
+if __name__ == "__main__":
+    rospy.init_node("joints_test")
+    rostest.rosrun("cartpole", "joints", JointsTest)
