@@ -33,6 +33,14 @@ def installing(package: str) -> str:
     return shlex.join(command)
 
 
+def finding_modules() -> str:
+    """How a module of the reader's own is found."""
+    workspace = os.environ.get("CARTPOLE_WS")
+    if workspace:
+        return f"{shlex.quote(workspace)} --with FOLDER ... finds those in FOLDER"
+    return "its folder has to be on PYTHONPATH"
+
+
 def watching(folder: Path) -> str:
     """The command that shows a run in TensorBoard."""
     workspace = os.environ.get("CARTPOLE_WS")

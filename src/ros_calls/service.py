@@ -107,7 +107,10 @@ class ServiceClient:
             except Refused as fault:
                 raise ServiceGone(f"{self.name}: {why_absent(self.name)}") from fault
         except NoAnswer as fault:
-            raise ServiceGone(f"{self.name}: the master at {master.uri()}: {fault}") from fault
+            raise ServiceGone(
+                f"{self.name}: no ROS master at {master.uri()} ({fault}): start roscore or launch a "
+                "simulator, or mend ROS_MASTER_URI"
+            ) from fault
 
     def close(self) -> None:
         """Gives the connection up; the next call makes a new one."""

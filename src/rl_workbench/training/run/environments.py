@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium import spaces
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.extras import installing
+from rl_workbench.extras import finding_modules, installing
 from rl_workbench.training.options.options import unknown
 
 FLAT = (spaces.Box, spaces.Discrete, spaces.MultiBinary, spaces.MultiDiscrete)
@@ -60,6 +60,12 @@ def make_environment(
         known = sorted(gymnasium.registry)
         raise WorkbenchError(_nearest(env_id, known)) from error
     except _REFUSED as error:
+        module, colon, _ = env_id.partition(":")
+        if colon and isinstance(error.__cause__ or error, ModuleNotFoundError):
+            missing = getattr(error.__cause__ or error, "name", None)
+            if missing and f"{module}.".startswith(f"{missing}."):  # not one that it imports itself
+                text = f"can't make {env_id}: there is no module '{missing}'; {finding_modules()}"
+                raise WorkbenchError(text) from error
         reason = " ".join(str(error).split()) or type(error).__name__
         raise WorkbenchError(f"can't make {env_id}: {reason}") from error
     except (Exception, SystemExit) as error:

@@ -61,7 +61,10 @@ def test_options_that_an_environment_refuses(env_id: str, options: dict, words: 
         ("CartPol-v1", "unknown environment 'CartPol-v1'; did you mean CartPole-v1?"),
         ("CartPole-v7", "did you mean CartPole-v1?"),
         ("zzz", "^unknown environment 'zzz'$"),
-        ("no_such_module:Env-v0", "can't make no_such_module:Env-v0"),
+        (
+            "my_module:Env-v0",
+            "can't make my_module:Env-v0: there is no module 'my_module'; .*--with FO",
+        ),
     ],
 )
 def test_an_environment_that_is_none(env_id: str, words: str) -> None:
