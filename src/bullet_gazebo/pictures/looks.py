@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from PIL import Image
 
 from bullet_gazebo.physics.description import Color, DescriptionError
 from bullet_gazebo.physics.elements import parse_xml
@@ -20,6 +19,7 @@ from bullet_gazebo.physics.meshes.reader import FAULTS, check_mesh, read_mesh
 
 if TYPE_CHECKING:  # imported with the first mesh: who looks at none doesn't pay for it
     import trimesh
+    from PIL import Image
 
 MOST_KEPT = 32  # files
 MOST_TEXTURE = 32_000_000  # [bytes] of a model with its textures, for the browser
@@ -41,7 +41,7 @@ class Part:
 
     triangles: np.ndarray
     rgba: Color | None
-    texture: Image.Image | None = None
+    texture: "Image.Image | None" = None
     uvs: np.ndarray | None = None
 
 
@@ -190,7 +190,9 @@ def _rgba(color: Any) -> Color:
     return (red, green, blue, rest[0] if rest else 1.0)
 
 
-def _image(material: Any) -> Image.Image | None:
+def _image(material: Any) -> "Image.Image | None":
+    from PIL import Image
+
     for key in ("baseColorTexture", "image"):
         found = getattr(material, key, None)
         if isinstance(found, Image.Image):

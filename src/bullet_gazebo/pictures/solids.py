@@ -1,14 +1,16 @@
 """Shapes as triangles, for whoever draws them."""
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from PIL import Image
 
 from bullet_gazebo.physics.description import Color, ModelDescription, Shape
 from bullet_gazebo.physics.pose import Pose, rotate
 from bullet_gazebo.pictures.looks import read_look
+
+if TYPE_CHECKING:  # a simulator only asks what is visible
+    from PIL import Image
 
 GREY: Color = (0.7, 0.7, 0.72, 1.0)  # of a shape that has no colour
 SIDES = 40  # of a cylinder
@@ -28,7 +30,7 @@ class Piece(NamedTuple):
 
     solid: Solid
     rgba: Color
-    texture: Image.Image | None = None
+    texture: "Image.Image | None" = None
     uvs: np.ndarray | None = None
 
 
