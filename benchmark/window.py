@@ -19,7 +19,7 @@ from pathlib import Path
 import msgspec
 import reporting
 import zstandard
-from bullet_gazebo_msgs.srv import StepWorld
+from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from cartpole_world import CART, add_cartpole
 from realtime import factor, processor_time, simulator_process
 from websockets.sync.client import connect
@@ -40,7 +40,8 @@ TICKS = 8  # in a request
 LINKS = 50
 HEADER = 16  # [bytes] in front of what viser sends: its lengths
 BOUND = 60.0  # [s]
-MANY = 200  # models
+MANY, THOUSANDS = 200, 300  # models
+PART = 12  # [bytes] of a position
 BOX = """<robot name="box"><link name="box"><inertial><mass value="1"/>
 <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
 <visual><geometry><box size="0.2 0.2 0.2"/></geometry></visual></link>
@@ -54,6 +55,9 @@ TARGETS = {
     "memory after all connects [MB]": "no growth",
     "memory after a tenth of them [MB]": "",
     "200 models: shown after [s]": "",
+    "3,000 links: shown after [s]": "",
+    "3,000 links: share of a core": "",
+    "3,000 links: pictures a second": "30",
 }
 
 
@@ -74,6 +78,22 @@ def told(page: Connection, timeout: float) -> bytes:
     assert isinstance(content, bytes)
     length = int.from_bytes(content[8:HEADER], "little")
     return zstandard.ZstdDecompressor().decompress(content[HEADER : HEADER + length])
+
+
+def wait_for_shapes(page: Connection, count: int) -> float:
+    """Waits until a page has been told of so many shapes; returns how long it took [s]."""
+    begin = time.perf_counter()
+    shapes: dict[str, int] = {}
+    while sum(shapes.values()) < count:
+        assert time.perf_counter() - begin < BOUND, shapes
+        content = told(page, 1.0)
+        found = msgspec.msgpack.decode(content) if content else {"messages": ()}
+        for message in found["messages"]:
+            values = message.get("props") or message.get("updates") or {}
+            if "batched_positions" in values:
+                place = values["batched_positions"]["__binary_index"]
+                shapes[message["name"]] = found["binaryBufferLengths"][place] // PART
+    return time.perf_counter() - begin
 
 
 def view(address: str) -> None:
@@ -126,7 +146,7 @@ def tick_rate(seconds: float) -> float:
     begin, ticks = time.perf_counter(), 0
     while time.perf_counter() - begin < seconds:
         target = 0.02 * (ticks // TICKS % 5)
-        assert step(TICKS, [CART], [target], [], [], 0, 0, [], [], [], False).success
+        assert step(StepWorldRequest(ticks=TICKS, controllers=[CART], commands=[target])).success
         ticks += TICKS
     step.close()
     return ticks / (time.perf_counter() - begin)
@@ -143,7 +163,7 @@ def compare(measure: Callable[[], float], address: str, pairs: int) -> tuple[flo
     return alongside / without, alongside / pairs
 
 
-def swinging() -> str:
+def swinging(links: int = LINKS) -> str:
     """A robot of pendulums on a fixed beam."""
     inertial = (
         '<inertial><origin xyz="0 0 -0.3"/><mass value="1"/>'
@@ -152,7 +172,7 @@ def swinging() -> str:
     parts = ['<link name="world"/>', f'<link name="beam">{inertial}</link>',
              '<joint name="fixed" type="fixed"><parent link="world"/><child link="beam"/>'
              '<origin xyz="0 0 2"/></joint>']  # fmt: skip
-    for index in range(LINKS):
+    for index in range(links):
         parts.append(
             f'<link name="l{index}">{inertial}<visual><origin xyz="0 0 -0.15"/><geometry>'
             f'<box size="0.02 0.02 0.3"/></geometry></visual></link>'
@@ -201,12 +221,28 @@ def many_models(results: dict[str, float]) -> None:
             assert ros_gazebo.gazebo_spawn_urdf_string(
                 BOX, model_name=f"box{index}", pos_x=float(index % 20), pos_y=float(index // 20)
             )[0]
-        begin = time.perf_counter()
         with open_page(address) as opened:
-            boxes = 0
-            while boxes < MANY and time.perf_counter() - begin < BOUND:
-                boxes += told(opened, 1.0).count(b"BoxMessage")
-        results["200 models: shown after [s]"] = time.perf_counter() - begin
+            results["200 models: shown after [s]"] = wait_for_shapes(opened, MANY)
+
+
+def thousands_of_links(results: dict[str, float], seconds: float) -> None:
+    """Robots of ten pendulums each, all of which swing; the simulator has a core of its own."""
+    robot, joints = swinging(10), [f"j{index}" for index in range(10)]
+    with Simulation() as simulation, simulation.active(), window(simulation) as (process, address):
+        for index in range(THOUSANDS):
+            name = f"robot{index}"
+            assert ros_gazebo.gazebo_spawn_urdf_string(
+                robot, model_name=name, pos_x=float(index % 20), pos_y=1.5 * (index // 20)
+            )[0]
+            ros_gazebo.gazebo_set_model_configuration(name, joints, [1.0] * 10)
+        with open_page(address) as opened:
+            results["3,000 links: shown after [s]"] = wait_for_shapes(opened, 10 * THOUSANDS)
+        with page(address) as moves:
+            used, begin = processor_time(process), time.perf_counter()
+            counts = [moves() for _ in range(max(1, round(3 * seconds)))]
+            share = (processor_time(process) - used) / (time.perf_counter() - begin)
+        results["3,000 links: share of a core"] = share
+        results["3,000 links: pictures a second"] = sum(counts) / len(counts)
 
 
 def measure(seconds: float, pairs: int, connects: int) -> dict[str, float]:
@@ -226,6 +262,7 @@ def measure(seconds: float, pairs: int, connects: int) -> dict[str, float]:
         results["real time, with / without"], results["real-time factor with a page"] = found
     moving_links(results, seconds, connects)
     many_models(results)
+    thousands_of_links(results, seconds)
     return results
 
 

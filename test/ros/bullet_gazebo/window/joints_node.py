@@ -57,11 +57,17 @@ class JointsTest(WindowCase):
         """Moves the slider of a joint to the right."""
         self.page.push_slider(joint, "ArrowRight", PRESSES)
 
-    def heard(self, topic, kind):
-        """What has been said on a topic of commands."""
+    def push_and_hear(self, joint, topic, kind):
+        """Pushes a slider until its joint has moved; returns what is then said on a topic of commands."""
         said = []
         subscriber = rospy.Subscriber(topic, kind, said.append)
         self.addCleanup(subscriber.unregister)
+        self.push(joint)
+        self.wait_until_at(joint, WAY)
+        # The page publishes from its first command on, and nobody else does.
+        wait_for(subscriber.get_num_connections, "publisher of commands")
+        self.push(joint)
+        wait_for(lambda: said, "command")
         return said
 
     def wait_until_at(self, joint, position):
@@ -74,18 +80,15 @@ class JointsTest(WindowCase):
         self.assertEqual(self.world().sim_time, 0.0)
 
     def test_a_slider_commands_a_running_position_controller(self):
-        said = self.heard("/slides/position_hold/command", Float64)
         self.run_controllers()
-        self.push("position_a")
-        self.wait_until_at("position_a", WAY)
-        wait_for(lambda: any(each.data > WAY for each in said), "command")
+        said = self.push_and_hear("position_a", "/slides/position_hold/command", Float64)
+        self.wait_until_at("position_a", 1.5 * WAY)
+        self.assertGreater(said[-1].data, WAY)
 
     def test_a_slider_commands_a_running_trajectory_controller(self):
-        said = self.heard("/slides/effort_arm/command", JointTrajectory)
         self.run_controllers()
-        self.push("effort_a")
-        self.wait_until_at("effort_a", WAY)
-        wait_for(lambda: said, "command")
+        said = self.push_and_hear("effort_a", "/slides/effort_arm/command", JointTrajectory)
+        self.wait_until_at("effort_a", 1.5 * WAY)
         self.assertEqual(set(said[-1].joint_names), {"effort_a", "effort_b"})
         self.assertLess(abs(self.joint("effort_b").position[0]), 0.05)
 
