@@ -15,7 +15,10 @@ from websockets.sync.client import connect
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 BOUND = 180.0  # [s] for anything of the browser's
 POLL = 0.05  # [s]
+# Software draws slowly on a busy machine: a GPU process that is taken for hung is started anew, without the
+# picture.
 OPTIONS = (
+    "--disable-gpu-watchdog", "--disable-hang-monitor",
     "--headless=new", "--no-sandbox", "--disable-gpu-sandbox", "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader", "--remote-debugging-port=0", "--no-first-run", "--disable-extensions",
     "--disable-dev-shm-usage", "--disable-background-networking",
