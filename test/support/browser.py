@@ -142,10 +142,17 @@ class Browser:
         found = f"e.innerText && e.innerText.trim() === {json.dumps(text)}"
         self._press(wait_for(lambda: self._middle(found), f"element {text!r}"))
 
+    def press_keys(self, selector, key, count):
+        """Presses a key some times on the first element of a CSS selector."""
+        self._press_keys(f"document.querySelector({json.dumps(selector)})", key, count)
+
     def push_slider(self, label, key, count):
         """Presses a key some times on the slider beside a label."""
-        found = self._slider(label)
-        wait_for(lambda: self.run(f"!!{found} && ({found}.focus(), true)"), f"slider {label!r}")
+        self._press_keys(self._slider(label), key, count)
+
+    def _press_keys(self, element, key, count):
+        """Presses a key on an element that JavaScript finds."""
+        wait_for(lambda: self.run(f"!!{element} && ({element}.focus(), true)"), element)
         for _ in range(count):
             for kind in ("keyDown", "keyUp"):
                 self._do("Input.dispatchKeyEvent", type=kind, key=key, code=key)
