@@ -52,3 +52,16 @@ def watching(folder: Path) -> str:
     else:
         command = [sys.executable, "-m", "tensorboard.main"]
     return shlex.join([*command, "--logdir", str(folder)])
+
+
+def replaying(folder: Path) -> str:
+    """The command that shows a run's episodes and curves on a page."""
+    workspace = os.environ.get("CARTPOLE_WS")
+    beside = Path(sys.executable).with_name("rl-workbench")
+    if workspace:
+        command = [workspace, "rosrun", "cartpole", "workbench.py"]
+    elif shutil.which(beside.name) == str(beside):
+        command = [beside.name]
+    else:
+        command = [sys.executable, "-m", "rl_workbench"]
+    return shlex.join([*command, "view", str(folder)])

@@ -9,12 +9,12 @@ from gymnasium.envs.registration import EnvSpec
 
 from bullet_gazebo.pictures.camera import Camera
 from robot_envs.backends.backend import RobotBackend
-from robot_envs.display import hindrance
 from robot_envs.picture import HEIGHT, WIDTH, RobotPicture
 from robot_envs.robot import State
 from robot_envs.sensing import Sensor
 from robot_envs.task import Task
 from robot_envs.variation import Randomisation
+from web_page.display import hindrance
 
 if TYPE_CHECKING:
     from viser import ViserServer

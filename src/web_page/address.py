@@ -7,6 +7,8 @@ import secrets
 import socket
 from dataclasses import dataclass, field
 
+from web_page.display import hindrance
+
 LOOPBACK = "127.0.0.1"
 FIRST_PORT = 8080
 LAST_PORT = 65535
@@ -56,7 +58,7 @@ class Address:
 
 def has_display() -> bool:
     """Returns whether a browser could be opened on this machine."""
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    return bool(os.environ.get("WAYLAND_DISPLAY")) or not hindrance()
 
 
 def is_loopback(host: str) -> bool:

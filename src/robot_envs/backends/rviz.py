@@ -3,10 +3,10 @@
 import shutil
 from collections.abc import Callable
 
-from robot_envs.display import hindrance
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot, State
 from ros_utils import ros_launch
+from web_page.display import hindrance
 
 
 def check_rviz(robot: Robot[State]) -> None:

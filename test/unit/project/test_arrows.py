@@ -31,7 +31,7 @@ ALLOWED = {
     "ros_calls": {"file_reading"},
     "file_reading": set(),
     "ros_utils": {"ros_calls", "file_reading"},
-    "robot_envs": {"bullet_gazebo", "file_reading", "ros_calls", "ros_utils"},
+    "robot_envs": {"bullet_gazebo", "file_reading", "ros_calls", "ros_utils", "web_page"},
     "lockstep_runner": {"ros_calls"},
     "rl_workbench": {"file_reading", "video_writing", "web_page"},
     "video_writing": set(),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rl_workbench.extras import installing, watching
+from rl_workbench.extras import installing, replaying, watching
 
 
 @pytest.fixture(params=["ws", "beside", "elsewhere"])
@@ -44,6 +44,17 @@ def test_how_to_watch_a_run(place: str, root: Path, tmp_path: Path) -> None:
         check=True,
     )
     assert done.stdout.split()[-1][0].isdigit(), done.stdout
+
+
+def test_how_to_replay_a_run(place: str, root: Path, tmp_path: Path) -> None:
+    command = replaying(tmp_path / "a run")
+    assert command.endswith(f" view '{tmp_path}/a run'")
+    if place == "ws":
+        assert command.startswith(f"{root}/ws rosrun cartpole workbench.py ")
+        return
+    words = [*shlex.split(command)[:-1], "--help"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert "--checkpoint" in done.stdout
 
 
 def test_how_to_install_an_extra(place: str, root: Path) -> None:

@@ -6,6 +6,7 @@ import pytest
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
+from web_page import address
 from web_page.address import Address, PortInUse, find_address
 from web_page.gate import Gate
 
@@ -60,7 +61,9 @@ def test_this_machine_needs_no_token_and_no_display(monkeypatch):
     told = "\n".join(Address("127.0.0.1", 8081).advice(*WINDOW))
     assert "http://127.0.0.1:8081/" in told
     assert "ssh -N -L 8081:127.0.0.1:8081" in told
-    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setenv("DISPLAY", ":9999")  # one that can't be opened is none
+    assert "ssh" in "\n".join(Address("127.0.0.1", 8081).advice(*WINDOW))
+    monkeypatch.setattr(address, "hindrance", lambda: "")
     assert "ssh" not in "\n".join(Address("127.0.0.1", 8081).advice(*WINDOW))
 
 

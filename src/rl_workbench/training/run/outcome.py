@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from rl_workbench.curves import learning_curve
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.extras import watching
+from rl_workbench.extras import replaying, watching
 from rl_workbench.figure import as_png
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.checkpoints import candidates
@@ -82,7 +82,8 @@ class TrainingOutcome(NamedTuple):
         tell(f"everything lies in {self.folder}")
         if self.is_interrupted:
             tell(f"interrupted{self._how_to_go_on()}")
-        tell(f"watch: {watching(self.folder)}")
+        tell(f"watch: {replaying(self.folder)}")
+        tell(f"curves: {watching(self.folder)}")
 
     def what_is_left(self, is_written: bool) -> str:
         """Of a training that failed.

@@ -42,6 +42,7 @@ class StepService:
         self._watchdog = watchdog
         self._one_at_a_time = one_at_a_time
         self._reader = StateReader(sim.world, NOTHING)
+        self._knows_contacts = False  # the last tick's, which a reset or a placing makes void
         self._service = rospy.Service("~step_world", StepWorld, self._step)
 
     def _step(self, request: StepWorldRequest) -> StepWorldResponse:
@@ -55,8 +56,10 @@ class StepService:
                 return self._refusal(str(error))
             with self._watchdog:
                 self._advance(request.ticks, plan.held)
+            if request.ticks:
+                self._knows_contacts = True
             try:
-                return self._answer(reader, request.ticks > 0)
+                return self._answer(reader, self._knows_contacts)
             except UnknownName as error:
                 return self._refusal(f"the ticks are done, but meanwhile {error}")
 
@@ -70,6 +73,8 @@ class StepService:
 
     def _begin(self, request: StepWorldRequest, plan: StepPlan) -> None:
         sim = self._sim
+        if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed:
+            self._knows_contacts = False
         if request.reset != StepWorldRequest.NONE:
             if request.seed:
                 seed_random_numbers(request.seed, tell=False)

@@ -134,7 +134,8 @@ def test_the_user_is_told_of_begin_and_end(tmp_path: Path, capsys, monkeypatch) 
     assert f"; best evaluation {mean:.1f} at step {step}" in told
     assert "; the last one over 20 greedy episodes: length " in told
     assert f"everything lies in {tmp_path}\n" in told and "--resume" not in told
-    assert f"watch: '/a place/ws' tensorboard --logdir {tmp_path}\n" in told
+    assert f"watch: '/a place/ws' rosrun cartpole workbench.py view {tmp_path}\n" in told
+    assert f"curves: '/a place/ws' tensorboard --logdir {tmp_path}\n" in told
 
 
 # The same seed and options: the same bits.
