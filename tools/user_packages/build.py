@@ -69,15 +69,17 @@ class Overlay:
                 failed[package.name] = f"it needs {', '.join(missing)}"
                 continue
             keys[package.name] = key = self._key(package, keys)
-            if self._record(package.name)[0] != key:
+            before = self._record(package.name)
+            if before != (key, ""):  # what has failed may work now, with a library installed
                 with self._locked():
-                    if self._record(package.name)[0] != key:  # nor has another ws made it meanwhile
+                    tried = self._record(package.name)
+                    if tried == before or tried[0] != key:  # nor has another ws tried it meanwhile
                         self._sweep_others()
-                        reason = self._build(package)
+                        tried = key, self._build(package)
                         self._stamps.mkdir(parents=True, exist_ok=True)
-                        (self._stamps / package.name).write_text(f"{key}\n{reason}")
-            if reason := self._record(package.name)[1]:
-                failed[package.name] = reason
+                        (self._stamps / package.name).write_text("\n".join(tried))
+                if tried[1]:
+                    failed[package.name] = tried[1]
         return failed
 
     def _record(self, name: str) -> tuple[str, str]:

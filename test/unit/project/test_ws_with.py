@@ -216,7 +216,20 @@ def test_what_cannot_be_used_is_said_and_the_rest_works(ws, tmp_path):
         (line,) = [each for each in again.stderr.splitlines() if words in each]
         assert line.startswith("ws: ") and line in first.stderr
     assert "gazebo_ros is for Gazebo itself" in first.stderr
-    assert "Gazebo itself" not in again.stderr and "building" not in again.stderr
+    assert "Gazebo itself" not in again.stderr
+    assert re.findall("building your package ([a-z]+)", again.stderr) == ["needy"], "once more"
+
+
+def test_what_failed_is_built_once_it_can_be(ws, tmp_path):
+    """As after an `apt-get install` of a library that it needs: its own files are as before."""
+    missing = tmp_path / "library"
+    package(tmp_path, "waiting", f"file(READ {missing} text)\ncatkin_package()\n")
+    package(tmp_path, "after", "add_custom_target(y)\n", "waiting")
+    assert "your package waiting isn't built" in ws("--with", str(tmp_path), "true").stderr
+    missing.write_text("here")
+    mended = ws("--with", str(tmp_path), "true").stderr
+    assert "waiting: done" in mended and "after: done" in mended and "isn't built" not in mended
+    assert ws("--with", str(tmp_path), "true").stderr == ""
 
 
 def test_an_empty_folder_is_said(ws, tmp_path):
