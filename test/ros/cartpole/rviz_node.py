@@ -20,6 +20,7 @@ from virtual_display import missing, virtual_display
 
 BOUND = 180.0  # [s] for anything
 ORANGE, BLUE = (lambda r, g, b: (r > b + 90) & (r > g + 40)), (lambda r, g, b: b > r + 60)
+MIDDLE = 550.0  # [pixels] column of the window's middle
 NEEDED = ("rviz", "Xvfb")
 CONFIGURE = """model_name: cartpole
 urdf_param_name: robot_description
@@ -89,10 +90,11 @@ class Rviz(unittest.TestCase):
 
     def test_the_robot_is_where_the_simulator_has_it(self):
         pole, cart = self.await_picture(
-            "a pole upon a cart",
-            lambda pole, cart: abs(pole[0] - cart[0]) < 30 and pole[1] < cart[1],
+            "a pole upon a cart, in the middle of a window that has its final layout",
+            lambda pole, cart: (
+                abs(cart[0] - MIDDLE) < 60 and abs(pole[0] - cart[0]) < 30 and pole[1] < cart[1]
+            ),
         )
-        self.assertAlmostEqual(cart[0], 550.0, delta=60.0)  # the middle of the window
         self.configure(0.3, 0.5)
         self.await_picture("the cart on the right", lambda _, moved: moved[0] > cart[0] + 80)
         leaning, moved = self.await_picture("a pole that leans", lambda a, b: a[0] < b[0] - 20)
