@@ -88,6 +88,12 @@ def find_address(host: str, port: int | None) -> Address:
     for each in ports:
         try:
             found = _bound(host, each)
+        except socket.gaierror as error:  # as at any port; asking for a name may take a while
+            problem = error.strerror or str(error)
+            break
+        except UnicodeError:  # two dots in a row, more than 63 letters between dots, ...
+            problem = "no host can have that name"
+            break
         except (OSError, OverflowError) as error:
             problem = getattr(error, "strerror", None) or str(error)
             continue

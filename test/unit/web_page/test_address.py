@@ -48,6 +48,13 @@ def test_a_host_of_somebody_else_is_one_line():
             find_address(host, 0)
 
 
+@pytest.mark.parametrize("host", ["a..b", ".", "a" * 64, "é" * 64, "", "\udcff", "[::1]"])
+def test_what_is_no_host_is_one_line(host):
+    with pytest.raises(PortInUse, match="can't be served on .*--host") as refused:
+        find_address(host, None)
+    assert "\n" not in str(refused.value)
+
+
 def test_a_free_port_is_found():
     found = find_address("127.0.0.1", None)
     assert found.port >= 8080
