@@ -74,11 +74,6 @@ class RemoteScene:
             self._poses = self._contacts = None
         return found
 
-    def wake(self) -> None:
-        """Ends a wait at its next message at the latest."""
-        with self._news:
-            self._news.notify_all()
-
     @property
     def is_heard(self) -> bool:
         """Whether the simulator is there."""
