@@ -14,7 +14,7 @@ from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.bring_up import STEP_SERVICE, Say, Undo
 from robot_envs.backends.own_simulator import OwnSimulator
 from robot_envs.backends.rviz import check_rviz, open_rviz
-from robot_envs.backends.window import open_window, show_curves, tell_window
+from robot_envs.backends.window import is_open, open_window, show_curves, tell_open, tell_opening
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot, State
 from ros_utils import ros_gazebo
@@ -94,10 +94,12 @@ class RosSession(Generic[State]):
             simulator = OwnSimulator()
             for undo in changes:
                 self._undo.callback(_at_living_simulator, simulator, undo)
-        if self._gui:
+        if self._gui and not own_simulator and is_open():
+            tell_open(say)
+        elif self._gui:
             if not own_simulator:
                 self._undo.callback(open_window(say))
-            tell_window(say)
+            tell_opening(say, begun=not own_simulator)
         if self._rviz:
             say("opening RViz")
             self._undo.callback(open_rviz(self._robot))

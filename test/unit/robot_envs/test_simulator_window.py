@@ -1,0 +1,66 @@
+"""What is said of the simulator's window: where it is, that it is open, or that it didn't open."""
+
+import threading
+
+import pytest
+import rospy
+from ros_fakes import FakeMaster
+
+from robot_envs.backends import window
+
+NODE = "/gazebo_gui"
+WHERE = "the window is the page http://127.0.0.1:8080/"
+
+
+@pytest.fixture
+def master(monkeypatch):
+    fake = FakeMaster()
+    monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
+    monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
+    for kept in ("_master_proxy", "_param_server"):  # of another test's master
+        monkeypatch.setattr(rospy.client, kept, None)
+    yield fake
+    fake.close()
+
+
+@pytest.fixture
+def said():
+    return []
+
+
+def test_one_that_tells_nobody_its_address_is_not_waited_for(master, said):
+    assert not window.is_open()
+    master.nodes[NODE] = master.uri
+    assert window.is_open()
+    window.tell_open(said.append)
+    (line,) = said
+    assert "open already" in line
+
+
+def test_one_that_is_open_tells_where(master, said):
+    master.params[window.WINDOW] = [WHERE]
+    window.tell_open(said.append)
+    assert said == [WHERE]
+
+
+def test_one_that_opens_is_waited_for(master, said):
+    master.nodes[NODE] = master.uri
+    telling = threading.Thread(target=window.tell_opening, args=(said.append, False))
+    telling.start()
+    master.params[window.WINDOW] = [WHERE]
+    telling.join()
+    assert said == [WHERE]
+
+
+def test_one_that_has_ended_is_waited_for_no_longer(master, said, monkeypatch):
+    monkeypatch.setattr(window, "TIMEOUT", float("inf"))
+    window.tell_opening(said.append, begun=True)
+    master.nodes[NODE] = master.uri
+    telling = threading.Thread(target=window.tell_opening, args=(said.append, False))
+    telling.start()
+    asked = len(master.questions)
+    while master.questions[asked:].count(NODE) == 0:
+        threading.Event().wait(0.01)
+    del master.nodes[NODE]
+    telling.join()
+    assert said == ["the window didn't open; the log of gazebo_gui says why"] * 2
