@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.pictures.page.geometry import Geometry
+from bullet_gazebo.pictures.page.geometry import Geometry, Whole
 
 MOST_PARTS = 128  # in a batch: all of them are sent when one of them has moved
 NUMBERS = 7  # of a pose: position x y z [m], quaternion x y z w
@@ -20,7 +20,7 @@ NUMBERS = 7  # of a pose: position x y z [m], quaternion x y z w
 class Look(NamedTuple):
     """What the parts of a batch have in common."""
 
-    geometry: Geometry
+    geometry: Geometry | Whole  # the latter neither mirrored nor clear: its looks are its own
     mirrored: bool = False
     clear: bool = False  # something shines through
     shadow: bool = True
@@ -126,6 +126,10 @@ class _Batch:
 
     def _make(self, positions: np.ndarray, wxyzs: np.ndarray) -> Any:
         look, geometry = self._look, self._look.geometry
+        if isinstance(geometry, Whole):
+            return self._scene.add_batched_glb(
+                self._name, geometry.glb, wxyzs, positions, batched_scales=self._scales, lod="off"
+            )
         faces = geometry.faces[:, ::-1] if look.mirrored else geometry.faces
         return self._scene.add_batched_meshes_simple(
             self._name, geometry.vertices, np.ascontiguousarray(faces), wxyzs, positions,
@@ -138,6 +142,8 @@ class _Batch:
     def _look_anew(self, handle: Any) -> None:
         """Other parts than before."""
         handle.batched_scales = self._scales
+        if isinstance(self._look.geometry, Whole):
+            return
         handle.batched_colors = self._colors
         if self._look.clear:
             handle.batched_opacities = self._opacities

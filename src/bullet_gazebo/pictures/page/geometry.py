@@ -21,6 +21,13 @@ class Geometry:
     side: Literal["front", "double"] = "front"
 
 
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """A file with its own colours and textures, as binary glTF."""
+
+    glb: bytes
+
+
 @cache
 def box() -> Geometry:
     """A cube with sides of 1 m."""

@@ -54,6 +54,7 @@ class ShapeMaker:
         self._complained: set[str] = set()
         self._names = 0
         self._of_file = lru_cache(MOST_FILES)(_of_file)
+        self._whole_of = lru_cache(MOST_FILES)(_whole_of)
 
     def add(self, where: Where, shape: Shape, told: str, collision: bool) -> None:
         """Adds a shape of a link; `told` is what it is, for the log."""
@@ -125,8 +126,12 @@ class ShapeMaker:
             return
         x, y, z = shape.size if len(shape.size) == 3 else (1.0, 1.0, 1.0)
         if mesh.glb is not None and not collision:
-            whole = self._scene.add_glb(self._singles.name(), mesh.glb, scale=(x, y, z))
-            self._singles.add(*where, _numbers(shape.pose), whole)
+            if x * y * z < 0.0:  # mirrored; parts of a batch show their backs then
+                whole = self._scene.add_glb(self._singles.name(), mesh.glb, scale=(x, y, z))
+                self._singles.add(*where, _numbers(shape.pose), whole)
+            else:
+                part = Part(shape.pose, (x, y, z), color_bytes(rgba))
+                self._batches.add(*where, Look(self._whole_of(mesh)), part)
             return
         self._add_part(where, self._of_file(mesh), shape.pose, (x, y, z), rgba, collision)
 
@@ -154,6 +159,11 @@ class ShapeMaker:
 
 def _of_file(mesh: MeshLook) -> geometry.Geometry:
     return geometry.mesh(mesh.vertices, mesh.faces)
+
+
+def _whole_of(mesh: MeshLook) -> geometry.Whole:
+    assert mesh.glb is not None
+    return geometry.Whole(mesh.glb)
 
 
 def _turned(way: Vector) -> tuple[float, float, float, float]:

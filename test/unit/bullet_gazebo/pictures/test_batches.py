@@ -111,3 +111,24 @@ def test_looks_go_together_and_a_mesh_that_is_not_there_is_a_box(server, picture
     assert heights(server) == {1.0: 0, 2.0: 1, 0.1: 2}
     (complaint,) = complaints
     assert "gone.stl" in complaint and "model 'm3', link 'l', visual" in complaint
+
+
+def test_a_file_with_looks_is_sent_once_for_all_models(server, picture, tmp_path):
+    (tmp_path / "looks.mtl").write_text("newmtl red\nKd 1 0 0\n")
+    path = tmp_path / "triangle.obj"
+    path.write_text("mtllib looks.mtl\nv 0 0 0\nv 1 0 0\nv 0 0 1\nusemtl red\nf 1 2 3\n")
+    models = [
+        SeenModel(i, f"m{i}", [SeenLink("l", [Shape("mesh", (1.0, 1.0, 2.0), mesh=str(path))])])
+        for i in range(5)
+    ]
+    picture.draw(models, [])
+    picture.move(in_a_row(5))
+    recording = Recording(server.get_scene_serializer().serialize())
+    (whole,) = recording.of("BatchedGlbMessage")
+    props = whole["props"]
+    assert bytes(props["glb_data"])[:4] == b"glTF"
+    assert props["batched_positions"].reshape(-1, 3)[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert props["batched_scales"].reshape(-1, 3)[0].tolist() == [1.0, 1.0, 2.0]
+    picture.move(in_a_row(5) + 0.5)
+    picture.draw(models[:2], [])
+    picture.move(in_a_row(2))
