@@ -27,6 +27,7 @@ HEIGHT = 150  # [pixels]
 # Mantissas of the axes' ends. The axis of steps is given, and seldom another one: viser's own way of
 # following data loses the range of a chart that is drawn while it can't be seen.
 ENDS = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0, 6.4, 8.0, 10.0)
+AXES = (uplot.Axis(space=85), uplot.Axis(size=55))  # [pixels] for 100,000,000 and for 100,000
 PALE, STRONG, SINGLE = "rgba(76, 114, 176, 0.45)", "#c0392b", "#2a6f97"
 
 
@@ -118,7 +119,7 @@ class Curves:
         place = names.index(tag) if tag in names else len(names)
         return self._gui.add_uplot(
             data, tuple(lines), title=title, height=HEIGHT, order=self._order(place),
-            legend=uplot.Legend(show=False), scales=self._scales(tag, data[0][-1]),
+            legend=uplot.Legend(show=False), axes=AXES, scales=self._scales(tag, data[0][-1]),
         )  # fmt: skip
 
     def _scales(self, tag: str, last: float) -> dict[str, uplot.Scale]:
