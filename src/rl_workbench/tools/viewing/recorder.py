@@ -16,8 +16,11 @@ from rl_workbench.tools.runs.runs import Run, open_run
 from rl_workbench.tools.viewing.views import View, make_view
 from rl_workbench.training.run import checkpoints
 from rl_workbench.training.run.environments import make_environment
+from rl_workbench.training.run.folder import is_held
 
 BEST, LAST, RANDOM = POLICIES = ("best", "last", "random")
+BACKEND = "backend"  # the option by which an environment may move a robot outside of its process
+IN_PROCESS = "bullet"
 MOST_STEPS = 20_000  # of an episode; some have no end
 MOST_BYTES = 2**28  # of its pictures
 
@@ -112,8 +115,8 @@ class Recorder:
                     self._play(episode)
                 except Stopped:
                     continue
-                except WorkbenchError as error:
-                    episode.note = str(error)
+                except (WorkbenchError, gymnasium.error.Error) as error:  # the latter of its view
+                    episode.note = str(error) or type(error).__name__
                     self._forget()
                 finally:
                     episode.is_over = True
@@ -131,7 +134,9 @@ class Recorder:
 
     def _play(self, episode: Episode) -> None:
         run = open_run(self._folder)
-        env, view = self._made(run)
+        options = {**run.env_kwargs, **self._env_options}
+        check_robot_is_free(run, options)
+        env, view = self._made(run.env_id, options)
         act = self._policy(run, episode, env)
         episode.rate = float(env.metadata.get("render_fps") or DEFAULT_RATE)
         try:
@@ -156,10 +161,10 @@ class Recorder:
         if not step.finished or episode.length >= MOST_STEPS:
             episode.note = f"cut off after {episode.length} steps"
 
-    def _made(self, run: Run) -> tuple[gymnasium.Env[Any, Any], View]:
+    def _made(self, env_id: str, options: dict[str, Any]) -> tuple[gymnasium.Env[Any, Any], View]:
         """The environment, and what shows it on the page: one for all episodes."""
         if self._env is None or self.view is None:
-            self._env = _environment(run.env_id, {**run.env_kwargs, **self._env_options})
+            self._env = _environment(env_id, options)
             self._server.scene.reset()  # of one that has failed
             self.view = make_view(self._server, self._env)
         return self._env, self.view
@@ -174,6 +179,30 @@ class Recorder:
         episode.policy = f"{episode.which}, of step {learned.steps}"
         episode.note = "; ".join(passed_over)
         return learned.act
+
+
+def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
+    """Makes sure that an episode doesn't move the robot of a training that runs.
+
+    An environment says so itself by `shares_robot`, but only once it is made, and has joined the
+    training's world. So this goes by the name of its backend.
+
+    Args:
+        options: of the environment that is to be played.
+
+    Raises:
+        WorkbenchError: if it would.
+    """
+    given = run.config["run"]
+    training = {**given["env_kwargs"], **given.get("train_env_kwargs", {})}
+    own = (None, IN_PROCESS)
+    if options.get(BACKEND) in own or training.get(BACKEND) in own or not is_held(run.folder):
+        return
+    raise WorkbenchError(
+        f"no episodes while it trains: {BACKEND}={options[BACKEND]} is the training's own robot. "
+        f"`view --env-kwargs {BACKEND}={IN_PROCESS}` plays another one, and so does --gui of a training "
+        f"with --train-env-kwargs {BACKEND}={training[BACKEND]} in place of --env-kwargs"
+    )
 
 
 def _environment(env_id: str, options: dict[str, Any]) -> gymnasium.Env[Any, Any]:

@@ -117,6 +117,21 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             raise self._error("reward", reward)
         return observation, reward, terminated, truncated, info
 
+    def render(self) -> Any:
+        """As the environment's.
+
+        Raises:
+            gymnasium.error.Error: as the environment's.
+            WorkbenchError: if the environment fails otherwise.
+        """
+        try:
+            return self.env.render()
+        except gymnasium.error.Error:  # who draws says what for
+            raise
+        except (Exception, SystemExit) as error:
+            text = f"{self._id} failed in render(): {_told(error)}"
+            raise EnvironmentFailure(text) from error
+
     def close(self) -> None:
         """As the environment's.
 

@@ -4,7 +4,9 @@ import os
 import shutil
 import socket
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -20,6 +22,8 @@ from rl_workbench.tools.runs.runs import open_run
 from rl_workbench.tools.viewing import recorder as recording
 from rl_workbench.tools.viewing.player import LINGER, Player
 from rl_workbench.tools.viewing.recorder import Episode, Recorder
+from rl_workbench.training.run.folder import held
+from robot_envs.errors import SimulatorError
 
 BOUND = 180.0  # [s]
 TICK = 0.1  # [s]
@@ -66,8 +70,8 @@ def make_recorder(server, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     made = []
 
-    def make(folder: Path) -> Recorder:
-        made.append(Recorder(folder, server, {}))
+    def make(folder: Path, env_options: dict[str, Any] | None = None) -> Recorder:
+        made.append(Recorder(folder, server, env_options or {}))
         return made[-1]
 
     yield make
@@ -75,10 +79,18 @@ def make_recorder(server, monkeypatch):
         each.close(BOUND)
 
 
+def begun(episode: Episode) -> Episode:
+    return waited(episode, lambda: bool(episode.frames))
+
+
 def whole(episode: Episode) -> Episode:
+    return waited(episode, lambda: episode.is_over)
+
+
+def waited(episode: Episode, is_there: Callable[[], bool]) -> Episode:
     deadline = time.monotonic() + BOUND
-    while not episode.is_over:
-        assert time.monotonic() < deadline
+    while not is_there():
+        assert time.monotonic() < deadline, episode.note
         time.sleep(0.01)
     return episode
 
@@ -133,14 +145,11 @@ def test_another_wish_ends_the_episode_before(run, make_recorder, monkeypatch) -
     monkeypatch.setattr(recording, "MOST_STEPS", 10**9)
     monkeypatch.setattr(recording, "MOST_BYTES", 2**60)
     recorder = make_recorder(endless(run.parent))
-    first = recorder.play("random", 0)
-    while not first.frames:
-        time.sleep(0.01)
+    first = begun(recorder.play("random", 0))
     second = recorder.play("random", 1)
     whole(first)
     assert not first.note
-    while not second.frames:
-        time.sleep(0.01)
+    begun(second)
 
 
 def endless(place: Path) -> Path:
@@ -195,6 +204,83 @@ def test_an_environment_that_draws_nothing_is_said(tmp_path, make_recorder) -> N
     assert "the environment draws no pictures" in whole(recorder.play("random", 0)).note
     recorder = make_recorder(record(tmp_path / "none", [1.0], env_id="NoSuch-v0"))
     assert "unknown environment 'NoSuch-v0'" in whole(recorder.play("random", 0)).note
+
+
+class Shared(Endless):
+    """One that moves a robot elsewhere, which its options name."""
+
+    made: ClassVar[list[str]] = []
+
+    def __init__(self, render_mode=None, backend="bullet") -> None:
+        super().__init__(render_mode)
+        self.made.append(backend)
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted", "played"),
+    [
+        ({"env_kwargs": {"backend": "ros"}}, {}, None),
+        ({"env_kwargs": {"backend": "ros"}}, {"backend": "bullet"}, "bullet"),
+        ({"train_env_kwargs": {"backend": "ros"}}, {}, "bullet"),
+        ({"train_env_kwargs": {"backend": "ros"}}, {"backend": "ros-realtime"}, None),
+        ({"env_kwargs": {"backend": "bullet"}}, {"backend": "ros"}, "ros"),
+    ],
+)
+def test_the_robot_of_a_training_isnt_moved(
+    tmp_path, make_recorder, monkeypatch, given, wanted, played
+) -> None:
+    monkeypatch.setattr(recording, "MOST_STEPS", 5)
+    monkeypatch.setattr(Shared, "made", [])
+    gymnasium.register("Shared-v0", Shared)
+    folder = record(tmp_path / "shared", [1.0], env_id="Shared-v0", **given)
+    recorder = make_recorder(folder, wanted)
+    with held(folder):
+        episode = whole(recorder.play("random", 0))
+        assert Shared.made == ([played] if played else [])
+        assert bool(episode.frames) == bool(played)
+        assert ("is the training's own robot" in episode.note) == (not played)
+    assert whole(recorder.play("random", 0)).frames  # it is over
+
+
+class Broken(Endless):
+    """One that fails when it is drawn in a picture."""
+
+    trouble: ClassVar[Exception | None] = None
+
+    def render(self):
+        if self.trouble is not None:
+            raise self.trouble
+        return super().render()
+
+
+class Lost(Broken):
+    """One that fails when it is drawn on the page itself, as where its simulator doesn't answer any more."""
+
+    def draw_on(self, server, beside=0):
+        return self
+
+    def look(self):
+        return self.render()
+
+
+@pytest.mark.parametrize(
+    ("kind", "trouble"),
+    [
+        (Broken, SimulatorError("it is gone")),
+        (Broken, KeyError("it is gone")),
+        (Lost, SimulatorError("it is gone")),
+    ],
+)
+def test_one_that_fails_while_it_is_drawn_is_said_and_made_anew(
+    tmp_path, make_recorder, monkeypatch, kind, trouble
+) -> None:
+    monkeypatch.setattr(recording, "MOST_STEPS", 5)
+    gymnasium.register("Broken-v0", kind)
+    monkeypatch.setattr(kind, "trouble", trouble)
+    recorder = make_recorder(record(tmp_path / "broken", [1.0], env_id="Broken-v0"))
+    assert "it is gone" in whole(recorder.play("random", 0)).note
+    monkeypatch.setattr(kind, "trouble", None)
+    assert whole(recorder.play("random", 0)).length == 5
 
 
 # The player.
