@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO
 
-START = 120.0  # [s] for its address to be told
 END = 15.0  # [s] for it to end
 POLICIES = ("last", "best", "random")
 
@@ -21,7 +20,7 @@ def page_beside(
     Args:
         folder: of the training, which begins in the block.
         program: how rl_workbench's command line is started.
-        say: is told where the page is, or that there is none.
+        say: is told where the page is, or that there is none, by a thread that the training doesn't wait for.
     """
     command = [*program, "view", str(folder), "--beside-training", "--checkpoint", *POLICIES]
     try:
@@ -34,10 +33,14 @@ def page_beside(
         yield
         return
     assert process.stdin is not None and process.stdout is not None
+    telling = _Telling(process.stdout, say)
+    telling.start()
     try:
-        _tell(process.stdout, say)
         yield
     finally:
+        if not telling.has_told.is_set():  # it is still starting, and nobody needs it any more
+            telling.is_needless.set()
+            process.kill()
         with contextlib.suppress(OSError):
             process.stdin.close()
         try:
@@ -45,17 +48,29 @@ def page_beside(
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        process.stdout.close()
+        telling.join(END)
+        if not telling.is_alive():
+            process.stdout.close()
 
 
-def _tell(output: IO[bytes], say: Callable[[str], None]) -> None:
-    """Tells what it says of where it is; it closes its output after that."""
-    lines: list[str] = []
-    reading = threading.Thread(
-        target=lambda: lines.extend(line.decode(errors="replace").rstrip() for line in output),
-        daemon=True,
-    )
-    reading.start()
-    reading.join(START)
-    for line in list(lines) or ["the page didn't open; the training goes on without it"]:
-        say(line)
+class _Telling(threading.Thread):
+    """Tells what the page says of where it is; it closes its output after that.
+
+    Args:
+        output: of the page.
+        say: is told each line, and that there was none.
+    """
+
+    def __init__(self, output: IO[bytes], say: Callable[[str], None]) -> None:
+        super().__init__(name="page", daemon=True)
+        self._output, self._say = output, say
+        self.has_told = threading.Event()
+        self.is_needless = threading.Event()  # the training was over first
+
+    def run(self) -> None:
+        """Reads until there is nothing more to be told."""
+        for line in self._output:
+            self._say(line.decode(errors="replace").rstrip())
+            self.has_told.set()
+        if not self.has_told.is_set() and not self.is_needless.is_set():
+            self._say("the page didn't open; the training goes on without it")

@@ -4,6 +4,9 @@ import json
 import os
 import signal
 import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -14,6 +17,7 @@ from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.options.training_options import choose
 from rl_workbench.training.page import page_beside
 
+BOUND = 180.0  # [s]
 SHORT = ["--algo=dqn", "--total-timesteps=300", "--learning-starts=50", "--eval-episodes=1"]
 TELLS = "import os, sys; print('it is here', flush=True); os.close(1); "
 
@@ -27,19 +31,41 @@ def children() -> set[int]:
     return {int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()}
 
 
-def test_its_address_is_told_before_and_it_ends_after(tmp_path) -> None:
-    told: list[str] = []
+class Told(list[str]):
+    """What was told; the first line can be waited for."""
+
+    def __init__(self) -> None:
+        self.first = threading.Event()
+
+    def __call__(self, line: str) -> None:
+        self.append(line)
+        self.first.set()
+
+
+def test_its_address_is_told_while_it_trains_and_it_ends_after(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(page, "END", BOUND)
+    told = Told()
     text = TELLS + "sys.stdin.read(); open(sys.argv[2] + '/ended', 'w').close()"
-    with page_beside(tmp_path, program(text), told.append):
+    with page_beside(tmp_path, program(text), told):
+        assert told.first.wait(BOUND)
         assert told == ["it is here"]
         assert not (tmp_path / "ended").exists()
     assert (tmp_path / "ended").exists()
 
 
+def test_the_training_doesnt_wait_for_one_that_is_slow_to_start(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(page, "END", BOUND)
+    before, told = children(), Told()
+    with page_beside(tmp_path, program("import time\nwhile True: time.sleep(1)"), told):
+        assert children() > before
+    assert children() <= before
+    assert not told
+
+
 def test_it_is_told_the_run_and_to_end_with_the_training(tmp_path) -> None:
-    told: list[str] = []
-    with page_beside(tmp_path, program("import sys; print(sys.argv[1:])"), told.append):
-        pass
+    told = Told()
+    with page_beside(tmp_path, program("import sys; print(sys.argv[1:])"), told):
+        assert told.first.wait(BOUND)
     assert told == [
         str(["view", str(tmp_path), "--beside-training", "--checkpoint", "last", "best", "random"])
     ]
@@ -53,22 +79,24 @@ def test_it_is_told_the_run_and_to_end_with_the_training(tmp_path) -> None:
     ],
 )
 def test_without_a_page_the_training_goes_on(tmp_path, command, words) -> None:
-    told: list[str] = []
-    with page_beside(tmp_path, command, told.append):
-        reached = True
-    assert reached
+    told = Told()
+    with page_beside(tmp_path, command, told):
+        assert told.first.wait(BOUND)
     assert told[0].startswith(words)
 
 
 def test_one_that_is_killed_or_hangs_isnt_waited_for(tmp_path, monkeypatch) -> None:
     before = children()
-    with page_beside(tmp_path, program(TELLS + "sys.stdin.read()"), print):
+    told = Told()
+    with page_beside(tmp_path, program(TELLS + "sys.stdin.read()"), told):
+        assert told.first.wait(BOUND)
         (pid,) = children() - before
         os.kill(pid, signal.SIGKILL)
     assert children() <= before
     monkeypatch.setattr(page, "END", 0.2)
-    with page_beside(tmp_path, program(TELLS + "import time\nwhile True: time.sleep(1)"), print):
-        pass
+    told = Told()
+    with page_beside(tmp_path, program(TELLS + "import time\nwhile True: time.sleep(1)"), told):
+        assert told.first.wait(BOUND)
     assert children() <= before
 
 
@@ -83,8 +111,27 @@ def test_it_is_no_setting(name: str) -> None:
     assert not choose(kind, [*flags, "--no-gui"], {"gui": "true"}).showing.gui
 
 
+@contextmanager
+def page_that_is_up(
+    folder: Path, program: tuple[str, ...], say: Callable[[str], None]
+) -> Iterator[None]:
+    """The training begins once the page is there: it would be over first."""
+    is_up = threading.Event()
+
+    def tell(line: str) -> None:
+        say(line)
+        is_up.set()
+
+    with page_beside(folder, program, tell):
+        assert is_up.wait(BOUND)
+        yield
+
+
 @pytest.mark.slow
-def test_the_bits_are_the_same_and_a_resumed_training_may_have_it(tmp_path, capsys) -> None:
+def test_the_bits_are_the_same_and_a_resumed_training_may_have_it(
+    tmp_path, capsys, monkeypatch
+) -> None:
+    monkeypatch.setattr(cli, "page_beside", page_that_is_up)
     plain, shown = tmp_path / "plain", tmp_path / "shown"
     assert cli.main([*SHORT, f"--run-dir={plain}"]) == 0
     assert "is the page" not in capsys.readouterr().out
