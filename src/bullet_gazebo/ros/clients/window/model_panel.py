@@ -28,7 +28,10 @@ UNMOVED = "Sliders that move nothing until the world is paused:"
 
 
 class ModelPanel:
-    """Shows models, follows the chosen one with the cameras, and has a slider for each of its joints."""
+    """Shows models, follows the chosen one with the cameras, and has a slider for each of its joints.
+
+    Called from one thread, which alone makes and removes sliders; clicks come in threads of viser's.
+    """
 
     def __init__(
         self,
@@ -46,6 +49,9 @@ class ModelPanel:
         self._models: dict[str, DrawnModel] = {}
         self._positions: dict[str, list[float]] = {}  # of joints, by model
         self._before: np.ndarray | None = None  # where the followed model was
+        self._chosen = (
+            NONE  # the model whose sliders there are; a click chooses another at any time
+        )
         self._touched: dict[str, float] = {}  # [s] when somebody moved a joint's slider
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._choice = server.gui.add_dropdown("Model", [NONE], initial_value=NONE)
@@ -53,7 +59,6 @@ class ModelPanel:
         self._joints = server.gui.add_folder("Joints", visible=False)
         self._unmoved = server.gui.add_html("", visible=False)  # joints whose sliders move nothing
         self._list = server.gui.add_html("")
-        self._choice.on_update(lambda _: self._choose())
 
     def set_models(self, models: Sequence[DrawnModel]) -> None:
         """Shows other models than before."""
@@ -67,9 +72,10 @@ class ModelPanel:
         self._choose()
 
     def _choose(self) -> None:
-        """Makes sliders for the chosen model, where they aren't there already."""
+        """Makes sliders for the chosen model."""
         self._before = None
-        model = self._models.get(self._choice.value)
+        self._chosen = self._choice.value
+        model = self._models.get(self._chosen)
         joints = list(model.seen.joints)[:MOST_SLIDERS] if model is not None else []
         self._joints.visible = bool(joints)
         for slider in self._sliders.values():
@@ -77,9 +83,9 @@ class ModelPanel:
         self._sliders = {}
         with self._joints:
             for joint in joints:
-                self._sliders[joint.name] = self._slider(joint)
+                self._sliders[joint.name] = self._slider(self._chosen, joint)
 
-    def _slider(self, joint: SeenJoint) -> viser.GuiSliderHandle[float]:
+    def _slider(self, model: str, joint: SeenJoint) -> viser.GuiSliderHandle[float]:
         low, high = _range(joint)
         slider = self._server.gui.add_slider(
             shown(joint.name), low, high, (high - low) / PARTS, min(max(0.0, low), high),
@@ -90,32 +96,36 @@ class ModelPanel:
             if event.client is not None:  # somebody moved it
                 position = float(slider.value)
                 self._touched[joint.name] = time.monotonic()
-                self._attempt(lambda: self._move(joint.name, position))
+                self._attempt(lambda: self._move(model, joint.name, position))
 
         slider.on_update(moved)
         return slider
 
-    def _move(self, joint: str, position: float) -> None:
-        model = self._choice.value
+    def _move(self, model: str, joint: str, position: float) -> None:
         if self._paused():
             self._commands.place_joint(model, joint, position)
             return
         holder = self._controllers.holder(joint)
         if isinstance(holder, str):
             raise ServiceFailed(f"{joint}: {holder}; pause the world to place it")
-        names = [each.name for each in self._models[model].seen.joints]
+        drawn = self._models.get(model)
+        if drawn is None:
+            raise ServiceFailed(f"{model} is gone")
+        names = [each.name for each in drawn.seen.joints]
         positions = dict(zip(names, self._positions.get(model, []), strict=False))
         self._controllers.command(holder, joint, positions | {joint: position})
 
     def show(self, links: dict[str, np.ndarray], positions: dict[str, list[float]]) -> None:
         """Shows poses (n, 7) of links and positions [rad, m] of joints, both by model."""
+        if self._choice.value != self._chosen:
+            self._choose()
         self._positions = positions
-        self._show_joints(positions.get(self._choice.value, []))
+        self._show_joints(positions.get(self._chosen, []))
         rows = []
         for name, model in list(self._models.items())[:MOST_SHOWN]:
             if name in links:
                 x, y, z = model.pose(links[name]).position
-                follows = self._before is not None and name == self._choice.value
+                follows = self._before is not None and name == self._chosen
                 rows.append(
                     f"<tr><td>{html.escape(shown(name))}{' (followed)' if follows else ''}</td>"
                     + "".join(f"<td align='right'>{each:.3f}</td>" for each in (x, y, z))
@@ -161,7 +171,7 @@ class ModelPanel:
 
     def follow(self, links: dict[str, np.ndarray]) -> None:
         """Moves all cameras along with the chosen model."""
-        model = self._models.get(self._choice.value)
+        model = self._models.get(self._chosen)
         if not self._follow.value or model is None or model.seen.name not in links:
             self._before = None
             return
