@@ -119,6 +119,7 @@ class SceneTopics:
             version=copy.version,
             now=to_time(now),
             paused=copy.paused,
+            lockstep=self._sim.lockstep,
             poses=_singles((*pose.position, *pose.orientation) for pose in copy.poses),
             positions=_singles([state[0] for state in states] for states in copy.joints),
         )

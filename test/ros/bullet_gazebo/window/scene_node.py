@@ -128,6 +128,7 @@ class SceneTest(unittest.TestCase):
         self.assertEqual(message.poses[-7:], (1.0, 2.0, 3.5, 0.0, 0.0, 0.0, 1.0))
         names = [(m.name, link.name) for m in self.scene([], False).models for link in m.links]
         self.assertEqual(len(message.poses), 7 * len(names))
+        self.assertTrue(message.lockstep)
         pole = names.index(("cartpole", next(name for _, name in names if "pole" in name)))
         get = proxy("/gazebo/get_link_state", GetLinkState)
         found = get("::".join(names[pole]), "world").link_state.pose.position

@@ -11,6 +11,7 @@ from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.page.picture import Picture
 from bullet_gazebo.pictures.page.seen import SeenJoint, SeenLink, SeenModel
 from bullet_gazebo.ros.clients.window.model_panel import NONE, ModelPanel
+from bullet_gazebo.ros.clients.window.time_panel import ONLY_STEPS, TimePanel
 
 ROUNDS = 300
 SWITCH = 1e-5  # [s] after which another thread has its turn
@@ -85,3 +86,31 @@ def test_models_are_chosen_while_another_thread_shows_them(server, interleaved):
         choice.value = name
         panel.show(picture.links, {})
         assert sorted(handles(server, viser.GuiSliderHandle)) == sorted(names.get(name, []))
+
+
+def test_a_world_in_lockstep_says_so_and_has_nothing_to_pause(server):
+    panel = TimePanel(server.gui, None, None)
+    status = panel._status
+    pause = handles(server, viser.GuiButtonHandle)["Pause"]
+    speed = handles(server, viser.GuiDropdownHandle)["Speed"]
+
+    def is_off():
+        assert pause.disabled == speed.disabled == (pause.hint == ONLY_STEPS)
+        return pause.disabled
+
+    panel.show(590.465, 0.0, True, False)
+    assert "590.465 s</b> &nbsp; paused" in status.content
+    assert (pause.label, is_off(), panel.stands) == ("Go on", False, True)
+    panel.show(590.465, 0.0, True, True)
+    assert "590.465 s</b> &nbsp; lock-step, waits for a client's steps" in status.content
+    assert (pause.label, is_off(), panel.stands) == ("Pause", True, True)
+    panel.show(600.0, 12.34, True, True)
+    assert "600.000 s</b> &nbsp; lock-step, 12 × real time" in status.content
+    panel.show(600.0, 0.5, False, True)
+    assert "lock-step, 0.50 × real time" in status.content
+    assert (is_off(), panel.stands) == (True, False)
+    panel.show(600.0, 0.0, False, True)
+    assert panel.stands
+    panel.show(601.0, 1.0, False, False)
+    assert "601.000 s</b> &nbsp; real-time factor 1.00" in status.content
+    assert (pause.label, is_off(), panel.stands) == ("Pause", False, False)

@@ -24,7 +24,7 @@ REACH = {"revolute": math.pi, "continuous": math.pi, "prismatic": 2.0}  # [rad, 
 NO_STOP = 1e15
 HANDS_OFF = 2.0  # [s] after somebody moved a slider
 PARTS = 500  # of a slider's way
-UNMOVED = "Sliders that move nothing until the world is paused:"
+UNMOVED = "Sliders that move nothing until time stands still:"
 
 
 class ModelPanel:
@@ -39,13 +39,13 @@ class ModelPanel:
         commands: Commands,
         controllers: Controllers,
         attempt: Attempt,
-        paused: Callable[[], bool],
+        stands: Callable[[], bool],
     ) -> None:
         self._server = server
         self._commands = commands
         self._controllers = controllers
         self._attempt = attempt
-        self._paused = paused
+        self._stands = stands
         self._models: dict[str, DrawnModel] = {}
         self._positions: dict[str, list[float]] = {}  # of joints, by model
         self._before: np.ndarray | None = None  # where the followed model was
@@ -89,7 +89,7 @@ class ModelPanel:
         low, high = _range(joint)
         slider = self._server.gui.add_slider(
             shown(joint.name), low, high, (high - low) / PARTS, min(max(0.0, low), high),
-            hint="commands the running controller; while paused it places the joint",
+            hint="commands the running controller; while time stands still it places the joint",
         )  # fmt: skip
 
         def moved(event: viser.GuiEvent[Any]) -> None:
@@ -102,12 +102,12 @@ class ModelPanel:
         return slider
 
     def _move(self, model: str, joint: str, position: float) -> None:
-        if self._paused():
+        if self._stands():
             self._commands.place_joint(model, joint, position)
             return
         holder = self._controllers.holder(joint)
         if isinstance(holder, str):
-            raise ServiceFailed(f"{joint}: {holder}; pause the world to place it")
+            raise ServiceFailed(f"{joint}: {holder}; it can be placed while time stands still")
         drawn = self._models.get(model)
         if drawn is None:
             raise ServiceFailed(f"{model} is gone")
@@ -152,7 +152,7 @@ class ModelPanel:
     def _show_unmoved(self) -> None:
         """Leaves sliders alone that would move nothing, and says why."""
         reasons = {}
-        for joint in self._sliders if not self._paused() else ():
+        for joint in self._sliders if not self._stands() else ():
             holder = self._controllers.holder(joint)
             if isinstance(holder, str):
                 reasons[joint] = holder

@@ -18,6 +18,8 @@ SPEEDS = {
 }
 OTHER = "other"
 MOST_STEPS = 100_000
+STILL = 0.005  # of real time; less is no pace that anybody sees
+ONLY_STEPS = "a world in lock-step moves by steps only: those that a client asks for, or these here"
 
 Attempt = Callable[[Callable[[], None]], None]
 """Does what a click asks for, and shows whoever clicked what went wrong."""
@@ -29,11 +31,13 @@ class TimePanel:
     def __init__(self, gui: viser.GuiApi, commands: Commands, attempt: Attempt) -> None:
         self._commands = commands
         self._attempt = attempt
-        self.paused = False
+        self.stands = False  # until somebody lets time go on, or asks for steps
+        self._paused = False
+        self._lockstep = False
         self._shown = ""
         self._status = gui.add_html("")
         self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
-        self._pause.on_click(lambda _: attempt(lambda: commands.set_paused(not self.paused)))
+        self._pause.on_click(lambda _: attempt(lambda: commands.set_paused(not self._paused)))
         one = gui.add_button("One step", icon=viser.Icon.PLAYER_SKIP_FORWARD)
         one.on_click(lambda _: attempt(lambda: commands.step(1)))
         steps = gui.add_number("Steps", 100, min=1, max=MOST_STEPS, step=1)
@@ -50,13 +54,21 @@ class TimePanel:
         if event.client is not None and self._speed.value != OTHER:  # somebody chose it
             self._attempt(lambda: self._commands.set_speed(SPEEDS[self._speed.value]))
 
-    def show(self, now: float, factor: float, paused: bool) -> None:
-        """Shows the time [s], the real-time factor, and whether the world is paused."""
-        if paused != self.paused:
-            self.paused = paused
-            self._pause.label = "Go on" if paused else "Pause"
-            self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
-        state = "paused" if paused else f"real-time factor {factor:.2f}"
+    def show(self, now: float, factor: float, paused: bool, lockstep: bool) -> None:
+        """Shows the time [s], the real-time factor, and what moves time."""
+        self.stands = paused or (lockstep and factor < STILL)
+        if (paused, lockstep) != (self._paused, self._lockstep):
+            self._paused, self._lockstep = paused, lockstep
+            goes_on = paused and not lockstep
+            self._pause.label = "Go on" if goes_on else "Pause"
+            self._pause.icon = viser.Icon.PLAYER_PLAY if goes_on else viser.Icon.PLAYER_PAUSE
+            for each in (self._pause, self._speed):  # neither does anything in lock-step
+                each.disabled = lockstep
+                each.hint = ONLY_STEPS if lockstep else None
+        if lockstep:
+            state = f"lock-step, {_pace(factor)}"
+        else:
+            state = "paused" if paused else f"real-time factor {factor:.2f}"
         self._write(f"<b>{now:.3f} s</b> &nbsp; {state}")
 
     def show_missing(self, node: str) -> None:
@@ -76,3 +88,10 @@ class TimePanel:
         if text != self._shown:
             self._shown = text
             self._status.content = f'<div style="padding: 0.4em 0.8em">{text}</div>'
+
+
+def _pace(factor: float) -> str:
+    """How fast a client's steps come."""
+    if factor < STILL:
+        return "waits for a client's steps"
+    return f"{factor:.{2 if factor < 10 else 0}f} × real time"

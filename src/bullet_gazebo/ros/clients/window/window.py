@@ -55,7 +55,7 @@ class Window:
             gui.add_button("Screenshot", icon=viser.Icon.CAMERA).on_click(self._screenshot)
         with tabs.add_tab("Models"):
             self._models = ModelPanel(
-                server, commands, self._controllers, self.attempt, lambda: self._time.paused
+                server, commands, self._controllers, self.attempt, lambda: self._time.stands
             )
         with tabs.add_tab("Controllers"):
             self._tree = gui.add_html("")
@@ -126,8 +126,9 @@ class Window:
         if not self._scene.is_heard:
             self._time.show_missing(self._scene.node)
         elif self._newest is not None:
-            now = self._newest.now.to_sec()
-            self._time.show(now, self._scene.real_time_factor, self._newest.paused)
+            newest = self._newest
+            now, factor = newest.now.to_sec(), self._scene.real_time_factor
+            self._time.show(now, factor, newest.paused, newest.lockstep)
             self._models.show(self._picture.links, self._picture.joints(self._newest.positions))
 
     def _show_rest(self) -> None:
