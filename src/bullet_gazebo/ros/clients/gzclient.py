@@ -9,11 +9,15 @@ import importlib
 import sys
 from collections.abc import Sequence
 
+import rosgraph
 import rospy
 
+from bullet_gazebo.ros.wire.names import full_name, one_at_a_time
 from bullet_gazebo.ros.wire.rospy_patches.node import stop_hearing_clock
-from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
+from bullet_gazebo.ros.wire.signals import SignalHandler, init_node, wait_for_master
+from ros_calls.nodes import living_address
 from ros_calls.requirements import WINDOW, lack
+from ros_calls.xmlrpc import NoAnswer
 from web_page.address import PortInUse, find_address
 from web_page.flags import add_flags
 
@@ -26,7 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parse_args(rospy.myargv(command_line)[1:])
 
     def work() -> int:
-        init_node(NAME, command_line, anonymous=False)
+        become_node(command_line)
         stop_hearing_clock()  # the scene has the time, thirty times a second instead of thousands
         if options.ignored:
             rospy.logwarn("Arguments without effect here: %s", " ".join(options.ignored))
@@ -44,6 +48,25 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
 
     return SignalHandler().run(work, interrupted=0)
+
+
+def become_node(command_line: Sequence[str]) -> None:
+    """Takes the name `gazebo_gui`; one with a number behind it where another window has that already.
+
+    A name that the command line gives is taken in any case, as every node does.
+    """
+    wait_for_master(NAME)
+    name = full_name(command_line, NAME)
+    with one_at_a_time(name):
+        is_given = "__name" in rosgraph.names.load_mappings(list(command_line))
+        init_node(NAME, command_line, anonymous=not is_given and _lives(name))
+
+
+def _lives(name: str) -> bool:
+    try:
+        return living_address(name) is not None
+    except NoAnswer:  # the master has gone meanwhile; rospy waits for it
+        return False
 
 
 def parse_args(arguments: Sequence[str]) -> argparse.Namespace:

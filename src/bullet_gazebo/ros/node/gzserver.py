@@ -24,8 +24,6 @@ from bullet_gazebo.ros.node.master_watch import MasterWatch
 from bullet_gazebo.ros.node.one_world import (
     NameLoss,
     NameTaken,
-    full_name,
-    one_at_a_time,
     refuse_twin,
 )
 from bullet_gazebo.ros.node.server_args import parse_args
@@ -39,6 +37,7 @@ from bullet_gazebo.ros.services.spawn_services import SpawnServices
 from bullet_gazebo.ros.services.stepping.advance_service import AdvanceService
 from bullet_gazebo.ros.services.stepping.step_service import StepService
 from bullet_gazebo.ros.services.world_services import advertise_world_services
+from bullet_gazebo.ros.wire.names import full_name, one_at_a_time
 from bullet_gazebo.ros.wire.rospy_patches.connections import (
     Reception,
     bound_calls,

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The window outlives simulators that are killed, and pages that go or take nothing."""
+"""The window outlives simulators that are killed, pages that go or take nothing, and other windows."""
 
 import contextlib
 import subprocess
@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import msgspec
+import rosnode
 import rospy
 import rostest
 import zstandard
@@ -91,6 +92,12 @@ class OutlivesTest(unittest.TestCase):
             spawn("first")
             page.wait_for("BatchedMeshesMessage")
             page.wait_for("<td>first</td>")
+            another = Output("rosrun", "gazebo_ros", "gzclient", "--no-browser")
+            self.addCleanup(another.close)
+            another_page = Page(another.line("is the page").rpartition(" ")[2])
+            self.addCleanup(another_page.close)
+            another_page.wait_for("<td>first</td>")  # and the first one goes on below
+            self.assertEqual(sum("gazebo_gui" in name for name in rosnode.get_node_names()), 2)
         page.wait_for("no simulator /gazebo")
         stuck = [Page(url) for _ in range(10)]  # they take nothing of what is sent
         with simulator():

@@ -6,7 +6,8 @@ import pytest
 from ros_fakes import FakeMaster
 
 from bullet_gazebo.ros.node import one_world
-from bullet_gazebo.ros.node.one_world import NameTaken, full_name, one_at_a_time, refuse_twin
+from bullet_gazebo.ros.node.one_world import NameTaken, refuse_twin
+from bullet_gazebo.ros.wire.names import full_name, one_at_a_time
 
 BOUND = 60.0  # [s]
 

@@ -9,7 +9,8 @@ import viser
 
 from web_page.curves import Curves
 
-CURVES = "~curves"  # parameter: a run folder, or the table of one; whoever trains sets it
+CURVES = "~curves"  # parameter: a run folder, or the table of one
+TRAINED = "/gazebo_gui/curves"  # the same; whoever trains sets it, for windows of any name
 PERIOD = 1.0  # [s] between two looks
 
 
@@ -38,7 +39,7 @@ class Training:
 
     def _look(self) -> bool:
         try:
-            named = str(rospy.get_param(CURVES, ""))
+            named = str(rospy.get_param(CURVES, "") or rospy.get_param(TRAINED, ""))
         except (OSError, rospy.ROSException) as fault:
             rospy.logdebug("the master doesn't answer: %s", fault)
             return False
