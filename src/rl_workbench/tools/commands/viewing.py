@@ -9,6 +9,7 @@ from pathlib import Path
 import torch
 
 from rl_workbench.tools.commands.shared import add_environment_flags, env_options
+from rl_workbench.tools.pictures.filming import draw_without_display
 from rl_workbench.tools.runs.runs import open_run
 from rl_workbench.tools.viewing.page import Place, Wanted, show_run
 from rl_workbench.tools.viewing.recorder import POLICIES
@@ -57,7 +58,7 @@ def show(wanted: Wanted, place: Place, interrupt: Interrupt, beside: bool = Fals
     Raises:
         WorkbenchError: if the page can't be served.
     """
-    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # or pygame would look for a screen
+    draw_without_display()
     torch.set_num_threads(1)  # networks this small only lose by more
     interrupt.defer()
     if not beside:

@@ -14,10 +14,12 @@ from rl_workbench.tools.commands.shared import add_policy_flags, env_options, nu
 from rl_workbench.tools.commands.viewing import show as show_page
 from rl_workbench.tools.pictures import videos
 from rl_workbench.tools.pictures.filming import (
+    DISPLAYS,
     Player,
     Recorded,
     SideBySide,
     Size,
+    draw_without_display,
     film_episode,
     size_options,
 )
@@ -33,7 +35,7 @@ from rl_workbench.training.run.progress import tell
 from web_page.address import LOOPBACK
 
 RANDOM = "random"  # a policy that every environment has
-DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")  # any of them names one
+WINDOWS = (*DISPLAYS, "SDL_VIDEODRIVER")  # where any of them is given, a window may be opened
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
@@ -116,7 +118,7 @@ def _eval(arguments: argparse.Namespace, run: Run) -> None:
 
 
 def _enjoy(arguments: argparse.Namespace, run: Run) -> None:
-    if not any(os.environ.get(name) for name in DISPLAYS):
+    if not any(os.environ.get(name) for name in WINDOWS):
         raise WorkbenchError(
             "enjoy needs a display to open a window on, and DISPLAY isn't set; "
             f"--gui shows it on a page in the browser, record {arguments.run} --out episode.gif writes it"
@@ -149,7 +151,7 @@ def _record(arguments: argparse.Namespace, run: Run) -> None:
     if out.suffix.lower() == ".gif" and fastest > videos.FASTEST:
         raise WorkbenchError(f"--fps: a GIF has {videos.FASTEST:g} frames a second at most")
     check_writable(out)
-    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # or pygame would look for a screen
+    draw_without_display()
     with contextlib.ExitStack() as stack:
         players = []
         for which in arguments.checkpoint:

@@ -1,6 +1,7 @@
 """Episodes as they are seen: what a video is made of; needs no display."""
 
 import inspect
+import os
 from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
 from typing import Any, NamedTuple
@@ -17,6 +18,7 @@ Act = Callable[[np.ndarray], Any]
 Size = tuple[int, int]
 """Width and height [pixels]."""
 
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # either of them names one
 DEFAULT_RATE = 30.0  # [Hz] of an environment that doesn't tell its own
 TEXT, PAPER = (40, 44, 52), (255, 255, 255)
 LINES = 14.0  # of text that would fit into a picture's height
@@ -53,6 +55,13 @@ class Recorded(NamedTuple):
     ends: list[Shot]
     frames: int
     seconds: float
+
+
+def draw_without_display() -> None:
+    """Has pygame look for no screen, and MuJoCo for none where there is none; before they are imported."""
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+    if not any(os.environ.get(name) for name in DISPLAYS):
+        os.environ.setdefault("MUJOCO_GL", "egl")
 
 
 def size_options(env_id: str, size: Size | None) -> dict[str, int]:
@@ -149,7 +158,10 @@ def take_picture(env: gymnasium.Env[Any, Any], size: Size | None = None) -> Imag
     """
     try:
         drawn: Any = env.render()
-    except gymnasium.error.Error as error:  # something isn't installed, or the robot isn't there
+    except (
+        gymnasium.error.Error,
+        WorkbenchError,
+    ) as error:  # something isn't installed, or the robot isn't there
         raise WorkbenchError(f"the environment can't be drawn: {error}") from error
     if not isinstance(drawn, np.ndarray):
         raise WorkbenchError("the environment draws no pictures")

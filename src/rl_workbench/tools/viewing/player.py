@@ -125,13 +125,13 @@ class Player:
             self._begin()
 
     def _show(self, episode: Episode, index: int, frame: Frame) -> None:
+        if self._slider.max != max(1, episode.length):
+            self._slider.max = max(1, episode.length)
         if self._drawn is not None and self._drawn[0] is episode and self._drawn[1] == index:
             return
         self._drawn = (episode, index)
         assert self._recorder.view is not None
         self._recorder.view.show(frame.seen)
-        if self._slider.max != max(1, episode.length):
-            self._slider.max = max(1, episode.length)
         self._slider.value = index  # type: ignore[misc]
 
     def _tell(self, episode: Episode) -> None:

@@ -141,6 +141,8 @@ class Recorder:
         episode.rate = float(env.metadata.get("render_fps") or DEFAULT_RATE)
         try:
             self._play_steps(episode, env, act, view)
+        except WorkbenchError:
+            raise
         except (ValueError, AssertionError, RuntimeError) as error:
             raise WorkbenchError(f"the policy doesn't fit the environment: {error}") from error
 

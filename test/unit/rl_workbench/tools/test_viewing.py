@@ -283,6 +283,17 @@ def test_one_that_fails_while_it_is_drawn_is_said_and_made_anew(
     assert whole(recorder.play("random", 0)).length == 5
 
 
+def test_record_says_it_in_one_line(tmp_path, monkeypatch, capsys) -> None:
+    """As with MuJoCo's environments where there is no OpenGL."""
+    gymnasium.register("Broken-v0", Broken)
+    monkeypatch.setattr(Broken, "trouble", RuntimeError("no\nOpenGL here"))
+    folder = record(tmp_path / "broken", [1.0], env_id="Broken-v0")
+    flags = ["--checkpoint", "random", "--out", str(tmp_path / "a.gif")]
+    assert cli.main(["record", str(folder), *flags], "workbench.py") == 1
+    (told,) = capsys.readouterr().err.strip().splitlines()
+    assert "can't be drawn: Broken-v0 failed in render(): RuntimeError: no OpenGL here" in told
+
+
 # The player.
 
 
