@@ -119,6 +119,10 @@ class Browser:
             }})()"""
         )
 
+    def reload(self):
+        """Opens the page anew: it is seen as at first."""
+        self._do("Page.reload")
+
     def wait_for_value(self, value):
         """Waits until a field or a list shows `value`."""
         wait_for(lambda: self._middle(f"e.value === {json.dumps(value)}"), f"value {value!r}")

@@ -45,7 +45,7 @@ class Picture:
     def __init__(
         self, server: viser.ViserServer, warn: Callable[[str], None], below: str = ""
     ) -> None:
-        self._server = server
+        self._server, self._below = server, below
         self._batches = Batches(server.scene, below)
         self._singles = Singles(below)
         self._shapes = ShapeMaker(server.scene, self._batches, self._singles, warn)
@@ -180,7 +180,7 @@ class Picture:
                 self._contacts.visible = bool(len(points))
         elif len(points):
             self._contacts = self._server.scene.add_point_cloud(
-                "/contacts",
+                f"{self._below}/contacts",
                 points,
                 RED,
                 point_size=CONTACT,

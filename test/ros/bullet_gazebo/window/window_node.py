@@ -142,20 +142,22 @@ class WindowTest(WindowCase):
         self.wait_until_gone(RED)
 
     def test_a_model_is_followed(self):
+        self.addCleanup(self.page.wait_for_text, "One step")
+        self.addCleanup(self.page.reload)
         self.spawn("ball", BALL, z=0.6)
         self.page.choose("(none)", "ball")
         self.addCleanup(self.page.choose, "ball", "(none)")
+        self.wait_until_seen(RED, 1000)
         self.page.click("Follow it")
         self.page.wait_for_text("ball (followed)")
-        self.addCleanup(self.place, "ball", (0.0, 0.0, 0.6))
-        self.place("ball", AWAY)
-        self.page.wait_for_text("-4.000")
-        self.wait_until_seen(RED, 1000)
-        self.place("ball", (0.0, 0.0, 0.6))
-        self.page.wait_for_text("0.600")
+        for x, y, z in (AWAY, (-20.0, 30.0, 0.6)):
+            self.place("ball", (x, y, z))
+            self.page.wait_for_text(f"ball (followed)\t{x:.3f}\t{y:.3f}\t{z:.3f}")
+            self.wait_until_seen(RED, 1000)
         self.page.click("Follow it")
         wait_for(lambda: "(followed)" not in self.page.text, "end of following")
-        self.place("ball", AWAY)
+        self.wait_until_seen(RED, 1000)  # the camera stays with it
+        self.place("ball", (0.0, 0.0, 0.6))
         self.wait_until_gone(RED)
 
     def screenshot(self):

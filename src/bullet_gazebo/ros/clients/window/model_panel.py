@@ -28,30 +28,33 @@ UNMOVED = "Sliders that move nothing until time stands still:"
 
 
 class ModelPanel:
-    """Shows models, follows the chosen one with the cameras, and has a slider for each of its joints.
+    """Shows models, follows the chosen one, and has a slider for each of its joints.
 
-    Called from one thread, which alone makes and removes sliders; clicks come in threads of viser's.
+    `world` is the node that the world is below. Called from one thread, which alone makes and removes
+    sliders; clicks come in threads of viser's.
     """
 
     def __init__(
         self,
         server: viser.ViserServer,
+        world: viser.FrameHandle,
         commands: Commands,
         controllers: Controllers,
         attempt: Attempt,
         stands: Callable[[], bool],
     ) -> None:
-        self._server = server
+        self._server, self._world = server, world
         self._commands = commands
         self._controllers = controllers
         self._attempt = attempt
         self._stands = stands
         self._models: dict[str, DrawnModel] = {}
         self._positions: dict[str, list[float]] = {}  # of joints, by model
-        self._before: np.ndarray | None = None  # where the followed model was
         self._chosen = (
             NONE  # the model whose sliders there are; a click chooses another at any time
         )
+        self._start: np.ndarray | None = None  # where the followed model was at first
+        self._followed = ""
         self._touched: dict[str, float] = {}  # [s] when somebody moved a joint's slider
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._choice = server.gui.add_dropdown("Model", [NONE], initial_value=NONE)
@@ -73,7 +76,6 @@ class ModelPanel:
 
     def _choose(self) -> None:
         """Makes sliders for the chosen model."""
-        self._before = None
         self._chosen = self._choice.value
         model = self._models.get(self._chosen)
         joints = list(model.seen.joints)[:MOST_SLIDERS] if model is not None else []
@@ -125,7 +127,7 @@ class ModelPanel:
         for name, model in list(self._models.items())[:MOST_SHOWN]:
             if name in links:
                 x, y, z = model.pose(links[name]).position
-                follows = self._before is not None and name == self._chosen
+                follows = name == self._followed
                 rows.append(
                     f"<tr><td>{html.escape(shown(name))}{' (followed)' if follows else ''}</td>"
                     + "".join(f"<td align='right'>{each:.3f}</td>" for each in (x, y, z))
@@ -170,20 +172,32 @@ class ModelPanel:
             self._unmoved.visible = bool(text)
 
     def follow(self, links: dict[str, np.ndarray]) -> None:
-        """Moves all cameras along with the chosen model."""
+        """Keeps the chosen model where it is on the page, if that is wanted, and has the world go by.
+
+        Moving all cameras instead would work against browsers that tell meanwhile where theirs were.
+        """
         model = self._models.get(self._chosen)
         if not self._follow.value or model is None or model.seen.name not in links:
-            self._before = None
+            self._let_go()
             return
+        if self._followed != model.seen.name:
+            self._let_go()
         place = np.array(model.pose(links[model.seen.name]).position)
-        if self._before is not None and np.isfinite(place).all():
-            way = place - self._before
-            if np.abs(way).max() > 1e-6:
-                for client in self._server.get_clients().values():
-                    client.camera.position = (
-                        client.camera.position + way
-                    )  # takes along what it looks at
-        self._before = place
+        if self._start is None:
+            self._start, self._followed = place, model.seen.name
+        if np.isfinite(place).all():
+            self._world.position = self._start - place
+
+    def _let_go(self) -> None:
+        """The world is where it belongs again, and cameras see what they saw."""
+        way = -np.array(self._world.position)
+        self._start, self._followed = None, ""
+        if np.abs(way).max() > 0.0:
+            self._world.position = (0.0, 0.0, 0.0)
+            for client in self._server.get_clients().values():
+                client.camera.position = (
+                    client.camera.position + way
+                )  # takes along what it looks at
 
 
 def _range(joint: SeenJoint) -> tuple[float, float]:

@@ -29,6 +29,7 @@ WAIT = 0.5  # [s] for a message, before the rest is looked after
 OFTEN, SELDOM = 0.25, 2.0  # [s] between two looks at what is shown as text
 NOTICE = 8.0  # [s] that a fault is shown
 RENDERING = 30.0  # [s] for a browser to draw a screenshot
+WORLD = "/world"  # node
 NOTHING = SceneContacts()
 
 
@@ -38,7 +39,8 @@ class Window:
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._scene = RemoteScene()
-        self._picture = Picture(server, rospy.logwarn)
+        world = server.scene.add_frame(WORLD, show_axes=False)
+        self._picture = Picture(server, rospy.logwarn, below=WORLD)
         self._version: int | None = None  # that is drawn
         self._redraw = threading.Event()  # all of it, otherwise than before
         self._newest: ScenePoses | None = None
@@ -55,7 +57,7 @@ class Window:
             gui.add_button("Screenshot", icon=viser.Icon.CAMERA).on_click(self._screenshot)
         with tabs.add_tab("Models"):
             self._models = ModelPanel(
-                server, commands, self._controllers, self.attempt, lambda: self._time.stands
+                server, world, commands, self._controllers, self.attempt, lambda: self._time.stands
             )
         with tabs.add_tab("Controllers"):
             self._tree = gui.add_html("")
@@ -108,8 +110,9 @@ class Window:
             self._version = scene.version
         if poses.version == self._version:
             self._newest = poses
-            self._picture.move(np.array(poses.poses, dtype=float).reshape(-1, NUMBERS))
-            self._models.follow(self._picture.links)
+            with self._server.atomic():
+                self._picture.move(np.array(poses.poses, dtype=float).reshape(-1, NUMBERS))
+                self._models.follow(self._picture.links)
 
     def _touch(self, message: SceneContacts | None) -> None:
         """Shows contact points; None leaves what is shown."""
