@@ -51,7 +51,9 @@ def joint(name):
 def test_models_are_chosen_while_another_thread_shows_them(server, interleaved):
     """Time that runs and stands by turns switches sliders off and on, which removed ones refuse."""
     stands = False
-    panel = ModelPanel(server, None, NoControllers(), None, lambda: stands)
+    panel = ModelPanel(
+        server, server.scene.add_frame("/world"), None, NoControllers(), None, lambda: stands
+    )
     picture = Picture(server, pytest.fail)
     names = {name: [f"{name}_{i}" for i in range(count)] for name, count in JOINTS.items()}
     picture.draw(
