@@ -6,8 +6,10 @@ those of the page, where they win. In the normal run all of it happens in this p
 thirty of them takes minutes; the long test starts them.
 """
 
+import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -25,6 +27,7 @@ ENGLISH, CHINESE = (ROOT / "docs" / name for name in ("tutorial_dqn.md", "tutori
 README = ROOT / "README.md"
 BLOCK = re.compile(r"^( *)```(\S+)(?: (\S+))?\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 LIMIT = 300.0  # [s] for one command
+INTERRUPTED = 130  # exit code
 DQN = ("--total-timesteps 400 --eval-frequency 200 --eval-episodes 1 --confirm-episodes 1 "
        "--learning-starts 50 --checkpoint-frequency 200")  # fmt: skip
 SHORTER = {  # command: flags behind its own
@@ -103,6 +106,20 @@ def run_line(line: str, mark: str, run: Callable[[list[str]], tuple[int, str]]) 
         assert code == (1 if mark == "fails" else 0), f"{line}\n{errors}"
 
 
+def show_page(line: str) -> None:
+    """Runs a command that serves a page until somebody ends it."""
+    words = [sys.executable, "-m", "cartpole.workbench", *shlex.split(line)[4:]]
+    environment = {**os.environ, "DISPLAY": "", "WAYLAND_DISPLAY": ""}  # opens no browser
+    with subprocess.Popen(
+        words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as shown:
+        assert shown.stdout is not None
+        lines = iter(shown.stdout.readline, "")
+        told = next((each for each in lines if "is the page" in each), "")
+        shown.send_signal(signal.SIGINT)
+        assert told and shown.wait(LIMIT) == INTERRUPTED, told
+
+
 def check_tutorial(run: Callable[[list[str]], tuple[int, str]]) -> None:
     for block in blocks(ENGLISH):
         if block.language != "text":
@@ -141,7 +158,10 @@ def test_every_command_of_the_readme_works(tmp_path: Path, monkeypatch) -> None:
         words = line.split()
         if words[-1] == "--help" or words[4:5] == ["benchmark"]:
             continue
-        run_line(line, "may-fail" if "enjoy" in words else "", here)
+        if "--gui" in words:
+            show_page(line)
+        else:
+            run_line(line, "may-fail" if "enjoy" in words else "", here)
     assert Path("episode.gif").is_file() and Path("compare.png").is_file()
 
 
