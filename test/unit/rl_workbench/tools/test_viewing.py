@@ -25,6 +25,8 @@ from rl_workbench.tools.viewing.recorder import Episode, Recorder
 from rl_workbench.training.run.folder import held
 from robot_envs.errors import SimulatorError
 
+pytestmark = pytest.mark.usefixtures("signals")
+
 BOUND = 180.0  # [s]
 TICK = 0.1  # [s]
 

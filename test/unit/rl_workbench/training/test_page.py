@@ -17,6 +17,8 @@ from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.options.training_options import choose
 from rl_workbench.training.page import page_beside
 
+pytestmark = pytest.mark.usefixtures("signals")
+
 BOUND = 180.0  # [s]
 SHORT = ["--algo=dqn", "--total-timesteps=300", "--learning-starts=50", "--eval-episodes=1"]
 TELLS = "import os, sys; print('it is here', flush=True); os.close(1); "
