@@ -17,7 +17,7 @@ from browser import wait_for
 from window_page import WindowCase, proxy
 
 HELD = ["position_hold", "effort_arm", "velocity_drive"]
-PRESSES = 20  # of a key, each of which moves a slider by a five hundredth of its way
+PRESSES = 5  # of a key, each of which moves a slider by a five hundredth of its way
 WAY = 0.3  # [m] that they come to at least: of 10 m
 
 
@@ -53,42 +53,40 @@ class JointsTest(WindowCase):
         self.assertNotIn("position_a: ", self.page.text)
         self.assertNotIn("effort_a: ", self.page.text)
 
-    def push(self, joint):
-        """Moves the slider of a joint to the right."""
-        self.page.push_slider(joint, "ArrowRight", PRESSES)
+    def push(self, joint, position):
+        """Moves the slider of a joint to the right until the joint has come beyond a position [m]."""
+
+        def is_there():
+            self.page.push_slider(joint, "ArrowRight", PRESSES)
+            return self.joint(joint).position[0] > position
+
+        wait_for(is_there, f"{joint} beyond {position}")
 
     def push_and_hear(self, joint, topic, kind):
         """Pushes a slider until its joint has moved; returns what is then said on a topic of commands."""
         said = []
         subscriber = rospy.Subscriber(topic, kind, said.append)
         self.addCleanup(subscriber.unregister)
-        self.push(joint)
-        self.wait_until_at(joint, WAY)
+        self.push(joint, WAY)
         # The page publishes from its first command on, and nobody else does.
         wait_for(subscriber.get_num_connections, "publisher of commands")
-        self.push(joint)
+        self.push(joint, 1.5 * WAY)
         wait_for(lambda: said, "command")
         return said
 
-    def wait_until_at(self, joint, position):
-        wait_for(lambda: self.joint(joint).position[0] > position, f"{joint} beyond {position}")
-
     def test_a_slider_places_a_joint_of_a_paused_world(self):
         wait_for(lambda: not self.page.is_off("velocity_b"), "slider of a paused world")
-        self.push("velocity_b")
-        self.wait_until_at("velocity_b", WAY)
+        self.push("velocity_b", WAY)
         self.assertEqual(self.world().sim_time, 0.0)
 
     def test_a_slider_commands_a_running_position_controller(self):
         self.run_controllers()
         said = self.push_and_hear("position_a", "/slides/position_hold/command", Float64)
-        self.wait_until_at("position_a", 1.5 * WAY)
         self.assertGreater(said[-1].data, WAY)
 
     def test_a_slider_commands_a_running_trajectory_controller(self):
         self.run_controllers()
         said = self.push_and_hear("effort_a", "/slides/effort_arm/command", JointTrajectory)
-        self.wait_until_at("effort_a", 1.5 * WAY)
         self.assertEqual(set(said[-1].joint_names), {"effort_a", "effort_b"})
         self.assertLess(abs(self.joint("effort_b").position[0]), 0.05)
 
@@ -98,7 +96,7 @@ class JointsTest(WindowCase):
             wait_for(lambda j=joint, o=off: self.page.is_off(j) == o, f"{joint}: {off=}")
         self.pause()
         wait_for(lambda: not self.page.is_off("velocity_b"), "slider of a paused world")
-        self.assertNotIn("takes velocities", self.page.text)
+        wait_for(lambda: "takes velocities" not in self.page.text, "end of the list")
 
     def test_controllers_are_shown_with_their_state(self):
         self.page.click("Controllers")

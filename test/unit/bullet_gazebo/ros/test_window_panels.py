@@ -90,6 +90,46 @@ def test_models_are_chosen_while_another_thread_shows_them(server, interleaved):
         assert sorted(handles(server, viser.GuiSliderHandle)) == sorted(names.get(name, []))
 
 
+def test_a_slider_that_is_dragged_leaves_its_joint_where_it_was_left(server):
+    """The first command waits for a controller to listen, and the rest of the way is gone meanwhile."""
+    listens, commanded = threading.Event(), []
+
+    class Slow:
+        def holder(self, joint):
+            return self
+
+        def command(self, holder, joint, positions):
+            assert listens.wait(60.0)
+            commanded.append(positions[joint])
+
+    panel = ModelPanel(
+        server,
+        server.scene.add_frame("/world"),
+        None,
+        Slow(),
+        lambda act: act(),
+        lambda: False,
+    )
+    picture = Picture(server, pytest.fail)
+    picture.draw([SeenModel(1, "arm", [SeenLink("base", [])], [joint("elbow")])], [])
+    panel.set_models(list(picture.models.values()))
+    handles(server, viser.GuiDropdownHandle)["Model"].value = "arm"
+    panel.show({}, {})
+    slider = handles(server, viser.GuiSliderHandle)["elbow"]
+    (moved,) = slider._impl.update_cb
+    somebody = viser.GuiEvent(client=object(), client_id=0, target=slider)
+    drags = []
+    for at in np.linspace(0.1, 0.9, 20):
+        slider._impl.value = at
+        drags.append(threading.Thread(target=moved, args=(somebody,), daemon=True))
+        drags[-1].start()
+    listens.set()
+    for each in drags:
+        each.join(60.0)
+    assert commanded[-1] == pytest.approx(0.9)
+    assert commanded == sorted(commanded)
+
+
 def test_a_world_in_lockstep_says_so_and_has_nothing_to_pause(server):
     panel = TimePanel(server.gui, None, None)
     status = panel._status

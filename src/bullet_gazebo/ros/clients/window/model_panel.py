@@ -2,6 +2,7 @@
 
 import html
 import math
+import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -55,6 +56,8 @@ class ModelPanel:
         )
         self._start: np.ndarray | None = None  # where the followed model was at first
         self._followed = ""
+        self._turn = threading.Lock()
+        self._wanted: dict[tuple[str, str], float] = {}  # [rad, m] of model and joint, not yet done
         self._touched: dict[str, float] = {}  # [s] when somebody moved a joint's slider
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._choice = server.gui.add_dropdown("Model", [NONE], initial_value=NONE)
@@ -96,12 +99,19 @@ class ModelPanel:
 
         def moved(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:  # somebody moved it
-                position = float(slider.value)
                 self._touched[joint.name] = time.monotonic()
-                self._attempt(lambda: self._move(model, joint.name, position))
+                self._wanted[model, joint.name] = float(slider.value)
+                self._attempt(lambda: self._move_newest(model, joint.name))
 
         slider.on_update(moved)
         return slider
+
+    def _move_newest(self, model: str, joint: str) -> None:
+        """Moves a joint to where its slider was left: threads of older places may wait for the same turn."""
+        with self._turn:
+            position = self._wanted.pop((model, joint), None)
+            if position is not None:
+                self._move(model, joint, position)
 
     def _move(self, model: str, joint: str, position: float) -> None:
         if self._stands():
