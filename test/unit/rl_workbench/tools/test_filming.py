@@ -8,7 +8,6 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-import workbench_runs
 from PIL import Image
 
 import cartpole  # noqa: F401 - registers the environments
@@ -128,21 +127,14 @@ def test_an_environment_that_draws_nothing_is_refused():
         filming.film_episode(filming.Player("", Blind(), lambda _: np.zeros(4)), 0, RATE)
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("runs") / "robot"
-    workbench_runs.dqn(folder, env_id="cartpole/Classic-v0", total_timesteps=200)
-    return folder
-
-
 def record(run: Path, out: Path, *words: str) -> int:
     return cli.main(["record", str(run), "--out", str(out), "--max-steps", "20", *words])
 
 
-def test_best_last_and_random_side_by_side(run: Path, tmp_path: Path, capsys):
+def test_best_last_and_random_side_by_side(robot_run: Path, tmp_path: Path, capsys):
     out = tmp_path / "three.gif"
     words = ("--checkpoint", "best", "last", "random", "--size", "64x48", "--fps", "10")
-    assert record(run, out, *words) == 0
+    assert record(robot_run, out, *words) == 0
     with Image.open(out) as video:
         assert video.size == (3 * 64, 48 + 8)
         assert video.info["duration"] == 100
@@ -159,14 +151,14 @@ def test_best_last_and_random_side_by_side(run: Path, tmp_path: Path, capsys):
         (("--checkpoint", "worst"), "invalid choice"),
     ],
 )
-def test_flags_that_make_no_sense(run: Path, tmp_path: Path, capsys, words, text):
+def test_flags_that_make_no_sense(robot_run: Path, tmp_path: Path, capsys, words, text):
     with pytest.raises(SystemExit):
-        record(run, tmp_path / "a.gif", *words)
+        record(robot_run, tmp_path / "a.gif", *words)
     assert text in capsys.readouterr().err
 
 
-def test_a_gif_that_browsers_would_slow_down_is_refused(run: Path, tmp_path: Path, capsys):
-    assert record(run, tmp_path / "a.gif", "--fps", "100") == 1
+def test_a_gif_that_browsers_would_slow_down_is_refused(robot_run: Path, tmp_path: Path, capsys):
+    assert record(robot_run, tmp_path / "a.gif", "--fps", "100") == 1
     assert "50 frames a second at most" in capsys.readouterr().err
 
 

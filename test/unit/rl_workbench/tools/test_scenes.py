@@ -13,20 +13,15 @@ pytestmark = pytest.mark.usefixtures("signals")
 LARGEST = 1_000_000  # [bytes]
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("runs") / "robot"
-    workbench_runs.dqn(folder, env_id="cartpole/Classic-v0", total_timesteps=200)
-    return folder
-
-
 def record(run: Path, out: Path, *words: str) -> int:
     return cli.main(["record", str(run), "--out", str(out), "--max-steps", "12", *words])
 
 
-def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(run: Path, tmp_path: Path, capsys):
+def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(
+    robot_run: Path, tmp_path: Path, capsys
+):
     out = tmp_path / "a.html"
-    assert record(run, out) == 0
+    assert record(robot_run, out) == 0
     steps = int(capsys.readouterr().out.split(" steps")[0].split()[-1])
     text = out.read_text()
     assert len(text) < LARGEST
@@ -42,9 +37,9 @@ def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(run: Path, tmp_path:
     assert before != after
 
 
-def test_several_are_seen_beside_each_other(run: Path, tmp_path: Path, capsys):
+def test_several_are_seen_beside_each_other(robot_run: Path, tmp_path: Path, capsys):
     out = tmp_path / "a.html"
-    assert record(run, out, "--checkpoint", "best", "last", "random", "--fps", "10") == 0
+    assert record(robot_run, out, "--checkpoint", "best", "last", "random", "--fps", "10") == 0
     told = capsys.readouterr().out.splitlines()
     assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
     nodes = viser_recording.of_page(out.read_text()).at()
@@ -52,14 +47,14 @@ def test_several_are_seen_beside_each_other(run: Path, tmp_path: Path, capsys):
     assert [each.split()[0] for each in captions] == ["best", "last", "random"]
 
 
-def test_captions_may_be_left_out(run: Path, tmp_path: Path):
+def test_captions_may_be_left_out(robot_run: Path, tmp_path: Path):
     out = tmp_path / "a.html"
-    assert record(run, out, "--no-captions") == 0
+    assert record(robot_run, out, "--no-captions") == 0
     assert "/caption0" not in viser_recording.of_page(out.read_text()).at()
 
 
-def test_a_size_is_refused_where_it_has_none(run: Path, tmp_path: Path, capsys):
-    assert record(run, tmp_path / "a.html", "--size", "64x48") == 1
+def test_a_size_is_refused_where_it_has_none(robot_run: Path, tmp_path: Path, capsys):
+    assert record(robot_run, tmp_path / "a.html", "--size", "64x48") == 1
     assert "as large as the browser's window" in capsys.readouterr().err
 
 
