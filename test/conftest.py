@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import progress_plugin
 import pytest
@@ -64,6 +65,16 @@ def signals() -> Iterator[None]:
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture
+def server() -> Iterator[Any]:
+    """A page of viser's, an empty one."""
+    import viser  # most tests have none
+
+    server = viser.ViserServer("127.0.0.1", 0, verbose=False)
+    yield server
+    server.stop()
 
 
 @pytest.fixture(scope="session")

@@ -4,20 +4,12 @@ import math
 
 import gymnasium
 import pytest
-import viser
 from rover import RoverState, rover_robot
 from viser_recording import Recording
 
 import cartpole  # noqa: F401 - registers its environments
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.picture import Camera, RobotPicture
-
-
-@pytest.fixture
-def server():
-    server = viser.ViserServer("127.0.0.1", 0, verbose=False)
-    yield server
-    server.stop()
 
 
 def shapes(nodes, kind):

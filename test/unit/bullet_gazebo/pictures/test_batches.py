@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import viser
 from viser_recording import Recording
 
 from bullet_gazebo.physics.description import Shape
@@ -12,13 +11,6 @@ from bullet_gazebo.pictures.page.picture import Picture
 from bullet_gazebo.pictures.page.seen import SeenLink, SeenModel
 
 AT_REST = (0.0, 0.0, 0.0, 1.0)
-
-
-@pytest.fixture
-def server():
-    server = viser.ViserServer("127.0.0.1", 0, verbose=False)
-    yield server
-    server.stop()
 
 
 @pytest.fixture

@@ -19,13 +19,6 @@ JOINTS = {"one": 3, "many": 20}  # of each model
 
 
 @pytest.fixture
-def server():
-    server = viser.ViserServer("127.0.0.1", 0, verbose=False)
-    yield server
-    server.stop()
-
-
-@pytest.fixture
 def interleaved():
     before = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH)

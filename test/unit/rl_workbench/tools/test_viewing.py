@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 import pytest
-import viser
 from workbench_runs import dqn, policy_gradient, record
 
 import cartpole  # noqa: F401 - registers its environments
@@ -58,13 +57,6 @@ def run(tmp_path_factory) -> Path:
 def robot(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("runs") / "robot"
     return policy_gradient(folder, env_id="cartpole/Balance-v0")
-
-
-@pytest.fixture
-def server():
-    server = viser.ViserServer("127.0.0.1", 0, verbose=False)
-    yield server
-    server.stop()
 
 
 @pytest.fixture
