@@ -23,6 +23,16 @@ BOUND = 180.0  # [s]
 SHORT = ["--algo=dqn", "--total-timesteps=300", "--learning-starts=50", "--eval-episodes=1"]
 TELLS = "import os, sys; print('it is here', flush=True); os.close(1); "
 
+# Gives up where nothing trains: it would be waited for.
+TELLS_ONCE_IT_TRAINS = """import os, sys, time
+for _ in range(600):
+    if os.path.exists(sys.argv[2] + "/trains"):
+        print("it is here", flush=True)
+        break
+    time.sleep(0.1)
+sys.stdin.read()
+"""
+
 
 def program(text: str) -> tuple[str, ...]:
     return (sys.executable, "-c", text)
@@ -58,10 +68,11 @@ def test_its_address_is_told_while_it_trains_and_it_ends_after(tmp_path, monkeyp
 def test_the_training_doesnt_wait_for_one_that_is_slow_to_start(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(page, "END", BOUND)
     before, told = children(), Told()
-    with page_beside(tmp_path, program("import time\nwhile True: time.sleep(1)"), told):
-        assert children() > before
+    with page_beside(tmp_path, program(TELLS_ONCE_IT_TRAINS), told):
+        assert children() > before and not told
+        (tmp_path / "trains").touch()
+        assert told.first.wait(BOUND)
     assert children() <= before
-    assert not told
 
 
 def test_it_is_told_the_run_and_to_end_with_the_training(tmp_path) -> None:
