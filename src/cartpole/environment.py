@@ -1,18 +1,21 @@
 """The cart-pole's environments and their manual page, the docstring of `CartPoleEnv`."""
 
-from cartpole.robot import CONTROL_PERIOD, ROBOT
-from cartpole.tasks import BalanceTask, CartPoleState, CartPoleTask
-from cartpole.variation import Randomisation
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cartpole.robot import CART_JOINT, POLE_JOINT, ROBOT
+from cartpole.tasks import CartPoleTask
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.environment import RobotEnv, Viewer
-from robot_envs.picture import HEIGHT, WIDTH, Camera
-from robot_envs.sensing import Sensor
+from robot_envs.pictures.picture import Camera
 
 CAMERA = Camera(target=(0.0, 0.0, 0.19), distance=1.65, yaw=14.0, pitch=-9.0)
 WINDOW_CAMERA = (1.3, 0.0, -5.0, (0.0, 0.0, 0.2))  # [m], yaw and pitch [degrees], looks at [m]
 
 
-class CartPoleEnv(RobotEnv[CartPoleState]):
+class CartPoleEnv(RobotEnv):
     """The cart-pole robot, whose cart has a position controller that follows a set-point.
 
     | id                    | task          | episode ends beyond        | cut off after |
@@ -58,12 +61,11 @@ class CartPoleEnv(RobotEnv[CartPoleState]):
     | name             | default    | meaning                                                  |
     |------------------|------------|----------------------------------------------------------|
     | `backend`        | `"bullet"` | the robot: in this process, ...                          |
-    |                  | `"ros"`    | ... over ROS in lock-step, with the same bits, ...       |
+    |                  | `"mujoco"` | ... on MuJoCo instead of PyBullet (`./ws extras`), ...     |
+    |                  | `"ros"`    | ... over ROS in lock-step, with the bits of `"bullet"`, ... |
     |                  | `"ros-realtime"` | ... or over ROS in real time, by Gazebo's own services alone |
-    | `engine`         | `"bullet"` | physics in this process: PyBullet, or `"mujoco"` (`./ws extras`); |
-    |                  |            | over ROS it is the simulator's (`physics:=`)              |
     | `control_period` | 0.008      | simulated time of an action [s], whole physics steps;    |
-    |                  |            | None in real time: the newest joint state, without waiting |
+    |                  |            | 0 in real time: the newest joint state, without waiting  |
     | `noise`          | the task's | of the starting state                                    |
     | `max_steps`      | the task's | length at which an episode is cut off                    |
     | `sensor_noise`   | 0          | standard deviation; one or four numbers, in the state's units |
@@ -75,47 +77,44 @@ class CartPoleEnv(RobotEnv[CartPoleState]):
     | `width`, `height` | 640, 320  | of the pictures [pixels]                                  |
 
     Args:
-        backend: moves the robot (see `robot_envs.backends`); the environment closes it.
-        task: what is to be learned; `BalanceTask()` by default.
-        sensor: how the state is measured; exactly and at once by default.
-        randomisation: what differs from episode to episode; nothing by default.
-        render_mode: see above.
-        width: of pictures [pixels].
-        height: of pictures [pixels].
-        control_period: the backend's [s]; tells how fast pictures follow each other.
+        task: what is to be learned.
+        backend: see above, or one that is made already; the environment closes it.
+        sensor_noise: see above.
+        options: the others of the table, as `RobotEnv` has them.
 
     Raises:
-        RobotEnvError: for a window where there is no display.
-        ValueError: for a render mode that doesn't exist, or pictures of no possible size.
+        RobotEnvError: if the robot can't be brought up; for a window where there is no display.
+        ValueError: for an option that makes no sense.
     """
 
     def __init__(
         self,
-        backend: RobotBackend[CartPoleState],
-        task: CartPoleTask | None = None,
+        task: CartPoleTask,
+        backend: str | RobotBackend | None = None,
         *,
-        sensor: Sensor[CartPoleState] | None = None,
-        randomisation: Randomisation | None = None,
-        render_mode: str | None = None,
-        width: int = WIDTH,
-        height: int = HEIGHT,
-        control_period: float = CONTROL_PERIOD,
+        sensor_noise: float | Sequence[float] | np.ndarray = 0.0,
+        **options: Any,
     ) -> None:
         super().__init__(
+            ROBOT,
+            task,
             backend,
-            task or BalanceTask(),
-            control_period=control_period,
-            sensor=sensor,
-            randomisation=randomisation,
+            sensor_noise=_by_joint(sensor_noise),
             camera=CAMERA,
-            width=width,
-            height=height,
             window=_open_window,
-            render_mode=render_mode,
+            **options,
         )
 
 
-def _open_window(period: float) -> Viewer[CartPoleState]:
-    from robot_envs.window import Window  # loads PyBullet, which nothing over ROS needs
+def _by_joint(noise: float | Sequence[float] | np.ndarray) -> Any:
+    """Noise as `CartPoleState` has its numbers, by the name of the joint."""
+    sizes = np.ravel(noise).tolist() * (1 if np.ndim(noise) else 4)
+    if len(sizes) != 4:
+        raise ValueError(f"sensor noise must be one or 4 numbers >= 0, not {noise}")
+    return {CART_JOINT: tuple(sizes[:2]), POLE_JOINT: tuple(sizes[2:])}
+
+
+def _open_window(period: float) -> Viewer:
+    from robot_envs.pictures.window import Window  # loads PyBullet, which nothing over ROS needs
 
     return Window(ROBOT, period, WINDOW_CAMERA)

@@ -66,7 +66,7 @@ class RobotOptions:
             installed = "ros" if has_ros() else "bullet"
             return {"backend": self.backend or installed, **noise}
         # The newest joint state, without waiting for another one: as the existing script does.
-        return {"backend": "ros-realtime", "control_period": None, **noise}
+        return {"backend": "ros-realtime", "control_period": 0.0, **noise}
 
 
 ROBOT_OPTIONS = Options(RobotOptions)
@@ -194,9 +194,8 @@ def session(
     backend = _backend(options)
     need_ros(f"the backend {backend}")
     from cartpole.robot import ROBOT
-    from robot_envs.backends.session import RosSession
+    from robot_envs.backends.ros.session import RosSession
 
-    height = None if "SwingUp" in options.run.env_id else 0.0
     opened = RosSession(
         ROBOT,
         name,
@@ -204,7 +203,6 @@ def session(
         realtime=backend == "ros-realtime",
         gui=options.showing.gui,
         seed=options.run.seed,
-        height=height,
         rviz=robot.rviz,
         curves=folder,
     )

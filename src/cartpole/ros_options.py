@@ -31,7 +31,7 @@ def ros_options(argv: list[str], default_name: str) -> tuple[list[str], dict[str
         namespace = os.environ.get("ROS_NAMESPACE", "").strip("/")
         return list(argv), {}, "/".join(["", *filter(None, [namespace, default_name])])
     need_ros(f"an argument with {REMAPPING}")
-    from robot_envs.backends import node
+    from robot_envs.backends.ros import node
 
     name = node.full_name(argv, default_name)
     own = node.command_line_parameters(argv)

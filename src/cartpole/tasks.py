@@ -1,17 +1,18 @@
 """What is to be learned on the cart-pole: three tasks, the same for every backend and every learner."""
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Self
 
 import gymnasium
 import numpy as np
 
-from robot_envs.task import Command, Task
+from cartpole.robot import CART_JOINT, CONTROLLER, MODEL, POLE_JOINT
+from robot_envs.task import Task
+from robot_envs.world_state import Commands, InitialState, Pose, WorldState
 
 ANGLE_LIMIT = 0.20943951023  # [rad], 12 degrees
 POSITION_LIMIT = 0.4  # [m]
 SET_POINT_STEP = 0.02  # [m] that one action moves the cart's set-point
-MAX_STEPS = 3000
 ALIVE_REWARD = 0.5
 FALL_PENALTY = 10.0
 _ANY = float(np.finfo(np.float32).max)
@@ -25,8 +26,20 @@ class CartPoleState(NamedTuple):
     pole_angle: float  # [rad], 0 is upright
     pole_velocity: float  # [rad/s]
 
+    @classmethod
+    def of(cls, state: WorldState) -> Self:
+        """The joints of a world."""
+        cart, pole = state.joints[CART_JOINT], state.joints[POLE_JOINT]
+        return cls(cart.position, cart.velocity, pole.position, pole.velocity)
 
-class CartPoleTask(Task[CartPoleState]):
+    def to_begin(self, height: float = 0.0) -> InitialState:
+        """An episode that begins so, the stand raised by a height [m]."""
+        joints = {CART_JOINT: (self[0], self[1]), POLE_JOINT: (self[2], self[3])}
+        raised = {MODEL: Pose((0.0, 0.0, height))} if height else {}
+        return InitialState(joints, raised)
+
+
+class CartPoleTask(Task):
     """One thing to learn on the cart-pole.
 
     Actions move the set-point of the cart's position controller. Set-points add up over an
@@ -35,22 +48,28 @@ class CartPoleTask(Task[CartPoleState]):
     Args:
         noise: half-width of what is drawn uniformly for the initial state; 0 starts every episode
             alike.
-        max_steps: length at which an episode is cut off.
 
     Raises:
-        ValueError: if noise or max_steps make no sense.
+        ValueError: if noise makes no sense.
     """
 
-    start = CartPoleState(0.0, 0.0, 0.0, 0.0)
+    start: ClassVar[CartPoleState] = CartPoleState(0.0, 0.0, 0.0, 0.0)  # without noise
+    height: ClassVar[float] = 0.0  # [m] above the ground, for the pole to clear it
 
-    def __init__(self, noise: float, max_steps: int) -> None:
+    def __init__(self, noise: float) -> None:
         if not 0.0 <= noise < ANGLE_LIMIT:
             raise ValueError(f"noise must lie in [0, {ANGLE_LIMIT}), not {noise}")
-        super().__init__(noise, max_steps)
+        self.noise = noise
 
-    def initial_command(self, state: CartPoleState) -> Command:
-        """The cart's set-point [m]: where it stands."""
-        return (state.cart_position,)
+    def draw(self, rng: np.random.Generator) -> CartPoleState:
+        """Draws where an episode starts: positions and velocities, up to `noise` off `start`."""
+        offsets = rng.uniform(-self.noise, self.noise, size=len(self.start))
+        pairs = zip(self.start, offsets, strict=True)
+        return CartPoleState(*(float(value + offset) for value, offset in pairs))
+
+    def initial_state(self, rng: np.random.Generator) -> InitialState:
+        """What `draw` says."""
+        return self.draw(rng).to_begin(self.height)
 
 
 class BalanceTask(CartPoleTask):
@@ -62,8 +81,10 @@ class BalanceTask(CartPoleTask):
     start at rest.
     """
 
-    def __init__(self, noise: float = 0.0, max_steps: int = MAX_STEPS) -> None:
-        super().__init__(noise, max_steps)
+    max_steps = 3000
+
+    def __init__(self, noise: float = 0.0) -> None:
+        super().__init__(noise)
 
     def action_space(self) -> gymnasium.spaces.Discrete:
         return gymnasium.spaces.Discrete(2)
@@ -73,33 +94,31 @@ class BalanceTask(CartPoleTask):
         high = np.array([2 * POSITION_LIMIT, _ANY, np.pi, _ANY], dtype=np.float32)
         return gymnasium.spaces.Box(-high, high, dtype=np.float32)
 
-    def initial_state(self, rng: np.random.Generator) -> CartPoleState:
+    def draw(self, rng: np.random.Generator) -> CartPoleState:
         """Draws where an episode starts; both joints are at rest."""
         if self.noise == 0.0:
             return self.start
         position, angle = rng.uniform(-self.noise, self.noise, size=2)
         return CartPoleState(float(position), 0.0, float(angle), 0.0)
 
-    def next_command(self, command: Command, action: int) -> Command:
+    def apply(self, action: int, state: WorldState) -> Commands:
         """Moves the cart's set-point [m] as the action (0 or 1) says."""
-        if getattr(action, "shape", ()) == ():  # an array of several compares to neither
-            if action == 1:
-                return (command[0] + SET_POINT_STEP,)
-            if action == 0:
-                return (command[0] - SET_POINT_STEP,)
-        raise ValueError(f"an action is 0 or 1, not {action!r}")
+        step = SET_POINT_STEP if action == 1 else -SET_POINT_STEP
+        return {CONTROLLER: state.commands[CONTROLLER] + step}
 
-    def observation(self, state: CartPoleState) -> np.ndarray:
-        """The state as the learner sees it: float32, shape (4,), in the state's order."""
-        return np.array(state, dtype=np.float32)
+    def observe(self, state: WorldState) -> np.ndarray:
+        """The state as the learner sees it: float32, shape (4,), in the order of `CartPoleState`."""
+        return np.array(CartPoleState.of(state), dtype=np.float32)
 
-    def is_terminal(self, state: CartPoleState) -> bool:
+    def is_terminal(self, state: WorldState) -> bool:
         """Whether the cart or the pole has left its range."""
-        return abs(state.cart_position) > POSITION_LIMIT or abs(state.pole_angle) > ANGLE_LIMIT
+        cart, pole = state.joints[CART_JOINT], state.joints[POLE_JOINT]
+        return abs(cart.position) > POSITION_LIMIT or abs(pole.position) > ANGLE_LIMIT
 
-    def reward(self, state: CartPoleState) -> float:
+    def reward(self, state: WorldState, action: int) -> float:
         """The reward for arriving in a state."""
-        reward = ALIVE_REWARD + abs(state.pole_angle) - abs(state.cart_position)
+        cart, pole = state.joints[CART_JOINT], state.joints[POLE_JOINT]
+        reward = ALIVE_REWARD + abs(pole.position) - abs(cart.position)
         return reward - FALL_PENALTY if self.is_terminal(state) else reward
 
 
@@ -110,14 +129,16 @@ class ClassicTask(BalanceTask):
     +-0.05 [m, m/s, rad, rad/s]. As in CartPole-v1 the step that falls counts as well.
     """
 
-    def __init__(self, noise: float = 0.05, max_steps: int = 500) -> None:
-        super().__init__(noise, max_steps)
+    max_steps = 500
 
-    def initial_state(self, rng: np.random.Generator) -> CartPoleState:
+    def __init__(self, noise: float = 0.05) -> None:
+        super().__init__(noise)
+
+    def draw(self, rng: np.random.Generator) -> CartPoleState:
         """Draws positions and velocities, all four from the same range."""
-        return CartPoleTask.initial_state(self, rng)
+        return CartPoleTask.draw(self, rng)
 
-    def reward(self, state: CartPoleState) -> float:
+    def reward(self, state: WorldState, action: int) -> float:
         """1, whatever the state."""
         return 1.0
 
@@ -137,12 +158,13 @@ class SwingUpTask(CartPoleTask):
     ground, so the stand is raised by 0.5 m.
     """
 
+    max_steps = 1250
     height = 0.5
     start = CartPoleState(0.0, 0.0, math.pi, 0.0)
     fast: ClassVar[float] = 5.0  # [rad/s]
 
-    def __init__(self, noise: float = 0.05, max_steps: int = 1250) -> None:
-        super().__init__(noise, max_steps)
+    def __init__(self, noise: float = 0.05) -> None:
+        super().__init__(noise)
 
     def action_space(self) -> gymnasium.spaces.Box:
         return gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -152,32 +174,28 @@ class SwingUpTask(CartPoleTask):
         high = np.array([2 * POSITION_LIMIT, _ANY, 1.0, 1.0, _ANY], dtype=np.float32)
         return gymnasium.spaces.Box(-high, high, dtype=np.float32)
 
-    def next_command(self, command: Command, action: np.ndarray) -> Command:
-        """Moves the cart's set-point [m] by `action[0]`, which lies in [-1, 1], times 0.02 m."""
-        try:
-            (share,) = action
-            if -1.0 <= share <= 1.0:
-                return (command[0] + SET_POINT_STEP * float(share),)
-        except (TypeError, ValueError):  # not one number
-            pass
-        raise ValueError(f"an action is one number in [-1, 1], not {action!r}")
+    def apply(self, action: np.ndarray, state: WorldState) -> Commands:
+        """Moves the cart's set-point [m] by the action times 0.02 m."""
+        step = SET_POINT_STEP * float(action[0])
+        return {CONTROLLER: state.commands[CONTROLLER] + step}
 
-    def observation(self, state: CartPoleState) -> np.ndarray:
+    def observe(self, state: WorldState) -> np.ndarray:
         """Float32, shape (5,); see `observation_space`."""
-        position, velocity, angle, rate = state
+        position, velocity, angle, rate = CartPoleState.of(state)
         return np.array(
             (position, velocity, math.sin(angle), math.cos(angle), rate), dtype=np.float32
         )
 
-    def is_terminal(self, state: CartPoleState) -> bool:
+    def is_terminal(self, state: WorldState) -> bool:
         """Whether the cart has left its range."""
-        return abs(state.cart_position) > POSITION_LIMIT
+        return abs(state.joints[CART_JOINT].position) > POSITION_LIMIT
 
-    def reward(self, state: CartPoleState) -> float:
+    def reward(self, state: WorldState, action: np.ndarray) -> float:
         """The reward for arriving in a state."""
-        upright = (1.0 + math.cos(state.pole_angle)) / 2.0
-        centred = (1.0 + _bell(state.cart_position / POSITION_LIMIT)) / 2.0
-        slow = (1.0 + _bell(state.pole_velocity / self.fast)) / 2.0
+        cart, pole = state.joints[CART_JOINT], state.joints[POLE_JOINT]
+        upright = (1.0 + math.cos(pole.position)) / 2.0
+        centred = (1.0 + _bell(cart.position / POSITION_LIMIT)) / 2.0
+        slow = (1.0 + _bell(pole.velocity / self.fast)) / 2.0
         return upright * centred * slow
 
 

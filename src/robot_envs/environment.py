@@ -1,34 +1,42 @@
-"""The Gymnasium environment: it hands commands to a robot and lets the task judge the state."""
+"""The Gymnasium environment: it hands commands to robots and lets the task judge the state."""
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
 
 import gymnasium
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
+from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
+from bullet_gazebo.state.names import did_you_mean
 from robot_envs.backends.backend import RobotBackend
-from robot_envs.picture import HEIGHT, WIDTH, RobotPicture
-from robot_envs.robot import State
-from robot_envs.sensing import Sensor
-from robot_envs.task import Task
+from robot_envs.backends.choice import make_backend
+from robot_envs.errors import RobotEnvError
+from robot_envs.pictures.picture import HEIGHT, WIDTH, RobotPicture
+from robot_envs.robot import Robot
+from robot_envs.scene import Scene
+from robot_envs.sensing import Noise, Sensor
+from robot_envs.spaces import action_reader, observation_reader
+from robot_envs.task import GoalTask, Task
 from robot_envs.variation import Randomisation
+from robot_envs.world_state import InitialState, WorldState
 from web_page.display import hindrance
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
-    from robot_envs.page import RobotOnPage
+    from robot_envs.pictures.page import RobotOnPage
 
-Shown_contra = TypeVar("Shown_contra", bound=tuple[float, ...], contravariant=True)
+RESET_OPTIONS = ("initial_state", "goal")
 
 
-class Viewer(Protocol[Shown_contra]):
+class Viewer(Protocol):
     """A window that shows the robot."""
 
-    def show(self, state: Shown_contra) -> None:
-        """Shows a state."""
+    def show(self, positions: Mapping[str, float]) -> None:
+        """Shows joints at their positions [rad, m], by name."""
         ...
 
     def close(self) -> None:
@@ -36,7 +44,7 @@ class Viewer(Protocol[Shown_contra]):
         ...
 
 
-class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
+class RobotEnv(gymnasium.Env[Any, Any]):
     """A robot with a task, as Gymnasium knows environments.
 
     Two attributes tell a training what it may rely on:
@@ -47,61 +55,88 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
     |                        | use them one after the other, and begin with a reset                |
     | `spec.nondeterministic` | the same seed and actions give other bits each time, as in real time |
 
+    `reset(options={...})` knows "initial_state", an `InitialState` in place of the task's, and for a
+    `GoalTask` "goal".
+
     Args:
-        backend: moves the robot (see `robot_envs.backends`); the environment closes it.
+        robot: the robot, or several that share a world.
         task: what is to be learned.
-        sensor: how the state is measured; exactly and at once by default.
+        backend: "bullet" or "mujoco": in this process; "ros": over ROS in lock-step, with the bits of
+            "bullet"; "ros-realtime": over ROS, by Gazebo's own services; None: in this process, with the
+            robot's engine. Or one that is made already; the environment closes it.
+        control_period: simulated time of an action [s]; None: the robot's. In real time 0 takes the
+            newest joint state, without waiting for another one.
+        max_steps: after how many steps an episode is cut off; None: the task's.
+        sensor_noise: standard deviation of noise on joints' positions and velocities; see `Sensor`.
+        sensor_delay: how many control steps old an observation is.
         randomisation: what differs from episode to episode; nothing by default.
-        camera: where pictures are taken from, see `robot_envs.picture`.
+        camera: where pictures are taken from, see `robot_envs.pictures.picture`.
         width: of the pictures [pixels].
         height: of the pictures [pixels].
-        window: opens a window that shows a state every so many [s], for the render mode "human".
+        window: opens a window that shows joints every so many [s], for the render mode "human".
         render_mode: "rgb_array": pictures; "human": a window, where there is one; or none.
-        control_period: of an action [s]; tells how fast pictures follow each other.
 
     Raises:
-        RobotEnvError: for a window where there is no display.
-        ValueError: for a render mode that doesn't exist, or pictures of no possible size.
+        RobotEnvError: if the robot's description is wrong, or it can't be brought up; for a window where
+            there is no display.
+        ValueError: for an option that makes no sense.
     """
 
     def __init__(
         self,
-        backend: RobotBackend[State],
-        task: Task[State],
+        robot: Robot | Sequence[Robot],
+        task: Task,
+        backend: str | RobotBackend | None = None,
         *,
-        control_period: float,
-        sensor: Sensor[State] | None = None,
+        control_period: float | None = None,
+        max_steps: int | None = None,
+        sensor_noise: Noise = 0.0,
+        sensor_delay: int = 0,
         randomisation: Randomisation | None = None,
         camera: Camera | None = None,
         width: int = WIDTH,
         height: int = HEIGHT,
-        window: Callable[[float], Viewer[State]] | None = None,
+        window: Callable[[float], Viewer] | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self.backend = backend
-        self._spec: EnvSpec | None = None
+        self._closed = True  # until there is something to close
+        self.scene = Scene([robot] if isinstance(robot, Robot) else robot, task.objects)
         self.task = task
+        self.max_steps = task.max_steps if max_steps is None else max_steps
+        if self.max_steps is not None and self.max_steps < 1:
+            raise ValueError(f"max_steps must be at least 1, not {self.max_steps}")
         self.action_space = task.action_space()
-        self.observation_space = task.observation_space()
+        self._read_action = action_reader(self.action_space)
+        self._task_space = task.observation_space()
+        self._read = observation_reader(self._task_space, type(task).__name__)
+        self.observation_space = _with_goals(task, self._task_space)
+        self._sensor = _sensor(self.scene, sensor_noise, sensor_delay)
+        self._randomisation = randomisation
+        period = self.scene.robots[0].control_period if control_period is None else control_period
+        shown = period or self.scene.robots[0].control_period  # [s] between pictures
         self.metadata = {
             "render_modes": ["human", "rgb_array"] if window and not hindrance() else ["rgb_array"],
-            "render_fps": max(1, round(1.0 / control_period)),
+            "render_fps": max(1, round(1.0 / shown)),
         }
-        known = ("human", "rgb_array") if window else ("rgb_array",)
-        if render_mode is not None and render_mode not in known:
-            names = " or ".join(f'"{name}"' for name in known)
-            raise ValueError(f"render_mode is {names}, not {render_mode!r}")
-        self.render_mode = render_mode
-        self._sensor = sensor
-        self._randomisation = randomisation
+        self.render_mode = _known_mode(render_mode, window is not None)
         self._picture = RobotPicture(
-            backend.robot, width, height, camera=camera, raised=task.height, base=backend.base
+            self.scene.robots[0], width, height, camera=camera, base=self._base
         )
-        self._window = window(control_period) if window and render_mode == "human" else None
-        self._state = task.start
-        self._command = task.initial_command(task.start)
+        self._window = window(shown) if window and render_mode == "human" else None
+        self._spec: EnvSpec | None = None
+        self._state: WorldState | None = None
+        self._initial = InitialState()
         self._steps: int | None = None  # None: no episode is under way
+        made = backend is None or isinstance(backend, str)
+        self.backend: RobotBackend = (
+            make_backend(self.scene, backend, period) if made else backend  # type: ignore[assignment,arg-type]
+        )
         self._closed = False
+        try:
+            self.backend.look(task.query)
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def shares_robot(self) -> bool:
@@ -121,28 +156,57 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Starts an episode.
 
         Args:
             seed: begins the stream of random numbers anew; None goes on with it.
-            options: none are known; there is nothing that they would change.
+            options: "initial_state", and for a `GoalTask` "goal"; see the class.
 
         Raises:
             gymnasium.error.ClosedEnvironmentError: after `close()`.
+            ValueError: for an option that isn't known, or an initial state or goal that can't be.
             SimulatorError: if the backend doesn't answer.
         """
         self._check_open()
+        options = self._known_options(options or {})
         super().reset(seed=seed)
+        self._steps = None
         info = self._vary()
-        self._state = state = self.backend.reset(self.task.initial_state(self.np_random))
-        self._command = self.task.initial_command(state)
+        drawn = self.task.initial_state(self.np_random)
+        self._initial = initial = options.get("initial_state", drawn)
+        state = self.backend.reset(initial)
+        if initial.commands:
+            held = {**state.commands, **self.scene.commands(initial.commands)}
+            state = state._replace(commands=held)
+        self._state = state
+        if isinstance(self.task, GoalTask):
+            self._aim(self.task, state, options.get("goal"))
+        seen = state if self._sensor is None else self._sensor.begin(state, self.np_random)
+        observation = self._observation(seen)
         self._steps = 0
-        if self._sensor is not None:
-            state = self._sensor.begin(state, self.np_random)
-        if self._window is not None:
-            self._window.show(self._state)
-        return self.task.observation(state), info
+        self._show(state)
+        return observation, {**self.task.info(state), **info}
+
+    def _known_options(self, options: dict[str, Any]) -> dict[str, Any]:
+        for name in options:
+            if name not in RESET_OPTIONS:
+                raise ValueError(
+                    f"reset knows no option '{name}'{did_you_mean(name, RESET_OPTIONS)}"
+                )
+        if "goal" in options and not isinstance(self.task, GoalTask):
+            raise ValueError(f"{type(self.task).__name__} has no goal; only a GoalTask does")
+        if not isinstance(options.get("initial_state", self._initial), InitialState):
+            raise ValueError(f"initial_state is an InitialState, not {options['initial_state']!r}")
+        return options
+
+    def _aim(self, task: GoalTask, state: WorldState, wanted: Any) -> None:
+        drawn = task.goal(self.np_random, state)
+        space = task.goals()
+        goal = np.asarray(drawn if wanted is None else wanted, space.dtype)
+        if not space.contains(goal):
+            raise ValueError(f"the goal {goal} isn't one of {type(task).__name__}'s goals: {space}")
+        task.desired = goal
 
     def _vary(self) -> dict[str, Any]:
         if self._randomisation is None:
@@ -151,41 +215,83 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
         self.backend.vary(variation)
         return {"variation": told}
 
-    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Carries out one action.
 
         Raises:
             gymnasium.error.ResetNeeded: if no episode is under way.
             gymnasium.error.ClosedEnvironmentError: after `close()`.
-            ValueError: if the action isn't one of the task's.
+            ValueError: if the action isn't one of the task's, or the task commands or returns what it can't.
             SimulatorError: if the backend doesn't answer.
         """
-        if self._steps is None:
+        if self._steps is None or self._state is None:
             self._check_open()
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         task = self.task
-        self._command = task.next_command(self._command, action)
-        self._state = state = self.backend.act(self._command)
+        action = self._read_action(action)
+        commands = self.scene.commands(task.apply(action, self._state))
+        if self._steps == 0 and self._initial.commands:
+            commands = {**self.scene.commands(self._initial.commands), **commands}
+        self._state = state = self.backend.act(commands)
         self._steps += 1
-        terminated = task.is_terminal(state)
-        truncated = not terminated and task.is_truncated(self._steps)
+        terminated = bool(task.is_terminal(state))
+        truncated = not terminated and self._steps == self.max_steps
         if terminated or truncated:
             self._steps = None
         seen = state if self._sensor is None else self._sensor.measure(state, self.np_random)
+        self._show(state)
+        reward = float(task.reward(state, action))
+        if not math.isfinite(reward):
+            raise ValueError(f"{type(task).__name__}.reward() returned {reward}")
+        return self._observation(seen), reward, terminated, truncated, task.info(state)
+
+    def _observation(self, state: WorldState) -> Any:
+        seen, task = self._read(self.task.observe(state)), self.task
+        if not isinstance(task, GoalTask):
+            return seen
+        achieved = np.asarray(task.achieved(state), task.desired.dtype)
+        return {
+            "observation": seen,
+            "achieved_goal": achieved,
+            "desired_goal": task.desired.copy(),
+        }
+
+    def compute_reward(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Any) -> Any:
+        """The reward for achieving one goal where another one is desired; see `GoalTask.compute_reward`.
+
+        Raises:
+            RobotEnvError: if the task has no goal.
+        """
+        if not isinstance(self.task, GoalTask):
+            raise RobotEnvError(f"{type(self.task).__name__} has no goal; only a GoalTask does")
+        return self.task.compute_reward(achieved_goal, desired_goal, info)
+
+    def _show(self, state: WorldState) -> None:
         if self._window is not None:
-            self._window.show(state)
-        return task.observation(seen), task.reward(state), terminated, truncated, {}
+            self._window.show(self._positions())
+
+    def _positions(self) -> dict[str, float]:
+        """Of the joints [rad, m], of the first robot, by plain name."""
+        robot, joints = self.scene.robots[0], self._state.joints if self._state else {}
+        names = {name: self.scene.joint(robot, name) for name in robot.joints}
+        return {plain: joints[name].position for plain, name in names.items() if name in joints}
+
+    def _base(self) -> Pose:
+        """Where the first robot's root link is."""
+        robot = self.scene.robots[0]
+        if robot.links.fixed_base:
+            return self.scene.stand(self._initial, robot).compose(robot.links.root_pose)
+        return self.backend.base()
 
     def render(self) -> np.ndarray | None:
         """A picture of the robot as it is, (height, width, 3). A window shows it by itself.
 
         Raises:
-            RobotEnvError: if the robot's file can't be read.
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
         """
-        return self._picture(self._state) if self.render_mode == "rgb_array" else None
+        return self._picture(self._positions()) if self.render_mode == "rgb_array" else None
 
-    def draw_on(self, server: "ViserServer", beside: int = 0) -> "RobotOnPage[State]":
+    def draw_on(self, server: "ViserServer", beside: int = 0) -> "RobotOnPage":
         """Draws the robot on a page of viser's: its visuals, a ground and lights, seen as in the pictures.
 
         Needs no render mode, with any backend:
@@ -205,10 +311,9 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
             are `look()`, which tells where the robot is, and `show()`, which moves it there, then or later.
 
         Raises:
-            RobotEnvError: if the robot's file can't be read.
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
         """
-        return self._picture.draw_on(server, lambda: self._state, beside)
+        return self._picture.draw_on(server, self._positions, beside)
 
     def close(self) -> None:
         """Closes the backend and the window; may be called twice."""
@@ -224,3 +329,24 @@ class RobotEnv(gymnasium.Env[np.ndarray, Any], Generic[State]):
             raise gymnasium.error.ClosedEnvironmentError(
                 "this environment is closed; make another one"
             )
+
+
+def _known_mode(mode: str | None, has_window: bool) -> str | None:
+    known = ("human", "rgb_array") if has_window else ("rgb_array",)
+    if mode is not None and mode not in known:
+        names = " or ".join(f'"{name}"' for name in known)
+        raise ValueError(f"render_mode is {names}, not {mode!r}")
+    return mode
+
+
+def _sensor(scene: Scene, noise: Any, delay: int) -> Sensor | None:
+    sensor = Sensor(scene.joints, noise, delay)
+    return None if sensor.is_exact else sensor
+
+
+def _with_goals(task: Task, space: gymnasium.Space[Any]) -> gymnasium.Space[Any]:
+    if not isinstance(task, GoalTask):
+        return space
+    return gymnasium.spaces.Dict(
+        {"observation": space, "achieved_goal": task.goals(), "desired_goal": task.goals()}
+    )

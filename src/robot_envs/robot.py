@@ -1,104 +1,194 @@
-"""What a robot is: its names, its files, and what of it an environment reads and commands."""
+"""What a robot is: its files, the controllers that run, and how it comes into the world."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Generic, TypeVar
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
 
-from robot_envs import files
+from bullet_gazebo.control.description import RobotDescription, read_description
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.joint import JointLimits
+from bullet_gazebo.physics.description import DescriptionError, ModelDescription
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.pose import Pose
+from robot_envs import controllers, files
+from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError
+from robot_envs.files import Source
 
-State = TypeVar("State", bound=tuple[float, ...])
-"""A NamedTuple of floats: position and velocity of each joint [m, m/s] or [rad, rad/s]."""
+CONTROL_PERIOD = 0.01  # [s]
+EMPTY = "empty"
+"""The world with a ground plane and nothing else, that of gazebo_ros's empty_world.launch."""
 
 
 @dataclass(frozen=True)
-class OverRos:
-    """What a robot is called over ROS; its files are the same as in this process.
+class Robot:
+    """A robot, wherever it moves: one description makes it in this process and over ROS.
+
+    Making one reads nothing; `check` reads everything, and environments call it.
 
     Args:
-        description: the parameter that holds the URDF.
-        publisher: the controller that publishes its joint states.
+        urdf: a URDF or xacro file: a path, "package://PACKAGE/PLACE", a function that finds it, or the
+            text of a URDF.
+        controllers: the controllers' parameters as ros_control has them: a YAML file, likewise, or a
+            mapping. What drives and limits joints (`gazebo_ros_control/pid_gains`, `joint_limits`) may
+            stand there, too.
+        run: the controllers that run, in the order in which they are started.
+        commanded: those of them that tasks command; None: all that take numbers.
+        name: of the model in the world; None: the URDF's own.
+        arguments: of xacro, by name.
+        pose: where it is spawned, in the world.
+        world: a world file: a path, or "package://..."; `EMPTY`: a ground plane; None: nothing else, in
+            this process, and over ROS what gzserver begins with.
+        engine: of the physics in this process: "bullet", or "mujoco".
+        control_period: simulated time of one action [s]; whole physics steps.
+        namespace: of its topics, services and controllers over ROS; each robot of a world with several
+            needs its own.
+        description: the parameter that holds the URDF over ROS, in the namespace.
+        publisher: the controller that publishes its joint states over ROS.
         rviz: package and name of the launch file that shows it in RViz; None: there is none.
     """
 
+    urdf: Source | Callable[[], Source]
+    controllers: Source | Callable[[], Source] | Mapping[str, Any] = field(default_factory=dict)
+    run: tuple[str, ...] = ()
+    commanded: tuple[str, ...] | None = None
+    name: str | None = None
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    pose: Pose = Pose()
+    world: Source | None = EMPTY
+    engine: str = "bullet"
+    control_period: float = CONTROL_PERIOD
+    namespace: str = ""
     description: str = "robot_description"
     publisher: str = "joint_state_controller"
     rviz: tuple[str, str] | None = None
 
-
-@dataclass(frozen=True)
-class Robot(Generic[State]):
-    """A robot, wherever it moves.
-
-    Args:
-        model: its name in the world.
-        state: makes the state that tasks see.
-        joints: in the order in which the state has them.
-        controllers: those that run, in the order in which they are started.
-        commanded: those of them that an environment commands, in the order of a command's numbers;
-            each takes one number.
-        urdf_file: finds the URDF or xacro file in this process.
-        parameters_file: finds the YAML file with the controllers' parameters in this process.
-        ros: how it is brought up over ROS; None: in this process only.
-        height: above the ground, where it is spawned over ROS [m]; enough for each of its tasks.
-
-    Raises:
-        ValueError: if the names don't go together.
-    """
-
-    model: str
-    state: type[State]
-    joints: tuple[str, ...]
-    controllers: tuple[str, ...]
-    commanded: tuple[str, ...]
-    urdf_file: Callable[[], Path]
-    parameters_file: Callable[[], Path]
-    ros: OverRos | None = None
-    height: float = 0.0
-
-    def __post_init__(self) -> None:
-        fields = self.state._fields  # type: ignore[attr-defined]  # of a NamedTuple
-        if len(fields) != 2 * len(self.joints):
-            raise ValueError(
-                f"{self.state.__name__} has the numbers {', '.join(fields)}: position and velocity of "
-                f"{', '.join(self.joints)} are {2 * len(self.joints)}"
-            )
-        idle = [name for name in self.commanded if name not in self.controllers]
-        if idle:
-            raise ValueError(f"commanded, but not among the controllers: {', '.join(idle)}")
-
-    def urdf(self) -> str:
+    @cached_property
+    def xml(self) -> str:
         """Its URDF, written out as the parameter robot_description has it.
 
         Raises:
             RobotEnvError: if the file isn't found, or can't be read.
         """
-        return files.read_urdf(self.urdf_file())
+        return files.read_urdf(_source(self.urdf), self.arguments)
 
-    def parameters(self, controller: str) -> dict[str, Any]:
-        """The parameters `/<controller>`.
+    @cached_property
+    def model(self) -> str:
+        """Its name in the world.
 
         Raises:
-            RobotEnvError: if the file isn't found, can't be read, or has no such controller.
+            RobotEnvError: if that is the URDF's, which can't be read.
         """
-        path = self.parameters_file()
-        found = files.read_parameters(path).get(controller)
-        if not isinstance(found, dict):
-            raise RobotEnvError(f"{path} has no controller '{controller}'")
-        return found
+        return self.name or self.links.name or "robot"
 
-    def state_of(self, numbers: Iterable[float]) -> State:
-        """The state with these numbers: position and velocity of each joint."""
-        return tuple.__new__(self.state, numbers)  # as its own _make, and twice as fast
+    @cached_property
+    def links(self) -> ModelDescription:
+        """Its links and joints, as the physics have them.
+
+        Raises:
+            RobotEnvError: if its URDF can't be read, or not be simulated.
+        """
+        try:
+            return parse_urdf(self.xml, resources=files.resources())
+        except DescriptionError as error:
+            raise RobotEnvError(f"the robot{self._named}: {error}") from error
+
+    @cached_property
+    def parameters(self) -> Mapping[str, Any]:
+        """The parameters below its namespace.
+
+        Raises:
+            RobotEnvError: if the file isn't found, or can't be read.
+        """
+        if isinstance(self.controllers, Mapping):
+            tree: Mapping[str, Any] = self.controllers
+        else:
+            tree = files.read_parameters(_source(self.controllers))
+        own = tree.get(self.namespace.strip("/"))
+        return own if isinstance(own, Mapping) else tree
+
+    @cached_property
+    def control(self) -> RobotDescription:
+        """What ros_control reads: transmissions, and the joints with their limits.
+
+        Raises:
+            RobotEnvError: if the URDF can't be read.
+        """
+        try:
+            return read_description(self.xml).limited_by(self.parameters.get("joint_limits"))
+        except ControlError as error:
+            raise RobotEnvError(f"the robot{self._named}: {error}") from error
+
+    @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """The joints that a state tells: those with a transmission, in alphabetical order."""
+        return tuple(sorted({each.joint for each in self.control.transmissions}))
 
     @property
-    def over_ros(self) -> OverRos:
-        """How it is brought up over ROS.
+    def limits(self) -> Mapping[str, JointLimits]:
+        """What limits each joint: lower, upper [rad, m], velocity [rad/s, m/s], effort [N m, N]; None: nothing."""
+        return {name: joint.limits for name, joint in self.control.joints.items()}
+
+    def hardware(self) -> RobotHardware:
+        """A new one of its joints as controllers see them.
 
         Raises:
-            RobotEnvError: if the description doesn't say.
+            ControlError: if something about its joints is wrong.
         """
-        if self.ros is None:
-            raise RobotEnvError(f"the robot '{self.model}' doesn't say how it comes up over ROS")
-        return self.ros
+        gains = self.parameters.get("gazebo_ros_control")
+        pids = gains.get("pid_gains") if isinstance(gains, Mapping) else None
+        description = read_description(self.xml).limited_by(self.parameters.get("joint_limits"))
+        return RobotHardware(description, pids if isinstance(pids, Mapping) else None)
+
+    @property
+    def _named(self) -> str:
+        return f" '{self.name}'" if self.name else ""
+
+    def check(self) -> None:
+        """Reads all of it.
+
+        Raises:
+            RobotEnvError: if something is wrong; all faults are told, with the nearest name where one
+                isn't known.
+        """
+        _ = self._sound
+
+    @cached_property
+    def _sound(self) -> bool:
+        faults = list(self._faults())
+        if faults:
+            listed = faults[0] if len(faults) == 1 else "".join(f"\n- {each}" for each in faults)
+            raise RobotEnvError(f"the robot '{self.model}': {listed}")
+        return True
+
+    def _faults(self) -> Iterator[str]:
+        if not all(map(math.isfinite, (*self.pose.position, *self.pose.orientation))):
+            yield f"its pose isn't finite: {self.pose}"
+        if not self.joints:
+            yield (
+                "its URDF has no <transmission>: each joint that is to be commanded or seen needs one"
+            )
+        try:
+            hardware = self.hardware()
+        except ControlError as error:
+            yield str(error)
+        else:
+            yield from controllers.faults(self.run, self.commanded, self.parameters, hardware)
+
+    @cached_property
+    def ports(self) -> tuple[CommandPort, ...]:
+        """What takes the commands of a task, in the order of `commanded`.
+
+        Raises:
+            RobotEnvError: if something in the description is wrong.
+        """
+        self.check()
+        loaded = controllers.load(self.run, self.parameters, self.hardware())[1]
+        return tuple(controllers.ports(self.commanded, self.parameters, loaded))
+
+
+def _source(given: Source | Callable[[], Source]) -> Source:
+    return given() if callable(given) else given

@@ -2,23 +2,24 @@
 
 import math
 from collections import deque
-from collections.abc import Sequence
-from typing import Generic
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from robot_envs.robot import Robot, State
+from bullet_gazebo.state.names import did_you_mean
+from robot_envs.world_state import JointState, WorldState
 
+Noise = float | Mapping[str, tuple[float, float]]
 MOST_DELAY = 1000  # [control steps]
 
 
-class Sensor(Generic[State]):
-    """Measures a robot's state.
+class Sensor:
+    """Measures a world's joints.
 
     Args:
-        robot: whose state.
-        noise: standard deviation of the normal noise on each of the state's numbers
-            [m, m/s, rad, rad/s]; a single number goes for all of them.
+        joints: their names.
+        noise: standard deviation of the normal noise [m, m/s, rad, rad/s]: a number for all joints, or
+            by a joint's name those of its position and its velocity.
         delay: how many control steps old a measurement is. Before there are any so old, it is
             the one of the episode's start.
 
@@ -28,34 +29,41 @@ class Sensor(Generic[State]):
 
     def __init__(
         self,
-        robot: Robot[State],
-        noise: float | Sequence[float] | np.ndarray = 0.0,
+        joints: Sequence[str],
+        noise: Noise = 0.0,
         delay: int = 0,
     ) -> None:
-        self._state_of = robot.state_of
-        self._count = 2 * len(robot.joints)
-        sizes = tuple(np.ravel(noise).tolist()) * (1 if np.ndim(noise) else self._count)
-        fits = len(sizes) == self._count
-        if not fits or not all(math.isfinite(size) and size >= 0.0 for size in sizes):
-            raise ValueError(f"sensor noise must be one or {self._count} numbers >= 0, not {noise}")
+        given = noise if isinstance(noise, Mapping) else dict.fromkeys(joints, (noise, noise))
+        for name in given:
+            if name not in joints:
+                raise ValueError(
+                    f"sensor noise of '{name}': no such joint{did_you_mean(name, joints)}"
+                )
+        self._sizes = {name: (float(place), float(speed)) for name, (place, speed) in given.items()}
+        sizes = [size for pair in self._sizes.values() for size in pair]
+        if not all(math.isfinite(size) and size >= 0.0 for size in sizes):
+            raise ValueError(f"sensor noise must be numbers >= 0, not {noise}")
         if not 0 <= delay <= MOST_DELAY or delay != int(delay):
             raise ValueError(f"sensor delay must lie in [0, {MOST_DELAY}] steps, not {delay}")
-        self._noise = sizes
         self.is_noisy = any(sizes)
         self.is_exact = not self.is_noisy and delay == 0
-        self._seen: deque[State] = deque(maxlen=int(delay) + 1)
+        self._seen: deque[WorldState] = deque(maxlen=int(delay) + 1)
 
-    def begin(self, state: State, rng: np.random.Generator) -> State:
+    def begin(self, state: WorldState, rng: np.random.Generator) -> WorldState:
         """Returns the first measurement of an episode that starts in `state`."""
         self._seen.clear()
         return self.measure(state, rng)
 
-    def measure(self, state: State, rng: np.random.Generator) -> State:
-        """Returns the measurement that arrives when the robot is in `state`."""
+    def measure(self, state: WorldState, rng: np.random.Generator) -> WorldState:
+        """Returns the measurement that arrives when the world is in `state`."""
         self._seen.append(self._noisy(state, rng) if self.is_noisy else state)
         return self._seen[0]
 
-    def _noisy(self, state: State, rng: np.random.Generator) -> State:
-        errors = rng.standard_normal(self._count).tolist()
-        sized = zip(state, self._noise, errors, strict=True)
-        return self._state_of([value + size * error for value, size, error in sized])
+    def _noisy(self, state: WorldState, rng: np.random.Generator) -> WorldState:
+        errors = rng.standard_normal(2 * len(self._sizes)).tolist()
+        measured: dict[str, JointState] = dict(state.joints)
+        pairs = zip(self._sizes.items(), zip(errors[::2], errors[1::2], strict=True), strict=True)
+        for (name, (place, speed)), (first, second) in pairs:
+            position, velocity, effort = measured[name]
+            measured[name] = JointState(position + place * first, velocity + speed * second, effort)
+        return state._replace(joints=measured)

@@ -3,79 +3,132 @@
 Knows neither ROS nor a simulator nor a learner; every backend runs the same tasks.
 """
 
-import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import Any, ClassVar, Generic
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import gymnasium
 import numpy as np
 
-from robot_envs.robot import State
-
-Command = tuple[float, ...]
-"""A number for each controller that is commanded, in the robot's order [m, rad, m/s, rad/s, N, N m]."""
+from robot_envs.files import Source
+from robot_envs.world_state import Commands, InitialState, Pose, StateQuery, WorldState
 
 
-class Task(ABC, Generic[State]):
-    """One thing to learn on a robot whose joints a `State` tells.
+@dataclass(frozen=True)
+class Object:
+    """An obstacle, or a thing to handle, that a task needs beside its robots.
 
     Args:
-        noise: half-width of what is drawn uniformly for the initial state; 0 starts every episode
-            alike.
-        max_steps: length at which an episode is cut off.
-
-    Raises:
-        ValueError: if noise or max_steps make no sense.
+        name: of the model in the world.
+        file: its SDF or URDF: a path, "package://PACKAGE/PLACE", or the text itself.
+        pose: where it is spawned; an `InitialState` may put it elsewhere for an episode.
     """
 
-    height: ClassVar[float] = 0.0  # [m] above the ground, for the robot to clear it
-    start: State  # of an episode without noise
+    name: str
+    file: Source
+    pose: Pose = Pose()
 
-    def __init__(self, noise: float, max_steps: int) -> None:
-        if not 0.0 <= noise < math.inf:
-            raise ValueError(f"noise must be at least 0 and finite, not {noise}")
-        if max_steps < 1:
-            raise ValueError(f"max_steps must be at least 1, not {max_steps}")
-        self.noise = noise
-        self.max_steps = max_steps
+
+class Task(ABC):
+    """One thing to learn.
+
+    A class of one's own says at least what actions and observations are, what they mean, and the reward:
+
+    | attribute | what it says |
+    |---|---|
+    | `max_steps` | after how many steps an episode is cut off (truncated); None: never |
+    | `query` | which links, models and contacts a `state` tells beside the joints; what isn't asked for costs nothing |
+    | `objects` | what is spawned beside the robots |
+
+    Names that a state has for joints, and commands for controllers, are plain where a world has one robot;
+    see `WorldState` for several. A task may keep what it likes from one call to the next, if
+    `initial_state`, which begins an episode, sets it anew.
+    """
+
+    max_steps: int | None = None
+    query: StateQuery = StateQuery()
+    objects: Sequence[Object] = ()
 
     @abstractmethod
     def action_space(self) -> gymnasium.Space[Any]:
         """A new space of the actions."""
 
     @abstractmethod
-    def observation_space(self) -> gymnasium.spaces.Box:
+    def observation_space(self) -> gymnasium.Space[Any]:
         """A new space of the observations."""
 
-    def initial_state(self, rng: np.random.Generator) -> State:
-        """Draws where an episode starts: `start`, and up to `noise` [m, m/s, rad, rad/s] off it."""
-        make: Callable[..., State] = type(self.start)
-        offsets = rng.uniform(-self.noise, self.noise, size=len(self.start))
-        return make(
-            *(float(value + offset) for value, offset in zip(self.start, offsets, strict=True))
-        )
+    def initial_state(self, rng: np.random.Generator) -> InitialState:
+        """Draws where an episode begins; as spawned, with all joints at 0, unless overridden."""
+        return InitialState()
 
     @abstractmethod
-    def initial_command(self, state: State) -> Command:
-        """What the controllers hold when an episode starts in a state."""
+    def apply(self, action: Any, state: WorldState) -> Commands:
+        """What an action, which lies in its space, commands.
+
+        Args:
+            action: of the action space.
+            state: before the action; `state.commands` is what the controllers hold.
+
+        Returns:
+            Commands by controller; those that aren't named keep theirs.
+        """
 
     @abstractmethod
-    def next_command(self, command: Command, action: Any) -> Command:
-        """What an action makes of the command before it; ValueError if it is none."""
+    def observe(self, state: WorldState) -> Any:
+        """The state as the learner sees it: of the observation space's shape."""
 
     @abstractmethod
-    def observation(self, state: State) -> np.ndarray:
-        """The state as the learner sees it; a new array."""
+    def reward(self, state: WorldState, action: Any) -> float:
+        """The reward for arriving in a state by an action."""
+
+    def is_terminal(self, state: WorldState) -> bool:
+        """Whether the state ends the episode; none does, unless overridden."""
+        return False
+
+    def info(self, state: WorldState) -> dict[str, Any]:
+        """What else is told of a state, beside the observation."""
+        return {}
+
+
+class GoalTask(Task):
+    """A task with a goal that each episode draws: for hindsight experience replay, and to be told where to go.
+
+    Observations are dicts of "observation" (`observe`), "achieved_goal" and "desired_goal", as
+    Gymnasium-Robotics has them; `compute_reward` is the environment's, too. The infos tell
+    "is_success".
+    """
+
+    desired: np.ndarray
+    """The goal of this episode."""
 
     @abstractmethod
-    def is_terminal(self, state: State) -> bool:
-        """Whether the state ends the episode."""
-
-    def is_truncated(self, steps: int) -> bool:
-        """Whether an episode of that many steps is cut off."""
-        return steps >= self.max_steps
+    def goals(self) -> gymnasium.spaces.Box:
+        """A new space of the goals."""
 
     @abstractmethod
-    def reward(self, state: State) -> float:
-        """The reward for arriving in a state."""
+    def goal(self, rng: np.random.Generator, state: WorldState) -> np.ndarray:
+        """Draws the goal of an episode that begins in a state."""
+
+    @abstractmethod
+    def achieved(self, state: WorldState) -> np.ndarray:
+        """The goal that a state reaches."""
+
+    @abstractmethod
+    def is_success(self, achieved: np.ndarray, desired: np.ndarray) -> Any:
+        """Whether goals are reached: (..., n) and (..., n) to (...) of bool."""
+
+    def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> Any:
+        """The reward for achieving one goal where another one is desired: (..., n) and (..., n) to (...).
+
+        0 for a success, and -1, unless overridden.
+        """
+        return np.where(self.is_success(achieved, desired), 0.0, -1.0)
+
+    def reward(self, state: WorldState, action: Any) -> float:
+        """`compute_reward` of what the state achieves."""
+        return float(self.compute_reward(self.achieved(state), self.desired, {}))
+
+    def info(self, state: WorldState) -> dict[str, Any]:
+        """Tells `is_success`."""
+        return {"is_success": bool(self.is_success(self.achieved(state), self.desired))}

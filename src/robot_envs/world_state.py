@@ -1,7 +1,7 @@
-"""What a task may see of the world beside its robot's `State`: joints, links, models and contacts by name."""
+"""What a task sees: joints, links, models and contacts by name; and where it has an episode begin."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from bullet_gazebo.physics.engine import Twist
@@ -11,7 +11,23 @@ from bullet_gazebo.physics.world import seen_from
 from bullet_gazebo.state.contacts import ContactPair
 from bullet_gazebo.state.query import LinkQuery, StateQuery
 
-__all__ = ["ContactPair", "JointState", "LinkQuery", "Motion", "Pose", "StateQuery", "WorldState"]
+__all__ = [
+    "Command",
+    "Commands",
+    "ContactPair",
+    "InitialState",
+    "JointState",
+    "LinkQuery",
+    "Motion",
+    "Pose",
+    "StateQuery",
+    "WorldState",
+]
+
+Command = float | Sequence[float]
+"""Of one controller [m, rad, m/s, rad/s, N, N m]: a number, or for a group one for each joint of its list."""
+Commands = Mapping[str, Command]
+"""By the controller's name; "/namespace/name" where a world has several robots."""
 
 
 class JointState(NamedTuple):
@@ -36,24 +52,42 @@ class Motion(NamedTuple):
         return Motion(*seen_from(self, frame))
 
 
-@dataclass(frozen=True)
-class WorldState:
+class WorldState(NamedTuple):
     """The world after a reset or a control period: the same numbers in-process and over ROS in lock-step.
 
     | attribute | what it tells |
     |---|---|
     | `time` | simulated time since the reset [s] |
-    | `joints` | those of the robot that have a transmission, by plain name |
-    | `links` | those that the query names, by the name that it gives them; each in the frame asked for |
+    | `joints` | those with a transmission, by name; as "model::joint" where a world has several robots |
+    | `commands` | what each controller that is commanded holds, by its name |
+    | `links` | those that the task's query names, by the name that it gives them; each in the frame asked for |
     | `models` | those that the query names, in the world |
     | `contacts` | of the last physics step, as the query names them; none right after a reset |
     """
 
     time: float
     joints: Mapping[str, JointState]
-    links: Mapping[str, Motion]
-    models: Mapping[str, Motion]
-    contacts: Sequence[ContactPair]
+    commands: Commands = {}
+    links: Mapping[str, Motion] = {}
+    models: Mapping[str, Motion] = {}
+    contacts: Sequence[ContactPair] = ()
+
+
+@dataclass(frozen=True)
+class InitialState:
+    """Where an episode begins; what isn't named is as the robot was spawned.
+
+    Args:
+        joints: positions [rad, m], or positions and velocities [rad/s, m/s], by the joint's name; the
+            others stand at 0. Beyond a stop means at it.
+        models: where models are put, in the world, by name; the others stand where they were spawned.
+        commands: what controllers hold until the first action, by name; by default position controllers
+            where their joints stand, and others 0.
+    """
+
+    joints: Mapping[str, float | tuple[float, float]] = field(default_factory=dict)
+    models: Mapping[str, Motion | Pose] = field(default_factory=dict)
+    commands: Commands = field(default_factory=dict)
 
 
 def link_keys(query: StateQuery) -> list[str]:

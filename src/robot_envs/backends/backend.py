@@ -1,55 +1,44 @@
-"""What an environment needs of a robot, be it simulated here, over ROS, or real."""
+"""What an environment needs of a world, be it simulated here, over ROS, or real."""
 
-from collections.abc import Mapping
 from typing import Protocol
 
 from bullet_gazebo.physics.pose import Pose
-from robot_envs.robot import Robot, State
-from robot_envs.task import Command
+from robot_envs.scene import Scene
 from robot_envs.variation import Variation
-from robot_envs.world_state import Motion, StateQuery, WorldState
+from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
 
 PHYSICS_STEP = 0.001  # [s]; Gazebo's, and of a world in this process
-DEFAULT_ENGINE = "bullet"
 
 
-class RobotBackend(Protocol[State]):
-    """Moves a robot whose controllers follow commands."""
+class RobotBackend(Protocol):
+    """Moves the robots of a scene, whose controllers follow commands."""
 
-    robot: Robot[State]
+    scene: Scene
     deterministic: bool  # whether the same commands give the same states
-    shared: bool  # whether all backends of its kind in a process move the same robot
+    shared: bool  # whether all backends of its kind in a process move the same robots
 
-    def reset(self, state: State, placed: Mapping[str, Motion] | None = None) -> State:
-        """Puts the joints where the state says; returns the state reached.
+    def look(self, query: StateQuery) -> None:
+        """Has states tell what a query names, beside the joints."""
+        ...
 
-        A backend that can't set velocities puts them at rest, and says so in what it returns.
+    def reset(self, initial: InitialState) -> WorldState:
+        """Begins an episode; returns the state reached.
 
-        Args:
-            state: of the robot.
-            placed: models to put where they are wanted, in the world, by name; the others stand
-                where they were spawned.
+        A backend that can't set velocities puts joints at rest, and says so in what it returns.
+        `initial.commands` are the environment's to send.
         """
         ...
 
-    def act(self, command: Command) -> State:
-        """Commands the controllers; returns the state one control period later."""
-        ...
-
-    def look(self, query: StateQuery) -> None:
-        """Has `world` tell what a query names, beside the joints, from the next reset on."""
-        ...
-
-    def world(self) -> WorldState:
-        """The world after the last reset or action; costs nothing where nobody asks for it."""
+    def act(self, commands: Commands) -> WorldState:
+        """Commands controllers, with plain numbers; returns the state one control period later."""
         ...
 
     def vary(self, variation: Variation) -> None:
-        """Gives the robot other masses, lengths and friction; to be called before a reset."""
+        """Gives the first robot other masses, lengths and friction; to be called before a reset."""
         ...
 
     def base(self) -> Pose:
-        """Where the frame of the robot's root link is, in the world."""
+        """Where the frame of the first robot's root link is, in the world."""
         ...
 
     def close(self) -> None:
@@ -57,14 +46,12 @@ class RobotBackend(Protocol[State]):
         ...
 
 
-def ticks_per_action(control_period: float | None, physics_step: float) -> int:
+def ticks_per_action(control_period: float, physics_step: float) -> int:
     """How many physics steps make one control period, both in [s].
 
     Raises:
-        ValueError: if the period is None, or isn't a whole number of steps.
+        ValueError: if the period isn't a whole number of steps.
     """
-    if control_period is None:
-        raise ValueError("a control period is needed; only a world in real time goes without one")
     ratio = control_period / physics_step
     ticks = round(ratio) if 0.0 < ratio < 1e6 else 0  # also for NaN
     if ticks < 1 or abs(ticks * physics_step - control_period) > 1e-9:

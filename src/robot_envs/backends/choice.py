@@ -2,17 +2,12 @@
 
 from importlib.util import find_spec
 
-from robot_envs.backends.backend import (
-    DEFAULT_ENGINE,
-    PHYSICS_STEP,
-    RobotBackend,
-    ticks_per_action,
-)
+from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action
 from robot_envs.errors import RobotEnvError
-from robot_envs.robot import Robot, State
+from robot_envs.scene import Scene
 
-IN_PROCESS, LOCKSTEP, REALTIME = "bullet", "ros", "ros-realtime"
-BACKENDS = (IN_PROCESS, LOCKSTEP, REALTIME)
+IN_PROCESS, MUJOCO, LOCKSTEP, REALTIME = "bullet", "mujoco", "ros", "ros-realtime"
+BACKENDS = (IN_PROCESS, MUJOCO, LOCKSTEP, REALTIME)
 
 
 def has_ros() -> bool:
@@ -30,43 +25,30 @@ def need_ros(what: str) -> None:
         raise RobotEnvError(f"{what} needs ROS, and there is no rospy: ./ws installs and finds it")
 
 
-def make_backend(
-    robot: Robot[State],
-    backend: str,
-    control_period: float | None,
-    height: float = 0.0,
-    engine: str = DEFAULT_ENGINE,
-) -> RobotBackend[State]:
-    """Makes what moves the robot; over ROS it brings up what isn't running.
+def make_backend(scene: Scene, backend: str | None, control_period: float) -> RobotBackend:
+    """Makes what moves a scene's robots; over ROS it brings up what isn't running.
 
     Args:
-        robot: the robot.
-        backend: one of `BACKENDS`.
-        control_period: simulated time [s] of one action; in real time None takes the newest joint
+        scene: the robots and objects.
+        backend: one of `BACKENDS`; None: in this process, with the first robot's engine.
+        control_period: simulated time [s] of one action; in real time 0 takes the newest joint
             state without waiting for another one.
-        height: the least that the robot must be above the ground [m].
-        engine: physics in this process: "bullet", or "mujoco"; see
-            `bullet_gazebo.physics.engines.registry`.
 
     Raises:
-        ValueError: if there is no such backend or engine, or the control period is no whole number
-            of physics steps.
-        RobotEnvError: if ROS isn't there, or the robot can't be brought up.
+        ValueError: if there is no such backend, or the control period is no whole number of physics
+            steps.
+        RobotEnvError: if ROS isn't there, or the robots can't be brought up.
     """
-    if backend not in BACKENDS:
-        raise ValueError(f"there is no backend {backend!r}; there are {', '.join(BACKENDS)}")
-    if backend == IN_PROCESS:
-        from robot_envs.backends.in_process import InProcessRobot
-
-        return InProcessRobot(robot, control_period, height, engine)
-    if engine != DEFAULT_ENGINE:
-        raise ValueError(
-            f"engine {engine!r} is for the backend 'bullet'; over ROS the simulator has its own: "
-            "start it with physics:=mujoco"
-        )
-    if control_period is not None or backend == LOCKSTEP:
+    name = scene.robots[0].engine if backend is None else backend
+    if name not in BACKENDS:
+        raise ValueError(f"there is no backend {name!r}; there are {', '.join(BACKENDS)}")
+    if control_period != 0.0 or name != REALTIME:
         ticks_per_action(control_period, PHYSICS_STEP)  # before a simulator is started for it
-    need_ros(f"the backend {backend}")
-    from robot_envs.backends.session import running_session
+    if name in (IN_PROCESS, MUJOCO):
+        from robot_envs.backends.in_process import InProcessWorld
 
-    return running_session(robot, backend == REALTIME).connect(control_period, height)
+        return InProcessWorld(scene, control_period, name)
+    need_ros(f"the backend {name}")
+    from robot_envs.backends.ros.session import running_session
+
+    return running_session(scene, name == REALTIME).connect(scene, control_period)

@@ -1,21 +1,21 @@
-"""A robot in a physics world of this process: no ROS, and the same bits as over ROS in lock-step."""
+"""Robots in a physics world of this process: no ROS, and the same bits as over ROS in lock-step."""
 
+import contextlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from operator import attrgetter
-from typing import Generic
+from typing import Any
 
-from bullet_gazebo.control.controllers.base import Controller
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointHandle
-from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.control.manager import STRICT
+from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.engines.registry import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose, normalized
 from bullet_gazebo.physics.properties import (
     JointProperties,
@@ -23,120 +23,108 @@ from bullet_gazebo.physics.properties import (
     set_joint_properties,
     set_link_properties,
 )
-from bullet_gazebo.physics.world import World
+from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 from bullet_gazebo.state.names import UnknownName, find_model
 from bullet_gazebo.state.query import NOTHING, StateReader
-from robot_envs.backends.backend import DEFAULT_ENGINE, PHYSICS_STEP, ticks_per_action
+from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action
+from robot_envs.backends.world_files import fill, spawn
+from robot_envs.controllers import Loaded, load
 from robot_envs.errors import RobotEnvError, SimulatorError
-from robot_envs.robot import Robot, State
-from robot_envs.task import Command
+from robot_envs.files import resources
+from robot_envs.robot import Robot
+from robot_envs.scene import Scene
 from robot_envs.variation import LinkFigures, Variation
-from robot_envs.world_state import JointState, Motion, StateQuery, WorldState, link_keys
+from robot_envs.world_state import (
+    Commands,
+    InitialState,
+    JointState,
+    Motion,
+    StateQuery,
+    WorldState,
+    link_keys,
+)
 
-_numbers = attrgetter("position", "velocity")
+PLUGIN = "libgazebo_ros_control.so"
+_numbers = attrgetter("position", "velocity", "effort")
+_make = tuple.__new__  # as a NamedTuple's own, and twice as fast
 
 
-class InProcessRobot(Generic[State]):
-    """A robot and its controllers, in a world of their own.
+class InProcessWorld:
+    """A scene's robots and their controllers, in a world of their own.
 
-    Nobody else knows this world, so its lock is never taken. There is no ground: a task that would
-    reach it has to end its episode before.
+    Nobody else knows this world, so its lock is never taken.
 
     Args:
-        robot: the robot.
+        scene: the robots and objects.
         control_period: simulated time [s] of one action.
-        height: above the world's origin, where it stands [m].
         engine: "bullet", or "mujoco"; see `bullet_gazebo.physics.engines.registry`.
 
     Raises:
         ValueError: if the period isn't a whole number of physics steps, or there is no such
             engine, or it isn't installed.
-        RobotEnvError: if the robot's files aren't found, or something in them is wrong.
+        RobotEnvError: if files aren't found, or something in them is wrong.
     """
 
     deterministic, shared = True, False
 
-    def __init__(
-        self,
-        robot: Robot[State],
-        control_period: float | None,
-        height: float = 0.0,
-        engine: str = DEFAULT_ENGINE,
-    ) -> None:
-        self.robot, self._state_of = robot, robot.state_of
-        self._ticks = ticks_per_action(control_period, PHYSICS_STEP)
-        urdf = robot.urdf()
-        self._sim = Simulator(World(make_engine(engine), time_step=PHYSICS_STEP), lockstep=True)
+    def __init__(self, scene: Scene, control_period: float, engine: str = "bullet") -> None:
+        self.scene = scene
+        world = World(make_engine(engine), time_step=PHYSICS_STEP)
+        self._sim = Simulator(world, lockstep=True)
         self._closed = False
         try:
-            pose = Pose((0.0, 0.0, height))
-            self._model = self._sim.world.spawn(robot.model, parse_urdf(urdf), pose)
-            self._hardware = hardware = RobotHardware(read_description(urdf))
-            self._joints = [_joint(hardware, name) for name in robot.joints]
-            self._receivers = self._start(hardware)
-        except (ControlError, DescriptionError) as error:
-            self.close()
-            raise RobotEnvError(f"the robot '{robot.model}': {error}") from error
+            fill(self._sim, scene.robots[0].world)
+            self._ticks = ticks_per_action(control_period, world.time_step)
+            self._robots = {robot.model: self._add(robot) for robot in scene.robots}
+            for each in scene.objects:
+                spawn(world, each)
         except BaseException:
             self.close()
             raise
+        self._model = self._robots[scene.robots[0].model][0]  # that varies
+        self._joints = self._found_joints()
+        self._receivers = self._found_receivers()
         self._nominal: dict[str, LinkFigures] = {}
         self._damping: dict[str, float] = {}
-        self._reader = StateReader(self._sim.world, NOTHING)
+        self._reader = StateReader(world, NOTHING)
+        self._links: list[str] = []
+        self._asked = False  # for more than the joints
+        self._held: dict[str, Any] = {}
         self._begin = 0  # [ns] of the episode
 
-    def _start(self, hardware: RobotHardware) -> list[tuple[int, Callable[[float], None]]]:
-        """Starts the robot's controllers in the world; returns what takes each number of a command."""
-        robot, manager = self.robot, ControllerManager(hardware)
-        self._sim.add_robot(ControlledRobot(self._model, hardware, manager))
-        loaded = {name: manager.load(name, robot.parameters(name)) for name in robot.controllers}
-        manager.switch(loaded, [], STRICT)
-        return [(index, _receiver(loaded[name])) for index, name in enumerate(robot.commanded)]
-
-    def reset(self, state: State, placed: Mapping[str, Motion] | None = None) -> State:
-        """See `RobotBackend.reset`; the state asked for is the state reached, within the joints' stops.
-
-        Raises:
-            SimulatorError: for a model to place that isn't there.
-        """
-        joints, world = self.robot.joints, self._sim.world
+    def _add(self, robot: Robot) -> tuple[Model, RobotHardware, Loaded]:
+        """Spawns a robot, and starts its controllers."""
         try:
-            models = [(find_model(world, name), at) for name, at in (placed or {}).items()]
-        except UnknownName as error:
-            raise SimulatorError(str(error)) from error
-        self._sim.reset(everything=False)
-        self._begin = self._sim.now
-        for model, (pose, twist) in models:
-            upright = Pose(pose.position, normalized(pose.orientation))
-            self._sim.place_model(model, upright, twist)
-        self._sim.set_joint_states(
-            self._model,
-            dict(zip(joints, state[::2], strict=True)),
-            dict(zip(joints, state[1::2], strict=True)),
-        )
-        return self._state()
+            description = parse_urdf(robot.xml, resources=resources())
+            model = self._sim.world.spawn(robot.model, description, robot.pose)
+            hardware = robot.hardware()
+            manager, loaded = load(robot.run, robot.parameters, hardware)
+            period, namespace = control_tick(description), f"/{robot.namespace.strip('/')}"
+            controlled = ControlledRobot(model, hardware, manager, period, namespace)
+            self._sim.add_robot(controlled)
+            manager.switch(loaded, [], STRICT)
+        except (ControlError, DescriptionError) as error:
+            raise RobotEnvError(f"the robot '{robot.model}': {error}") from error
+        except NameTaken as error:
+            raise RobotEnvError(
+                f"the world has a model '{robot.model}'; give the robot another name"
+            ) from error
+        return model, hardware, loaded
 
-    def act(self, command: Command) -> State:
-        """See `RobotBackend.act`.
+    def _found_joints(self) -> list[tuple[str, JointHandle]]:
+        return [
+            (self.scene.joint(robot, name), joint)
+            for robot in self.scene.robots
+            for name, joint in self._robots[robot.model][1].joints.items()
+        ]
 
-        Raises:
-            SimulatorError: if the physics has come to something that isn't finite.
-        """
-        for index, receive in self._receivers:
-            receive(command[index])
-        self._sim.advance(self._ticks)
-        return self._state()
-
-    def _state(self) -> State:
-        numbers: tuple[float, ...] = ()
-        for joint in self._joints:
-            numbers += _numbers(joint)
-        state = self._state_of(numbers)
-        if not math.isfinite(sum(state)):
-            raise SimulatorError(f"the joint state isn't finite: {state}")
-        return state
+    def _found_receivers(self) -> dict[str, Callable[[Any], None]]:
+        return {
+            name: self._robots[robot.model][2][port.name].inputs[0].receive
+            for name, (robot, port) in self.scene.ports.items()
+        }
 
     def look(self, query: StateQuery) -> None:
         """See `RobotBackend.look`.
@@ -145,23 +133,76 @@ class InProcessRobot(Generic[State]):
             ValueError: for a link that is named twice.
             SimulatorError: for a name of nothing in this world.
         """
-        link_keys(query)
+        links = link_keys(query)
         try:
             self._reader = StateReader(self._sim.world, query)
         except UnknownName as error:
             raise SimulatorError(str(error)) from error
+        self._links, self._asked = links, query != NOTHING
 
-    def world(self) -> WorldState:
-        """See `RobotBackend.world`."""
-        passed, reader = self._sim.now - self._begin, self._reader
-        answer = reader.read(stepped=passed > 0)
-        joints = self._hardware.joints.items()
+    def reset(self, initial: InitialState) -> WorldState:
+        """See `RobotBackend.reset`; the state asked for is the state reached, within the joints' stops.
+
+        Raises:
+            ValueError: for a joint to place that isn't there.
+            SimulatorError: for a model to place that isn't there.
+        """
+        joints, world = self.scene.placed_joints(initial), self._sim.world
+        placed = self.scene.placed_models(initial)
+        try:
+            models = [(find_model(world, name), at) for name, at in placed.items()]
+        except UnknownName as error:
+            raise SimulatorError(str(error)) from error
+        self._sim.reset(everything=False)
+        self._begin = self._sim.now
+        for model, (pose, twist) in models:
+            upright = Pose(pose.position, normalized(pose.orientation))
+            self._sim.place_model(model, upright, twist)
+        for robot in self.scene.robots:
+            own = [
+                (name, joints[key]) for key, (of, name) in self.scene.moved.items() if of is robot
+            ]
+            self._sim.set_joint_states(
+                self._robots[robot.model][0],
+                {name: position for name, (position, _) in own},
+                {name: velocity for name, (_, velocity) in own},
+            )
+        state = self._state()
+        self._held = self.scene.starting_commands(state.joints)
+        return state._replace(commands=self._held)
+
+    def act(self, commands: Commands) -> WorldState:
+        """See `RobotBackend.act`.
+
+        Raises:
+            SimulatorError: if the physics has come to something that isn't finite.
+        """
+        receivers = self._receivers
+        for name, command in commands.items():
+            receivers[name](command)
+        self._held = {**self._held, **commands}
+        self._sim.advance(self._ticks)
+        return self._state()
+
+    def _state(self) -> WorldState:
+        joints: dict[str, JointState] = {}
+        total = 0.0
+        for name, joint in self._joints:
+            joints[name] = state = _make(JointState, _numbers(joint))
+            total += state[0] + state[1]
+        if not math.isfinite(total):
+            raise SimulatorError(f"the joint state isn't finite: {joints}")
+        passed = self._sim.now - self._begin
+        if not self._asked:
+            return WorldState(passed / NANOSECONDS, joints, self._held)
+        answer = self._reader.read(stepped=passed > 0)
         return WorldState(
-            time=passed / NANOSECONDS,
-            joints={name: JointState(j.position, j.velocity, j.effort) for name, j in joints},
-            links=dict(zip(link_keys(reader.query), map(_motion, answer.links), strict=True)),
-            models={name: _motion(state) for name, state in answer.models.items()},
-            contacts=answer.contacts,
+            passed / NANOSECONDS,
+            joints,
+            self._held,
+            dict(zip(self._links, map(_motion, answer.links), strict=True)),
+            {name: _motion(state) for name, state in answer.models.items()},
+            answer.contacts,
         )
 
     def vary(self, variation: Variation) -> None:
@@ -204,25 +245,10 @@ def _motion(state: tuple[Pose, Twist]) -> Motion:
     return Motion(*state)
 
 
-def _joint(hardware: RobotHardware, name: str) -> JointHandle:
-    """A joint whose state is told over ROS, too.
-
-    Raises:
-        ControlError: if it has no transmission.
-    """
-    if name not in hardware.joints:
-        raise ControlError(f"joint '{name}' has no transmission, so nobody tells its state")
-    return hardware.joints[name]
-
-
-def _receiver(controller: Controller) -> Callable[[float], None]:
-    """What takes a controller's command.
-
-    Raises:
-        ControlError: if a command isn't a single number.
-    """
-    if [each.kind for each in controller.inputs] != ["Float64"]:
-        raise ControlError(
-            f"controller '{controller.name}' ({controller.type_name}) doesn't take single numbers"
-        )
-    return controller.inputs[0].receive
+def control_tick(description: ModelDescription) -> float:
+    """How often the URDF has its controllers updated [s]; 0: with each step."""
+    for plugin in description.plugins:
+        if plugin.filename == PLUGIN:
+            with contextlib.suppress(ValueError):
+                return max(0.0, float(plugin.element.findtext("controlPeriod") or 0.0))
+    return 0.0

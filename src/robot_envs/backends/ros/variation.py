@@ -12,17 +12,16 @@ from gazebo_msgs.srv import (
 )
 from geometry_msgs.msg import Point, Pose, Quaternion
 
-from bullet_gazebo.physics.files.urdf import parse_urdf
-from robot_envs.backends.service import ServiceClient
+from robot_envs.backends.ros.service import ServiceClient
 from robot_envs.errors import SimulatorError
-from robot_envs.robot import Robot, State
+from robot_envs.robot import Robot
 from robot_envs.variation import LinkFigures, Variation
 
 
 class RosVariation:
     """Changes a robot that a simulator has, and gives it back as it was found."""
 
-    def __init__(self, robot: Robot[State]) -> None:
+    def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._get = ServiceClient("/gazebo/get_link_properties", GetLinkProperties)
         self._set_link = ServiceClient("/gazebo/set_link_properties", SetLinkProperties)
@@ -50,7 +49,7 @@ class RosVariation:
     def _own_damping(self, joint: str) -> float:
         """What the robot's file says, since Gazebo's services don't tell it."""
         if not self._damping:
-            joints = parse_urdf(self._robot.urdf()).joints
+            joints = self._robot.links.joints
             self._damping = {name: each.damping for name, each in joints.items()}
         return self._damping[joint]
 

@@ -1,12 +1,12 @@
 """A window that shows a robot: PyBullet's own, at about the pace of real time."""
 
 import time
-from typing import Generic
+from collections.abc import Mapping
 
 from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
 from bullet_gazebo.scratch import scratch_folder
 from robot_envs.errors import RobotEnvError
-from robot_envs.robot import Robot, State
+from robot_envs.robot import Robot
 from web_page.display import hindrance
 
 Camera = tuple[float, float, float, tuple[float, float, float]]
@@ -17,7 +17,7 @@ NO_WINDOW = (
 )
 
 
-class Window(Generic[State]):
+class Window:
     """Shows states, each for `period` [s] of wall time.
 
     Args:
@@ -29,7 +29,7 @@ class Window(Generic[State]):
         RobotEnvError: if there is no display, or this process has such a window already.
     """
 
-    def __init__(self, robot: Robot[State], period: float, camera: Camera) -> None:
+    def __init__(self, robot: Robot, period: float, camera: Camera) -> None:
         reason = hindrance()
         if reason:
             raise RobotEnvError(NO_WINDOW.format(reason=reason))
@@ -40,8 +40,8 @@ class Window(Generic[State]):
             self._client = pybullet.connect(pybullet.GUI, options=options)
         except pybullet.error as error:
             raise RobotEnvError(f"a second window can't be opened: {error}") from error
-        self._body = self._load(robot.urdf())
-        self._joints = self._indices(robot.joints)
+        self._body = self._load(robot.xml)
+        self._joints = self._indices()
         pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self._client)
         pybullet.resetDebugVisualizerCamera(*camera, physicsClientId=self._client)
 
@@ -51,15 +51,14 @@ class Window(Generic[State]):
             path.write_text(urdf, encoding="utf-8")
             return int(pybullet.loadURDF(str(path), physicsClientId=self._client))
 
-    def _indices(self, joints: tuple[str, ...]) -> list[int]:
-        names = [
-            pybullet.getJointInfo(self._body, index, self._client)[1].decode()
-            for index in range(pybullet.getNumJoints(self._body, self._client))
-        ]
-        return [names.index(joint) for joint in joints]
+    def _indices(self) -> dict[str, int]:
+        """Of the body's joints, by name."""
+        count = pybullet.getNumJoints(self._body, self._client)
+        infos = (pybullet.getJointInfo(self._body, each, self._client) for each in range(count))
+        return {info[1].decode(): info[0] for info in infos}
 
-    def show(self, state: State) -> None:
-        """Shows a state, not before the one before it has been seen.
+    def show(self, positions: Mapping[str, float]) -> None:
+        """Shows joints at their positions [rad, m], not before those before have been seen.
 
         Raises:
             RobotEnvError: if the user has closed the window.
@@ -68,8 +67,8 @@ class Window(Generic[State]):
             raise RobotEnvError("the window was closed")
         self._due = max(time.monotonic(), self._due + self._period)
         time.sleep(max(0.0, self._due - time.monotonic()))
-        for index, position in zip(self._joints, state[::2], strict=True):
-            pybullet.resetJointState(self._body, index, position, 0.0, self._client)
+        for name, position in positions.items():
+            pybullet.resetJointState(self._body, self._joints[name], position, 0.0, self._client)
 
     def close(self) -> None:
         """Closes the window, if it is open."""

@@ -2,22 +2,21 @@
 
 from gazebo_msgs.srv import GetLinkState
 
-from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from robot_envs.backends.service import ServiceClient
+from robot_envs.backends.ros.service import ServiceClient
 from robot_envs.errors import SimulatorError
-from robot_envs.robot import Robot, State
+from robot_envs.robot import Robot
 
 SERVICE = "/gazebo/get_link_state"
 
 
-def base_pose(robot: Robot[State]) -> Pose:
+def base_pose(robot: Robot) -> Pose:
     """The frame of the robot's root link, in the world.
 
     Raises:
         SimulatorError: if the simulator doesn't answer, or has no such robot.
     """
-    link = f"{robot.model}::{parse_urdf(robot.urdf()).root}"
+    link = f"{robot.model}::{robot.links.root}"
     answer = ServiceClient(SERVICE, GetLinkState)(link, "world")
     if not answer.success:
         raise SimulatorError(f"{SERVICE}: {answer.status_message}")

@@ -2,8 +2,8 @@
 
 import logging
 from collections import defaultdict
-from collections.abc import Callable
-from typing import Generic, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 import viser
@@ -14,8 +14,7 @@ from bullet_gazebo.physics.pose import IDENTITY, ZERO
 from bullet_gazebo.pictures.camera import Camera, overview
 from bullet_gazebo.pictures.page.picture import Picture
 from bullet_gazebo.pictures.page.seen import SeenLink, SeenModel, seen_model
-from robot_envs.placement import Placement
-from robot_envs.robot import State
+from robot_envs.pictures.placement import Placement
 
 WORLD = "/world"  # node
 GAP = 0.15  # between robots, as a share of what one of them can reach
@@ -31,7 +30,7 @@ class Placed(NamedTuple):
     strayed: np.ndarray  # (3,) [m]: what a robot that drives has gone from where it started
 
 
-class RobotOnPage(Generic[State]):
+class RobotOnPage:
     """A robot, and for the first one of a page a ground, lights, and where the page is seen from.
 
     The first one stays where it is on the page, and the world goes by: so all cameras follow it, wherever
@@ -40,7 +39,7 @@ class RobotOnPage(Generic[State]):
     Args:
         server: of the page.
         placement: of the robot.
-        state: tells the robot's.
+        positions: tells where its joints are [rad, m], by name.
         camera: where pictures of it are taken from.
         size: of these pictures [pixels].
         beside: so many robots of its kind are on the page already.
@@ -52,13 +51,13 @@ class RobotOnPage(Generic[State]):
     def __init__(
         self,
         server: viser.ViserServer,
-        placement: Placement[State],
-        state: Callable[[], State],
+        placement: Placement,
+        positions: Callable[[], Mapping[str, float]],
         camera: Camera | None,
         size: tuple[int, int],
         beside: int,
     ) -> None:
-        self._server, self._placement, self._state = server, placement, state
+        self._server, self._placement, self._positions = server, placement, positions
         self._is_first, self._node = not beside, f"{WORLD}/{beside}"
         self._caption_node = f"/caption{beside}"
         self._caption: viser.LabelHandle | None = None
@@ -101,7 +100,7 @@ class RobotOnPage(Generic[State]):
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
         """
         base = self._placement.base()
-        poses = self._placement.links(self._state(), base)
+        poses = self._placement.links(self._positions(), base)
         rows = [
             [*poses[link.name].position, *poses[link.name].orientation] for link in self._seen.links
         ]
@@ -140,7 +139,7 @@ def _draw_ground(server: viser.ViserServer) -> None:
     ground.move(np.array([(*ZERO, *IDENTITY)] * sum(len(model.links) for model in seen)))
 
 
-def _seen(placement: Placement[State]) -> SeenModel:
+def _seen(placement: Placement) -> SeenModel:
     shapes: dict[str, list[Shape]] = defaultdict(list)
     for link, shape in placement.shapes:
         shapes[link].append(shape)

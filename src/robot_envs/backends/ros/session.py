@@ -3,33 +3,44 @@
 import atexit
 import contextlib
 import os
+import re
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Generic
+from tempfile import NamedTemporaryFile
 
 import rospy
 
-from robot_envs.backends import bring_up, node
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
-from robot_envs.backends.bring_up import STEP_SERVICE, Say, Undo
-from robot_envs.backends.own_simulator import OwnSimulator
-from robot_envs.backends.rviz import check_rviz, open_rviz
-from robot_envs.backends.window import is_open, open_window, show_curves, tell_open, tell_opening
+from robot_envs.backends.ros import bring_up, node
+from robot_envs.backends.ros.bring_up import STEP_SERVICE, Say, Undo
+from robot_envs.backends.ros.own_simulator import OwnSimulator
+from robot_envs.backends.ros.rviz import check_rviz, open_rviz
+from robot_envs.backends.ros.turn import Turn
+from robot_envs.backends.ros.window import (
+    is_open,
+    open_window,
+    show_curves,
+    tell_open,
+    tell_opening,
+)
 from robot_envs.errors import RobotEnvError
-from robot_envs.robot import Robot, State
+from robot_envs.files import is_text, locate
+from robot_envs.robot import EMPTY, Robot
+from robot_envs.scene import Scene
 from ros_utils import ros_gazebo
 
 START_TIMEOUT = 60.0  # [s] for the simulator to come up
 
 
-class RosSession(Generic[State]):
+class RosSession:
     """Brings up master, simulator, robot and controllers; `close()` ends just what it started.
 
     Once started it is the process's session: environments of this robot that are made with the
     backend "ros" ("ros-realtime" if `realtime`) use it and start nothing else.
 
     Args:
-        robot: the robot.
+        robots: the robot, or several that share a world.
         name: this process's node name, with namespace.
         argv: the process's arguments, with roslaunch's remappings.
         realtime: let the world run by itself, instead of in lock-step.
@@ -37,32 +48,30 @@ class RosSession(Generic[State]):
         seed: for a simulator that is started here.
         rviz: show the robot in RViz, too.
         curves: a run folder, whose curves the window shows beside the robot, whoever opened it.
-        height: above the ground, where a robot that is spawned here stands [m]; the robot's own by
-            default, so that it can do each of its tasks.
     """
 
     def __init__(
         self,
-        robot: Robot[State],
+        robots: Robot | Sequence[Robot],
         name: str,
         argv: list[str],
         realtime: bool,
         gui: bool,
         seed: int,
-        height: float | None = None,
         rviz: bool = False,
         curves: Path | None = None,
     ) -> None:
-        self._robot = robot
+        self._scene = Scene([robots] if isinstance(robots, Robot) else robots)
+        self._turn = Turn()
         self._name = name
         self._argv = argv
         self._realtime = realtime
         self._gui = gui
         self._seed = seed
-        self._height = robot.height if height is None else height
         self._rviz = rviz
         self._curves = curves
         self._undo = contextlib.ExitStack()
+        self._own_simulator = False
 
     def start(self, say: Say) -> None:
         """Starts what is missing, and makes this the process's session.
@@ -80,58 +89,63 @@ class RosSession(Generic[State]):
                 "session until the end, or begin another process"
             )
         if self._rviz:
-            check_rviz(self._robot)
-        own_simulator = not (node.master_is_up() and bring_up.simulator_answers())
-        if own_simulator:
+            check_rviz(self._scene.robots[0])
+        self._own_simulator = own = not (node.master_is_up() and bring_up.simulator_answers())
+        if own:
             say("starting the simulator")
             self._start_simulator()
         self._join()
         self._check_mode()
+        bring_up.check_world(self._scene.robots[0])
         if self._curves is not None:
             self._undo.callback(show_curves(self._curves))
-        changes = bring_up.bring_up(self._robot, say, self._height)
-        if not own_simulator:  # one of ours ends with all that is in it
-            simulator = OwnSimulator()
-            for undo in changes:
-                self._undo.callback(_at_living_simulator, simulator, undo)
-        if self._gui and not own_simulator and is_open():
+        changes = bring_up.bring_up(self._scene, say)
+        self._undo_at_living_simulator(changes)
+        if self._gui and not own and is_open():
             tell_open(say)
         elif self._gui:
-            if not own_simulator:
+            if not own:
                 self._undo.callback(open_window(say))
-            tell_opening(say, begun=not own_simulator)
+            tell_opening(say, begun=not own)
         if self._rviz:
             say("opening RViz")
-            self._undo.callback(open_rviz(self._robot))
+            self._undo.callback(open_rviz(self._scene.robots[0]))
         _started().append(self)
         self._undo.callback(_started().remove, self)
 
-    def serves(self, robot: Robot[State], realtime: bool) -> bool:
-        """Whether it is this robot's, and moves as asked."""
-        return self._robot == robot and self._realtime == realtime
+    def serves(self, scene: Scene, realtime: bool) -> bool:
+        """Whether it is these robots', and moves as asked."""
+        return self._scene.robots == scene.robots and self._realtime == realtime
 
-    def connect(self, control_period: float | None, height: float = 0.0) -> RobotBackend[State]:
-        """A connection of its own to the robot; whoever asks for it closes it.
+    def connect(self, scene: Scene, control_period: float) -> RobotBackend:
+        """A connection of its own to the robots; whoever asks for it closes it.
 
         Args:
-            control_period: simulated time [s] of one action; in real time None takes the newest
+            scene: the session's robots, and objects, which are spawned where they aren't there.
+            control_period: simulated time [s] of one action; in real time 0 takes the newest
                 joint state without waiting for another one.
-            height: the least that the robot must be above the ground [m].
 
         Raises:
             ValueError: if the period isn't a whole number of physics steps.
-            RobotEnvError: if the simulator doesn't answer, or the robot stands too low.
+            RobotEnvError: if the simulator doesn't answer, or an object can't be spawned.
         """
-        bring_up.check_height(self._robot, height)
+        ticks = ticks_per_action(control_period, _physics_step()) if control_period else 0
+        changes = bring_up.bring_objects(scene.objects)
+        self._undo_at_living_simulator(changes)
         if self._realtime:
-            from robot_envs.backends.realtime import RealtimeRobot
+            from robot_envs.backends.ros.realtime import RealtimeWorld
 
-            if control_period is not None:
-                ticks_per_action(control_period, _physics_step())
-            return RealtimeRobot(self._robot, control_period)
-        from robot_envs.backends.lockstep import LockstepRobot
+            return RealtimeWorld(scene, control_period, self._turn)
+        from robot_envs.backends.ros.lockstep import LockstepWorld
 
-        return LockstepRobot(self._robot, ticks_per_action(control_period, _physics_step()))
+        return LockstepWorld(scene, ticks, self._turn)
+
+    def _undo_at_living_simulator(self, changes: list[Undo]) -> None:
+        if self._own_simulator:  # it ends with all that is in it
+            return
+        simulator = OwnSimulator()
+        for undo in changes:
+            self._undo.callback(_at_living_simulator, simulator, undo)
 
     def _start_simulator(self) -> None:
         started = ros_gazebo.launch_Gazebo(
@@ -139,6 +153,7 @@ class RosSession(Generic[State]):
             gui=self._gui,
             output="log",
             launch_new_term=False,
+            custom_world_path=self._world_path(),
             lockstep=not self._realtime,
             seed=self._seed,
             timeout=START_TIMEOUT,
@@ -155,6 +170,18 @@ class RosSession(Generic[State]):
                 started.close()
 
         self._undo.callback(end)
+
+    def _world_path(self) -> str | None:
+        """The world file for a simulator of ours; None: its own, with a ground plane."""
+        world = self._scene.robots[0].world
+        if world is None or world == EMPTY:
+            return None
+        if not is_text(world):
+            return str(locate(world))
+        with NamedTemporaryFile("w", suffix=".world", delete=False) as file:
+            file.write(str(world))
+        self._undo.callback(os.unlink, file.name)
+        return file.name
 
     def _join(self) -> None:
         """Becomes a node, unless the process is one; the training handles signals itself."""
@@ -189,7 +216,7 @@ def _at_living_simulator(simulator: OwnSimulator, undo: Undo) -> None:
             undo()
 
 
-def running_session(robot: Robot[State], realtime: bool) -> RosSession[State]:
+def running_session(scene: Scene, realtime: bool) -> RosSession:
     """The process's session, started if there is none; that one runs until the process ends.
 
     Where its simulator has died, another one is started.
@@ -198,12 +225,12 @@ def running_session(robot: Robot[State], realtime: bool) -> RosSession[State]:
         RobotEnvError: if something can't be started, or what runs doesn't fit.
     """
     for session in reversed(_started()):
-        if session.serves(robot, realtime):
+        if session.serves(scene, realtime):
             if bring_up.simulator_answers():
                 return session
             break
-    name = f"/{robot.model}_env_{os.getpid()}"
-    session = RosSession(robot, name, [], realtime=realtime, gui=False, seed=0)
+    name = f"/{_name(scene)}_env_{os.getpid()}"
+    session = RosSession(scene.robots, name, [], realtime=realtime, gui=False, seed=0)
     try:
         session.start(rospy.loginfo)
     except BaseException:  # Ctrl-C, too: nothing that was started may stay behind
@@ -213,8 +240,13 @@ def running_session(robot: Robot[State], realtime: bool) -> RosSession[State]:
     return session
 
 
+def _name(scene: Scene) -> str:
+    """A robot's model, as far as a node may be called so."""
+    return re.sub(r"\W", "_", scene.robots[0].model, flags=re.ASCII).strip("_") or "robot"
+
+
 @lru_cache(maxsize=1)
-def _started() -> list[RosSession[Any]]:
+def _started() -> list[RosSession]:
     """The process's sessions, oldest first: a process can become a ROS node only once."""
     return []
 

@@ -1,19 +1,19 @@
 """Pictures of a robot from its state: the same for every backend, and without a display."""
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Generic
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bullet_gazebo.physics.pose import Pose, add
 from bullet_gazebo.pictures.camera import Camera
-from robot_envs.placement import Placement
-from robot_envs.robot import Robot, State
+from robot_envs.pictures.placement import Placement
+from robot_envs.robot import Robot
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
-    from robot_envs.page import RobotOnPage
+    from robot_envs.pictures.page import RobotOnPage
 
 __all__ = ["HEIGHT", "WIDTH", "Camera", "RobotPicture"]
 
@@ -21,17 +21,16 @@ WIDTH, HEIGHT = 640, 320  # [pixels], by default
 LARGEST = 4096  # [pixels]
 
 
-class RobotPicture(Generic[State]):
+class RobotPicture:
     """Draws a robot where a state says, on a ground; what it needs is loaded with the first picture.
 
     Args:
         robot: the robot.
         width: of the pictures [pixels].
         height: of the pictures [pixels].
-        camera: where it is seen from, if it stood on the ground; by default so that all that the
-            joints can reach is seen.
-        raised: how far it stands above the ground [m].
-        base: where the root link of a robot that isn't fixed is now; the camera follows it.
+        camera: where it is seen from, as it is spawned; by default so that all that the joints can
+            reach is seen.
+        base: where its root link is now; the camera follows it.
 
     Raises:
         ValueError: for a size that no picture has.
@@ -39,45 +38,42 @@ class RobotPicture(Generic[State]):
 
     def __init__(
         self,
-        robot: Robot[State],
+        robot: Robot,
         width: int = WIDTH,
         height: int = HEIGHT,
         *,
         camera: Camera | None = None,
-        raised: float = 0.0,
-        base: Callable[[], Pose] | None = None,
+        base: Callable[[], Pose],
     ) -> None:
         for side in (width, height):
             if not 1 <= side <= LARGEST or side != int(side):
                 raise ValueError(f"a picture's width and height lie in [1, {LARGEST}], not {side}")
         self._robot, self._size = robot, (int(width), int(height))
-        self._camera, self._raised, self._base = camera, raised, base
-        self._drawn: _DrawnRobot[State] | None = None
+        self._camera, self._base = camera, base
+        self._drawn: _DrawnRobot | None = None
 
-    def __call__(self, state: State) -> np.ndarray:
-        """The robot in a state: (height, width, 3) of uint8.
+    def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
+        """The robot with its joints at their positions [rad, m], by name: (height, width, 3) of uint8.
 
         Raises:
             RobotEnvError: if the robot's file can't be read.
         """
         if self._drawn is None:
-            self._drawn = _DrawnRobot(
-                Placement(self._robot, self._raised, self._base), self._camera, self._size
-            )
-        return self._drawn(state)
+            self._drawn = _DrawnRobot(Placement(self._robot, self._base), self._camera, self._size)
+        return self._drawn(positions)
 
     def draw_on(
-        self, server: "ViserServer", state: Callable[[], State], beside: int = 0
-    ) -> "RobotOnPage[State]":
-        """Draws the robot on a page of viser's, where `state` says; see `RobotEnv.draw_on`.
+        self, server: "ViserServer", positions: Callable[[], Mapping[str, float]], beside: int = 0
+    ) -> "RobotOnPage":
+        """Draws the robot on a page of viser's, where `positions` says; see `RobotEnv.draw_on`.
 
         Raises:
             RobotEnvError: if the robot's file can't be read.
         """
-        from robot_envs.page import RobotOnPage
+        from robot_envs.pictures.page import RobotOnPage
 
-        placement = Placement(self._robot, self._raised, self._base)
-        return RobotOnPage(server, placement, state, self._camera, self._size, beside)
+        placement = Placement(self._robot, self._base)
+        return RobotOnPage(server, placement, positions, self._camera, self._size, beside)
 
     def close(self) -> None:
         """Frees what it has loaded; may be called twice."""
@@ -86,12 +82,10 @@ class RobotPicture(Generic[State]):
             self._drawn = None
 
 
-class _DrawnRobot(Generic[State]):
+class _DrawnRobot:
     """A robot in a scene, and a camera."""
 
-    def __init__(
-        self, placement: Placement[State], camera: Camera | None, size: tuple[int, int]
-    ) -> None:
+    def __init__(self, placement: Placement, camera: Camera | None, size: tuple[int, int]) -> None:
         from bullet_gazebo.pictures.scene import Scene  # loads PyBullet: when it is asked for
 
         self._placement, self._size = placement, size
@@ -99,8 +93,8 @@ class _DrawnRobot(Generic[State]):
         self.scene = Scene()
         self.scene.add("robot", placement.shapes)
 
-    def __call__(self, state: State) -> np.ndarray:
+    def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
         base = self._placement.base()
-        self.scene.place("robot", self._placement.links(state, base))
+        self.scene.place("robot", self._placement.links(positions, base))
         target = add(self._camera.target, self._placement.strayed(base))
         return self.scene.picture(self._camera.at(target), *self._size)

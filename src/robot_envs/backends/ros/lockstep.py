@@ -1,0 +1,131 @@
+"""Robots in a simulator over ROS that moves in lock-step."""
+
+from typing import Any
+
+import genpy
+from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
+
+from bullet_gazebo.physics.pose import Pose
+from robot_envs.backends.ros.base_pose import base_pose
+from robot_envs.backends.ros.bring_up import STEP_SERVICE, full_name, ready
+from robot_envs.backends.ros.messages import JointReader, ask_for, place, told
+from robot_envs.backends.ros.own_simulator import OwnSimulator
+from robot_envs.backends.ros.service import ServiceClient
+from robot_envs.backends.ros.turn import Turn
+from robot_envs.backends.ros.variation import RosVariation
+from robot_envs.errors import SimulatorError
+from robot_envs.scene import Scene
+from robot_envs.variation import Variation
+from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState, link_keys
+from ros_utils.step_client import time_of
+
+
+class LockstepWorld:
+    """One service call for each action: command, advance, read; time stands still between.
+
+    Args:
+        scene: the robots and objects; they are there, and the controllers run.
+        ticks: physics steps of one action.
+        turn: whose episode is under way, among those that move these robots.
+    """
+
+    deterministic = shared = True
+
+    def __init__(self, scene: Scene, ticks: int, turn: Turn) -> None:
+        self.scene, self._turn = scene, turn
+        self._simulator = OwnSimulator()
+        self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True)
+        moved = [f"{robot.model}::{name}" for robot, name in scene.moved.values()]
+        self._begin = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=moved)
+        self._advance = StepWorldRequest(ticks=ticks)
+        self._look = StepWorldRequest()
+        self._step.timeout += time_of(ticks)
+        self._full = {
+            name: full_name(robot, port.name) for name, (robot, port) in scene.ports.items()
+        }
+        self._read = JointReader(scene)
+        self._query = StateQuery()
+        self._begun = StepWorldResponse()
+        self._held: dict[str, Any] = {}
+        self._variation = RosVariation(scene.robots[0])
+
+    def look(self, query: StateQuery) -> None:
+        """See `RobotBackend.look`.
+
+        Raises:
+            ValueError: for a link that is named twice.
+            SimulatorError: for a name of nothing in the simulator's world, or if it doesn't answer.
+        """
+        link_keys(query)
+        ask_for(self._look, query)
+        if query != StateQuery():
+            self._call(self._look)  # no ticks: it only looks
+        for request in (self._begin, self._advance):
+            ask_for(request, query)
+        self._query = query
+
+    def reset(self, initial: InitialState) -> WorldState:
+        """See `RobotBackend.reset`; the state asked for is the state reached, exactly.
+
+        Raises:
+            ValueError: for a joint to place that isn't there.
+            SimulatorError: if it is refused or the simulator doesn't answer.
+        """
+        joints = self.scene.placed_joints(initial).values()
+        self._begin.positions = [position for position, _ in joints]
+        self._begin.velocities = [velocity for _, velocity in joints]
+        place(self._begin, self.scene.placed_models(initial))
+        self._turn.take(self)
+        self._begun = answer = self._call(self._begin)
+        state = self._state(answer)
+        self._held = self.scene.starting_commands(state.joints)
+        return state._replace(commands=self._held)
+
+    def act(self, commands: Commands) -> WorldState:
+        """See `RobotBackend.act`.
+
+        Raises:
+            SimulatorError: if the step is refused or the simulator doesn't answer, or another environment
+                has moved the robots since the reset.
+        """
+        self._turn.check(self)
+        numbers: list[float] = []
+        for command in commands.values():
+            if isinstance(command, float):
+                numbers.append(command)
+            else:
+                numbers += command  # type: ignore[arg-type]
+        self._advance.controllers = [self._full[name] for name in commands]
+        self._advance.commands = numbers
+        self._held = {**self._held, **commands}
+        return self._state(self._call(self._advance))
+
+    def _state(self, answer: StepWorldResponse) -> WorldState:
+        joints = self._read(answer.joint_states)
+        return told(answer, self._begun, self._query, joints, self._held)
+
+    def _call(self, request: genpy.Message) -> StepWorldResponse:
+        with self._simulator:
+            answer = self._step(request)
+            if not answer.success:
+                missing = ready(self.scene).missing()
+                raise SimulatorError(f"{STEP_SERVICE}: {missing or answer.status_message}")
+            return answer
+
+    def vary(self, variation: Variation) -> None:
+        """See `RobotBackend.vary`."""
+        self._variation(variation)
+
+    def base(self) -> Pose:
+        """See `RobotBackend.base`.
+
+        Raises:
+            SimulatorError: if the simulator doesn't answer.
+        """
+        with self._simulator:
+            return base_pose(self.scene.robots[0])
+
+    def close(self) -> None:
+        """Closes the connection to the simulator; the robots are as they were found."""
+        self._step.close()
+        self._variation.undo()

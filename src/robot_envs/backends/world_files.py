@@ -1,0 +1,90 @@
+"""What stands in a world of this process beside its robots: a world file's models, and a task's objects."""
+
+import logging
+from dataclasses import replace
+
+from bullet_gazebo.physics.description import DescriptionError, Light
+from bullet_gazebo.physics.files.model_file import read_entity
+from bullet_gazebo.physics.files.reading import Reading
+from bullet_gazebo.physics.files.world_file import (
+    WorldDescription,
+    empty_world,
+    load_world,
+    parse_world,
+)
+from bullet_gazebo.physics.world import NameTaken, World
+from bullet_gazebo.simulator import Simulator
+from robot_envs.errors import RobotEnvError
+from robot_envs.files import Source, is_text, locate, read_text, resources
+from robot_envs.robot import EMPTY
+from robot_envs.task import Object
+
+logger = logging.getLogger(__name__)
+
+
+def fill(sim: Simulator, source: Source | None) -> None:
+    """Puts a world file's models into an empty world, with its gravity and its step, as gzserver does.
+
+    Args:
+        sim: of the world.
+        source: the file; `EMPTY`: a ground plane; None: nothing.
+
+    Raises:
+        RobotEnvError: if the file can't be read, or something in it not be simulated.
+    """
+    if source is None:
+        return
+    found = empty_world() if source == EMPTY else _read(source)
+    for warning in found.warnings:
+        logger.warning("world %s: %s", _told(source), warning)
+    sim.set_time_step(found.time_step)
+    sim.world.set_gravity(found.gravity)
+    if found.iterations is not None:
+        sim.world.set_solver(replace(sim.world.solver, iterations=found.iterations))
+    for name, description in found.models.items():
+        try:
+            sim.world.spawn(name, description, description.initial_pose)
+        except DescriptionError as error:
+            raise RobotEnvError(f"world {_told(source)}: model '{name}': {error}") from error
+
+
+def _read(source: Source) -> WorldDescription:
+    try:
+        if is_text(source):
+            return parse_world(str(source), resources())
+        return load_world(locate(source), resources())
+    except DescriptionError as error:
+        raise RobotEnvError(f"world {_told(source)}: {error}") from error
+
+
+def world_models(source: Source | None) -> list[str]:
+    """Names of the models that a world file brings; none for `EMPTY`.
+
+    Raises:
+        RobotEnvError: if it can't be read.
+    """
+    return [] if source is None or source == EMPTY else list(_read(source).models)
+
+
+def spawn(world: World, thing: Object) -> None:
+    """Adds an object.
+
+    Raises:
+        RobotEnvError: if its file can't be read or simulated, or the world has a model of that name.
+    """
+    text = read_text(thing.file)
+    try:
+        entity = read_entity(text, thing.name, resources(), Reading())
+        if isinstance(entity, Light):
+            raise RobotEnvError(f"the object '{thing.name}' is a light; an object is a model")
+        world.spawn(thing.name, entity, thing.pose.compose(entity.initial_pose))
+    except NameTaken as error:
+        raise RobotEnvError(
+            f"the object '{thing.name}': the world has a model of that name; give it another one"
+        ) from error
+    except DescriptionError as error:
+        raise RobotEnvError(f"the object '{thing.name}' ({_told(thing.file)}): {error}") from error
+
+
+def _told(source: Source) -> str:
+    return "given as text" if is_text(source) else str(source)

@@ -1,0 +1,127 @@
+"""Controllers as a robot's parameters describe them: checked, loaded, and what commands them."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from bullet_gazebo.control.controllers.base import Controller
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.manager import STRICT, ControllerManager
+from bullet_gazebo.control.user_types import find_type
+from bullet_gazebo.state.names import did_you_mean
+
+KINDS = ("Float64", "Float64MultiArray")  # of command topics that take numbers
+Loaded = dict[str, Controller]
+
+
+class CommandPort(NamedTuple):
+    """What takes a controller's commands.
+
+    Args:
+        name: of the controller.
+        joints: as many numbers, in this order.
+        single: whether it takes one number, and no list.
+        holds: whether it holds positions, so that an episode starts with those where its joints stand.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    single: bool
+    holds: bool
+
+    def at_start(self, positions: Mapping[str, float]) -> float | tuple[float, ...]:
+        """What it holds when an episode starts: where the joints stand, or zeros."""
+        values = tuple(positions[joint] if self.holds else 0.0 for joint in self.joints)
+        return values[0] if self.single else values
+
+
+def load(
+    names: Sequence[str], parameters: Mapping[str, Any], hardware: RobotHardware
+) -> tuple[ControllerManager, Loaded]:
+    """Makes a manager that has loaded these controllers.
+
+    Raises:
+        ControlError: if one isn't described, or can't be made.
+    """
+    manager = ControllerManager(hardware)
+    return manager, {name: _load_one(manager, name, parameters) for name in names}
+
+
+def _load_one(manager: ControllerManager, name: str, parameters: Mapping[str, Any]) -> Controller:
+    if name not in parameters:
+        raise ControlError(
+            f"there is no controller '{name}' among its parameters{did_you_mean(name, parameters)}"
+        )
+    described = parameters[name]
+    kind = described.get("type") if isinstance(described, Mapping) else None
+    if isinstance(kind, str) and kind not in manager.types:
+        own = find_type(kind)  # as the simulator finds a user's
+        if own is None:
+            near = did_you_mean(kind, manager.types)
+            raise ControlError(f"controller '{name}': there is no type '{kind}'{near}")
+        manager.types[kind] = own
+    return manager.load(name, described)
+
+
+def ports(
+    commanded: Sequence[str] | None, parameters: Mapping[str, Any], loaded: Loaded
+) -> list[CommandPort]:
+    """What takes the commands of a task.
+
+    Args:
+        commanded: the controllers, in order; None: all that take numbers.
+        parameters: of all controllers.
+        loaded: those that run.
+
+    Raises:
+        ControlError: if one doesn't run, or takes no numbers.
+    """
+    if commanded is None:
+        return [_port(each, parameters) for each in loaded.values() if _takes_numbers(each)]
+    for name in commanded:
+        if name not in loaded:
+            raise ControlError(
+                f"'{name}' is commanded, but not among the controllers that run{did_you_mean(name, loaded)}"
+            )
+        if not _takes_numbers(loaded[name]):
+            raise ControlError(
+                f"controller '{name}' ({loaded[name].type_name}) takes no numbers; tasks command "
+                "controllers of single joints, or of groups"
+            )
+    return [_port(loaded[name], parameters) for name in commanded]
+
+
+def _takes_numbers(controller: Controller) -> bool:
+    return [each.kind in KINDS for each in controller.inputs] == [True]
+
+
+def _port(controller: Controller, parameters: Mapping[str, Any]) -> CommandPort:
+    described = parameters[controller.name]
+    listed = described.get("joints") or [described.get("joint")]
+    joints = tuple(listed) if set(listed) == set(controller.claimed) else controller.claimed
+    kind = controller.type_name.rpartition("/")[2]
+    holds = "Position" in kind or "Position" in controller.interface
+    return CommandPort(controller.name, joints, controller.inputs[0].kind == KINDS[0], holds)
+
+
+def faults(
+    run: Sequence[str],
+    commanded: Sequence[str] | None,
+    parameters: Mapping[str, Any],
+    hardware: RobotHardware,
+) -> Iterator[str]:
+    """What is wrong with them, one line each."""
+    manager = ControllerManager(hardware)
+    loaded: Loaded = {}
+    for name in dict.fromkeys(run):
+        try:
+            loaded[name] = _load_one(manager, name, parameters)
+        except ControlError as error:
+            yield str(error)
+    if len(loaded) < len(run):
+        return
+    try:
+        ports(commanded, parameters, loaded)
+        manager.switch(loaded, [], STRICT)
+    except ControlError as error:
+        yield str(error)

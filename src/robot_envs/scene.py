@@ -1,0 +1,151 @@
+"""The robots and objects of one world, and what their joints and controllers are called in it."""
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+from bullet_gazebo.state.names import did_you_mean
+from robot_envs.controllers import CommandPort
+from robot_envs.errors import RobotEnvError
+from robot_envs.robot import Robot
+from robot_envs.task import Object
+from robot_envs.world_state import Commands, InitialState, JointState, Motion, Pose
+
+Placed = dict[str, tuple[float, float]]
+"""Position and velocity of joints, by name."""
+
+
+class Scene:
+    """What is in a world beside what its file brings.
+
+    Args:
+        robots: one or several; the first one says world, engine and control period.
+        objects: of the task.
+
+    Raises:
+        RobotEnvError: if something in a robot's description is wrong, or names are there twice.
+    """
+
+    def __init__(self, robots: Sequence[Robot], objects: Sequence[Object] = ()) -> None:
+        self.robots, self.objects = tuple(robots), tuple(objects)
+        if not self.robots:
+            raise RobotEnvError("an environment needs a robot")
+        for robot in self.robots:
+            robot.check()
+        models = [robot.model for robot in self.robots]
+        _once("model", [*models, *(each.name for each in self.objects)])
+        _once("namespace", [robot.namespace.strip("/") for robot in self.robots])
+        self.several = len(self.robots) > 1
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scene) and vars(self)["robots"] == other.robots
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def joint(self, robot: Robot, name: str) -> str:
+        """What a joint is called in a state."""
+        return f"{robot.model}::{name}" if self.several else name
+
+    def controller(self, robot: Robot, name: str) -> str:
+        """What a controller is called in commands."""
+        return f"/{robot.namespace.strip('/')}/{name}" if self.several else name
+
+    @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """All that a state tells, robot by robot."""
+        return tuple(self.joint(robot, name) for robot in self.robots for name in robot.joints)
+
+    @cached_property
+    def moved(self) -> dict[str, tuple[Robot, str]]:
+        """All joints that move, those without a transmission, too: they begin an episode anew as well."""
+        return {
+            self.joint(robot, each.name): (robot, each.name)
+            for robot in self.robots
+            for each in robot.links.movable_joints
+        }
+
+    @cached_property
+    def ports(self) -> dict[str, tuple[Robot, CommandPort]]:
+        """What takes commands, by the controller's name in them."""
+        return {
+            self.controller(robot, port.name): (robot, port)
+            for robot in self.robots
+            for port in robot.ports
+        }
+
+    def starting_commands(self, joints: Mapping[str, JointState]) -> dict[str, Any]:
+        """What the controllers hold when an episode starts with such joints."""
+        positions = {name: state.position for name, state in joints.items()}
+        found = {}
+        for name, (robot, port) in self.ports.items():
+            own = {each: positions[self.joint(robot, each)] for each in port.joints}
+            found[name] = port.at_start(own)
+        return found
+
+    def commands(self, given: Commands) -> dict[str, float | tuple[float, ...]]:
+        """Commands as plain numbers.
+
+        Raises:
+            ValueError: for a controller that isn't commanded, another number of numbers, or one that
+                isn't finite.
+        """
+        found: dict[str, float | tuple[float, ...]] = {}
+        for name, value in given.items():
+            port = self._port(name)
+            if port.single:
+                number = found[name] = float(value)  # type: ignore[arg-type]
+                fits = math.isfinite(number)
+            else:
+                numbers = found[name] = tuple(map(float, value))  # type: ignore[arg-type]
+                fits = len(numbers) == len(port.joints) and all(map(math.isfinite, numbers))
+            if not fits:
+                wanted = (
+                    "one finite number" if port.single else f"{len(port.joints)} finite numbers"
+                )
+                raise ValueError(f"the command of '{name}' must be {wanted}, not {value}")
+        return found
+
+    def _port(self, name: str) -> CommandPort:
+        found = self.ports.get(name)
+        if found is None:
+            near = (
+                did_you_mean(name, self.ports) or f"; there are {', '.join(self.ports) or 'none'}"
+            )
+            raise ValueError(f"no controller '{name}' takes commands{near}")
+        return found[1]
+
+    def placed_joints(self, initial: InitialState) -> Placed:
+        """Position and velocity of all joints that move.
+
+        Raises:
+            ValueError: for a joint that isn't there, or something that is neither.
+        """
+        found: Placed = dict.fromkeys(self.moved, (0.0, 0.0))
+        for name, given in initial.joints.items():
+            if name not in found:
+                raise ValueError(f"there is no joint '{name}' to place{did_you_mean(name, found)}")
+            position, velocity = given if isinstance(given, tuple) else (given, 0.0)
+            found[name] = (float(position), float(velocity))
+        return found
+
+    def placed_models(self, initial: InitialState) -> dict[str, Motion]:
+        """The models to place."""
+        return {
+            name: at if isinstance(at, Motion) else Motion(at)
+            for name, at in initial.models.items()
+        }
+
+    def stand(self, initial: InitialState, robot: Robot) -> Pose:
+        """Where a robot's model is when an episode begins."""
+        return self.placed_models(initial).get(robot.model, Motion(robot.pose)).pose
+
+
+def _once(what: str, names: Sequence[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise RobotEnvError(
+                f"a world has each {what} once, and '{name}' is there twice"
+                if name
+                else f"in a world with several robots each needs its own {what}"
+            )
