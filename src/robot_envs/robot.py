@@ -129,7 +129,7 @@ class Robot:
 
     @property
     def limits(self) -> Mapping[str, JointLimits]:
-        """What limits each joint: lower, upper [rad, m], velocity [rad/s, m/s], effort [N m, N]; None: nothing."""
+        """What limits each joint: its range [rad, m], speed [rad/s, m/s], effort [N m, N]; None: nothing."""
         return {name: joint.limits for name, joint in self.control.joints.items()}
 
     def hardware(self) -> RobotHardware:

@@ -38,7 +38,7 @@ class Task(ABC):
     | attribute | what it says |
     |---|---|
     | `max_steps` | after how many steps an episode is cut off (truncated); None: never |
-    | `query` | which links, models and contacts a `state` tells beside the joints; what isn't asked for costs nothing |
+    | `query` | links, models and contacts that a `state` tells beside joints; what isn't asked for costs nothing |
     | `objects` | what is spawned beside the robots |
 
     Names that a state has for joints, and commands for controllers, are plain where a world has one robot;
@@ -92,7 +92,7 @@ class Task(ABC):
 
 
 class GoalTask(Task):
-    """A task with a goal that each episode draws: for hindsight experience replay, and to be told where to go.
+    """A task with a goal that each episode draws: for hindsight experience replay, too.
 
     Observations are dicts of "observation" (`observe`), "achieved_goal" and "desired_goal", as
     Gymnasium-Robotics has them; `compute_reward` is the environment's, too. The infos tell

@@ -35,7 +35,7 @@ def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]
     folder = Path(run_dir or Path("runs") / name)
     try:
         if run_dir:
-            folder.mkdir(parents=True, exist_ok=True)
+            _make(folder)
         else:
             folder = _fresh(folder)
     except OSError as error:
@@ -47,6 +47,17 @@ def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]
         finally:
             with contextlib.suppress(OSError):  # it isn't empty: all is well
                 folder.rmdir()
+
+
+def _make(folder: Path) -> None:
+    """Makes it, if it isn't there; also where somebody who can't begin removes it in the same moment."""
+    while True:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            return
+        except FileExistsError:  # it was there, and then it was no folder
+            if folder.exists():
+                raise
 
 
 def _check_empty(folder: Path) -> None:
