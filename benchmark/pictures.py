@@ -13,9 +13,8 @@ import time
 import reporting
 
 from cartpole.environment import CAMERA
-from cartpole.robot import ROBOT
-from cartpole.tasks import CartPoleState
-from robot_envs.picture import RobotPicture
+from cartpole.robot import CART_JOINT, POLE_JOINT, ROBOT
+from robot_envs.pictures.picture import RobotPicture
 
 SIZES = ((320, 240), (640, 320), (640, 480))
 
@@ -23,10 +22,10 @@ SIZES = ((320, 240), (640, 320), (640, 480))
 def rate(width: int, height: int, frames: int) -> float:
     """Pictures a second of the process's own time, the pole going round."""
     picture = RobotPicture(ROBOT, width, height, camera=CAMERA)
-    picture(CartPoleState(0.0, 0.0, 0.0, 0.0))  # loads
+    picture({CART_JOINT: 0.0, POLE_JOINT: 0.0})  # loads
     begin = time.process_time()
     for frame in range(frames):
-        picture(CartPoleState(0.3 * math.sin(0.1 * frame), 0.0, 0.1 * frame, 0.0))
+        picture({CART_JOINT: 0.3 * math.sin(0.1 * frame), POLE_JOINT: 0.1 * frame})
     spent = time.process_time() - begin
     picture.close()
     return frames / spent

@@ -23,7 +23,10 @@ from std_srvs.srv import Empty
 
 from cartpole.environment import CartPoleEnv
 from cartpole.robot import ROBOT
-from robot_envs.backends.lockstep import LockstepRobot
+from cartpole.tasks import BalanceTask
+from robot_envs.backends.ros.lockstep import LockstepWorld
+from robot_envs.backends.ros.turn import Turn
+from robot_envs.scene import Scene
 from ros_utils.simulation import Simulation
 from ros_utils.step_client import StepClient
 
@@ -64,7 +67,7 @@ def environment_rate(count: int, rounds: int) -> float:
     """Environment steps a second, resets included."""
     with Simulation(lockstep=True) as simulation, simulation.active():
         add_cartpole()
-        env = CartPoleEnv(LockstepRobot(ROBOT, TICKS))
+        env = CartPoleEnv(BalanceTask(), LockstepWorld(Scene([ROBOT]), TICKS, Turn()))
         env.reset(seed=0)
 
         def step(index: int) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 from cartpole.environment import CartPoleEnv
 from cartpole.tasks import TASKS, CartPoleTask
 from cartpole.variation import Randomisation
+from robot_envs.making import check_options
 
 
 def make_environment(
@@ -22,6 +23,7 @@ def make_environment(
         ValueError: if an option makes no sense.
         RobotEnvError: if the robot can't be brought up.
     """
+    check_options(options, ("noise",))
     drawn = Randomisation(**randomisation) if randomisation else None
     return CartPoleEnv(make_task(task, noise), backend, randomisation=drawn, **options)
 

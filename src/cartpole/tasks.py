@@ -181,10 +181,9 @@ class SwingUpTask(CartPoleTask):
 
     def observe(self, state: WorldState) -> np.ndarray:
         """Float32, shape (5,); see `observation_space`."""
-        position, velocity, angle, rate = CartPoleState.of(state)
-        return np.array(
-            (position, velocity, math.sin(angle), math.cos(angle), rate), dtype=np.float32
-        )
+        seen = CartPoleState.of(state)
+        turned = (math.sin(seen.pole_angle), math.cos(seen.pole_angle), seen.pole_velocity)
+        return np.array((seen.cart_position, seen.cart_velocity, *turned), dtype=np.float32)
 
     def is_terminal(self, state: WorldState) -> bool:
         """Whether the cart has left its range."""

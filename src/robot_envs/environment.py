@@ -13,7 +13,6 @@ from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.state.names import did_you_mean
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.choice import make_backend
-from robot_envs.errors import RobotEnvError
 from robot_envs.pictures.picture import HEIGHT, WIDTH, RobotPicture
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -55,6 +54,7 @@ class RobotEnv(gymnasium.Env[Any, Any]):
     |                        | use them one after the other, and begin with a reset                |
     | `spec.nondeterministic` | the same seed and actions give other bits each time, as in real time |
 
+    With a `GoalTask` it is a goal environment: observations are dicts, and it has `compute_reward`.
     `reset(options={...})` knows "initial_state", an `InitialState` in place of the task's, and for a
     `GoalTask` "goal".
 
@@ -109,11 +109,14 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         self._read_action = action_reader(self.action_space)
         self._task_space = task.observation_space()
         self._read = observation_reader(self._task_space, type(task).__name__)
-        self.observation_space = _with_goals(task, self._task_space)
+        self.observation_space = self._task_space
+        if isinstance(task, GoalTask):
+            self.observation_space = _with_goals(task, self._task_space)
+            self.compute_reward = task.compute_reward  # environments without goals have none
         self._sensor = _sensor(self.scene, sensor_noise, sensor_delay)
         self._randomisation = randomisation
         period = self.scene.robots[0].control_period if control_period is None else control_period
-        shown = period or self.scene.robots[0].control_period  # [s] between pictures
+        shown = period if period > 0.0 else self.scene.robots[0].control_period  # [s] a picture
         self.metadata = {
             "render_modes": ["human", "rgb_array"] if window and not hindrance() else ["rgb_array"],
             "render_fps": max(1, round(1.0 / shown)),
@@ -256,16 +259,6 @@ class RobotEnv(gymnasium.Env[Any, Any]):
             "desired_goal": task.desired.copy(),
         }
 
-    def compute_reward(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Any) -> Any:
-        """The reward for achieving one goal where another one is desired; see `GoalTask.compute_reward`.
-
-        Raises:
-            RobotEnvError: if the task has no goal.
-        """
-        if not isinstance(self.task, GoalTask):
-            raise RobotEnvError(f"{type(self.task).__name__} has no goal; only a GoalTask does")
-        return self.task.compute_reward(achieved_goal, desired_goal, info)
-
     def _show(self, state: WorldState) -> None:
         if self._window is not None:
             self._window.show(self._positions())
@@ -344,9 +337,7 @@ def _sensor(scene: Scene, noise: Any, delay: int) -> Sensor | None:
     return None if sensor.is_exact else sensor
 
 
-def _with_goals(task: Task, space: gymnasium.Space[Any]) -> gymnasium.Space[Any]:
-    if not isinstance(task, GoalTask):
-        return space
+def _with_goals(task: GoalTask, space: gymnasium.Space[Any]) -> gymnasium.Space[Any]:
     return gymnasium.spaces.Dict(
         {"observation": space, "achieved_goal": task.goals(), "desired_goal": task.goals()}
     )

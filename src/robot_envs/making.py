@@ -2,7 +2,7 @@
 
 import importlib
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import gymnasium
@@ -65,13 +65,7 @@ def make_environment(robot: str, task: str, backend: str | None = None, **option
     known = option_names(RobotEnv)
     own = {name: value for name, value in options.items() if name in known}
     others = {name: value for name, value in options.items() if name not in known}
-    of_task = option_names(make_task)
-    for name in others:
-        if name not in of_task:
-            raise RobotEnvError(
-                f"neither the environment nor {task} has an option '{name}'"
-                f"{did_you_mean(name, [*known, *of_task])}"
-            )
+    check_options(others, option_names(make_task))
     made = make_task(**others)
     if not isinstance(made, Task):
         raise RobotEnvError(f"{task} makes {made!r}, which is no robot_envs.Task")
@@ -87,6 +81,25 @@ def _robots(name: str) -> Any:
             f"{name} is {robots!r}, which is no robot_envs.Robot, nor a list of them"
         )
     return robots
+
+
+def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
+    """Makes sure that options are known.
+
+    Args:
+        given: their names.
+        known: those that there are beside `RobotEnv`'s.
+
+    Raises:
+        RobotEnvError: if one isn't.
+    """
+    names = [*option_names(RobotEnv), *known]
+    for name in given:
+        if name not in names:
+            raise RobotEnvError(
+                f"this environment has no option '{name}'{did_you_mean(name, names)}; there are "
+                f"{', '.join(names)}"
+            )
 
 
 def option_names(make: Callable[..., Any]) -> list[str]:

@@ -38,7 +38,7 @@ class Task(ABC):
     | attribute | what it says |
     |---|---|
     | `max_steps` | after how many steps an episode is cut off (truncated); None: never |
-    | `query` | links, models and contacts that a `state` tells beside joints; what isn't asked for costs nothing |
+    | `query` | links, models and contacts that a `state` tells beside joints; others cost nothing |
     | `objects` | what is spawned beside the robots |
 
     Names that a state has for joints, and commands for controllers, are plain where a world has one robot;

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import AT_REST
@@ -59,7 +59,7 @@ class WorldState(NamedTuple):
     |---|---|
     | `time` | simulated time since the reset [s] |
     | `joints` | those with a transmission, by name; as "model::joint" where a world has several robots |
-    | `commands` | what each controller that is commanded holds, by its name |
+    | `commands` | what each controller that is commanded holds, by its name: a number, or a tuple for a group |
     | `links` | those that the task's query names, by that name; each in the frame asked for |
     | `models` | those that the query names, in the world |
     | `contacts` | of the last physics step, as the query names them; none right after a reset |
@@ -67,7 +67,7 @@ class WorldState(NamedTuple):
 
     time: float
     joints: Mapping[str, JointState]
-    commands: Commands = {}
+    commands: Mapping[str, Any] = {}
     links: Mapping[str, Motion] = {}
     models: Mapping[str, Motion] = {}
     contacts: Sequence[ContactPair] = ()

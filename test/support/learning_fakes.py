@@ -7,14 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from bullet_gazebo.physics.pose import Pose
-from cartpole.robot import ROBOT
-from cartpole.tasks import CartPoleState
 from rl_workbench.agents.pg.document import PolicyGradientAgent
 from rl_workbench.agents.pg.reinforce import ReinforceAgent
 from rl_workbench.training.pg.episodes import run_episode
-from robot_envs.errors import SimulatorError
-from robot_envs.variation import Variation
 
 DT = 0.008  # [s]
 
@@ -149,47 +144,3 @@ class Spoilt(gymnasium.Env):
 
 SPOILT = "fakes/Spoilt-v0"
 gymnasium.register(SPOILT, Spoilt, disable_env_checker=True)
-
-
-class FakePlant:
-    """A pole on a cart that follows its set-point with a lag; semi-implicit Euler.
-
-    Args:
-        fail_after: number of actions after which the simulator "dies"; None: never.
-    """
-
-    robot, deterministic, shared = ROBOT, True, False
-
-    def __init__(self, fail_after: int | None = None) -> None:
-        self.closed = 0
-        self.actions = 0
-        self.variations: list[Variation] = []
-        self._fail_after = fail_after
-        self._state = CartPoleState(0.0, 0.0, 0.0, 0.0)
-
-    def reset(self, state: CartPoleState) -> CartPoleState:
-        self._state = state._replace(cart_velocity=0.0, pole_velocity=0.0)
-        return self._state
-
-    def act(self, command: tuple[float, ...]) -> CartPoleState:
-        (set_point,) = command
-        self.actions += 1
-        if self._fail_after is not None and self.actions > self._fail_after:
-            raise SimulatorError("the connection broke; the simulator has ended")
-        x, v, angle, rate = self._state
-        acceleration = 100.0 * (set_point - x) - 14.0 * v
-        v += acceleration * DT
-        x += v * DT
-        rate += (30.0 * angle + 3.0 * acceleration) * DT  # leans towards -x
-        angle += rate * DT
-        self._state = CartPoleState(x, v, angle, rate)
-        return self._state
-
-    def base(self) -> Pose:
-        return Pose()
-
-    def vary(self, variation: Variation) -> None:
-        self.variations.append(variation)
-
-    def close(self) -> None:
-        self.closed += 1

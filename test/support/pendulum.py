@@ -2,48 +2,30 @@
 
 import math
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium
 import numpy as np
 
-from robot_envs.backends.choice import make_backend
-from robot_envs.environment import RobotEnv
-from robot_envs.robot import OverRos, Robot
-from robot_envs.sensing import Sensor
-from robot_envs.task import Command, Task
+from robot_envs import Commands, InitialState, Robot, RobotEnv, Task, WorldState
 from robot_envs.variation import LinkScale, Variation
 
 FILES = Path(__file__).resolve().parents[1] / "data" / "robots"
 STRONGEST = 0.5  # [N m]
-
-
-class PendulumState(NamedTuple):
-    """One joint; 0 is upright."""
-
-    angle: float  # [rad]
-    rate: float  # [rad/s]
-
+MOTOR = "hinge_effort_controller"
 
 PENDULUM = Robot(
-    model="pendulum",
-    state=PendulumState,
-    joints=("hinge",),
-    controllers=("hinge_effort_controller",),
-    commanded=("hinge_effort_controller",),
-    urdf_file=lambda: FILES / "pendulum.urdf",
-    parameters_file=lambda: FILES / "pendulum.yaml",
-    ros=OverRos(),
+    urdf=FILES / "pendulum.urdf", controllers=FILES / "pendulum.yaml", run=(MOTOR,), world=None
 )
 
 
-class Upright(Task[PendulumState]):
-    """The action is the motor's torque; the nearer to upright, the better."""
+class Upright(Task):
+    """The action is the motor's torque; the nearer to upright (0), the better."""
 
-    start = PendulumState(0.0, 0.0)
+    max_steps = 200
 
-    def __init__(self, noise: float = 0.05, max_steps: int = 200) -> None:
-        super().__init__(noise, max_steps)
+    def __init__(self, noise: float = 0.05) -> None:
+        self.noise = noise  # [rad], [rad/s]
 
     def action_space(self) -> gymnasium.spaces.Box:
         return gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -52,20 +34,23 @@ class Upright(Task[PendulumState]):
         high = np.array([1.0, 1.0, np.finfo(np.float32).max], np.float32)
         return gymnasium.spaces.Box(-high, high)
 
-    def initial_command(self, state: PendulumState) -> Command:
-        return (0.0,)
+    def initial_state(self, rng: np.random.Generator) -> InitialState:
+        angle, rate = rng.uniform(-self.noise, self.noise, 2).tolist()
+        return InitialState({"hinge": (angle, rate)})
 
-    def next_command(self, command: Command, action: np.ndarray) -> Command:
-        return (STRONGEST * float(action[0]),)
+    def apply(self, action: np.ndarray, state: WorldState) -> Commands:
+        return {MOTOR: STRONGEST * float(action[0])}
 
-    def observation(self, state: PendulumState) -> np.ndarray:
-        return np.array([math.cos(state.angle), math.sin(state.angle), state.rate], np.float32)
+    def observe(self, state: WorldState) -> np.ndarray:
+        hinge = state.joints["hinge"]
+        turned = [math.cos(hinge.position), math.sin(hinge.position), hinge.velocity]
+        return np.array(turned, np.float32)
 
-    def is_terminal(self, state: PendulumState) -> bool:
-        return abs(state.angle) > 2.0
+    def is_terminal(self, state: WorldState) -> bool:
+        return abs(state.joints["hinge"].position) > 2.0
 
-    def reward(self, state: PendulumState) -> float:
-        return math.cos(state.angle)
+    def reward(self, state: WorldState, action: np.ndarray) -> float:
+        return math.cos(state.joints["hinge"].position)
 
 
 class OtherRods:
@@ -77,18 +62,14 @@ class OtherRods:
         return drawn, np.array([mass, length, friction])
 
 
+def hanging(angle: float, rate: float = 0.0) -> InitialState:
+    """An episode that begins with the hinge there [rad, rad/s]."""
+    return InitialState({"hinge": (angle, rate)})
+
+
 def make_pendulum(
-    backend: str = "bullet",
-    control_period: float | None = 0.01,
-    engine: str = "bullet",
-    varied: bool = False,
-    **sensor: Any,
-) -> RobotEnv[PendulumState]:
+    backend: str | None = None, robot: Robot = PENDULUM, varied: bool = False, **options: Any
+) -> RobotEnv:
     """The pendulum as an environment."""
-    return RobotEnv(
-        make_backend(PENDULUM, backend, control_period, engine=engine),
-        Upright(),
-        control_period=control_period or 0.01,
-        sensor=Sensor(PENDULUM, **sensor) if sensor else None,
-        randomisation=OtherRods() if varied else None,
-    )
+    randomisation = OtherRods() if varied else None
+    return RobotEnv(robot, Upright(), backend, randomisation=randomisation, **options)

@@ -1,8 +1,5 @@
 """A robot that isn't fixed to the world: a red hull with a green mast that leans."""
 
-from pathlib import Path
-from typing import NamedTuple
-
 from robot_envs.robot import Robot
 
 ROVER = """<robot name="rover"><link name="hull">
@@ -18,15 +15,4 @@ ROVER = """<robot name="rover"><link name="hull">
 </robot>"""
 
 
-class RoverState(NamedTuple):
-    """One joint."""
-
-    neck: float  # [rad]
-    rate: float  # [rad/s]
-
-
-def rover_robot(folder: Path) -> Robot[RoverState]:
-    """The robot; its file is written to `folder`."""
-    path = folder / "rover.urdf"
-    path.write_text(ROVER)
-    return Robot("rover", RoverState, ("neck",), (), (), lambda: path, lambda: path)
+ROVER_ROBOT = Robot(ROVER, world=None)

@@ -30,7 +30,7 @@ class RobotPicture:
         height: of the pictures [pixels].
         camera: where it is seen from, as it is spawned; by default so that all that the joints can
             reach is seen.
-        base: where its root link is now; the camera follows it.
+        base: where its root link is now, which the camera follows; None: where it is spawned.
 
     Raises:
         ValueError: for a size that no picture has.
@@ -43,7 +43,7 @@ class RobotPicture:
         height: int = HEIGHT,
         *,
         camera: Camera | None = None,
-        base: Callable[[], Pose],
+        base: Callable[[], Pose] | None = None,
     ) -> None:
         for side in (width, height):
             if not 1 <= side <= LARGEST or side != int(side):

@@ -20,16 +20,17 @@ class Placement:
 
     Args:
         robot: the robot.
-        base: where its root link is now.
+        base: where its root link is now; None: where it is spawned.
 
     Raises:
         RobotEnvError: if the robot's file can't be read.
     """
 
-    def __init__(self, robot: Robot, base: Callable[[], Pose]) -> None:
-        self.name, self.description, self.base = robot.model, robot.links, base
+    def __init__(self, robot: Robot, base: Callable[[], Pose] | None = None) -> None:
+        self.name, self.description = robot.model, robot.links
         self.shapes = visible_shapes(self.description)
         self._start = robot.pose.compose(self.description.root_pose)
+        self.base = base or (lambda: self._start)
 
     def links(self, positions: Mapping[str, float], base: Pose) -> dict[str, Pose]:
         """The frame of every link in the world, for joints' positions and where the root link is."""

@@ -24,7 +24,8 @@ from environment_conformance import IDS, RICH, EnvironmentConformance, rollout
 from gymnasium.utils.env_checker import data_equivalence as same
 
 import cartpole  # noqa: F401 - registers the environments
-from robot_envs.backends import realtime
+from cartpole.robot import CONTROLLER
+from robot_envs.backends.ros import realtime
 from robot_envs.errors import RobotEnvError, SimulatorError
 from ros_utils import ros_gazebo
 
@@ -136,7 +137,7 @@ class Realtime(unittest.TestCase):
         env.reset(seed=0)
         begin = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
         for _ in range(10):  # not env.step: where actions take long, the pole falls sooner
-            env.unwrapped.backend.act((0.0,))
+            env.unwrapped.backend.act({CONTROLLER: 0.0})
         end = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
         self.assertGreaterEqual(end - begin, 0.49)
         env.close()
@@ -145,10 +146,10 @@ class Realtime(unittest.TestCase):
         env = gymnasium.make("cartpole/Balance-v0", backend="ros-realtime", control_period=0.5)
         env.reset(seed=0)
         backend = env.unwrapped.backend
-        backend.act((0.0,))
+        backend.act({CONTROLLER: 0.0})
         begin = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
         with mock.patch.object(realtime, "STATE_TIMEOUT", 0.1):  # joint states come every 20 ms
-            backend.act((0.0,))
+            backend.act({CONTROLLER: 0.0})
         end = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
         self.assertGreaterEqual(end - begin, 0.45)
         env.close()

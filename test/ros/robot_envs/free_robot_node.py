@@ -14,8 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
 
 from pendulum import FILES, PENDULUM, Upright
 
-from robot_envs.backends.choice import make_backend
-from robot_envs.backends.session import RosSession
+from robot_envs.backends.ros.session import RosSession
 from robot_envs.environment import RobotEnv
 
 HULL = """<link name="hull">
@@ -31,7 +30,7 @@ def make_robot(folder):
     text = text.replace('<origin xyz="0 0 1"/>', '<origin xyz="0 0 0.05"/>')
     path = folder / "free.urdf"
     path.write_text(text)
-    return replace(PENDULUM, model="free", urdf_file=lambda: path)
+    return replace(PENDULUM, name="free", urdf=path)
 
 
 class FreeRobot(unittest.TestCase):
@@ -43,9 +42,8 @@ class FreeRobot(unittest.TestCase):
         pictures, places = {}, {}
         for backend in ("ros", "bullet"):
             env = RobotEnv(
-                make_backend(robot, backend, 0.01), Upright(), control_period=0.01,
-                render_mode="rgb_array", width=160, height=120,
-            )  # fmt: skip
+                robot, Upright(), backend, render_mode="rgb_array", width=160, height=120
+            )
             pictures[backend] = []
             env.reset(seed=3)
             for _ in range(4):

@@ -4,6 +4,7 @@
 import sys
 import unittest
 import xmlrpc.client
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +15,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
 
 from environment_conformance import rollout
 from gymnasium.utils.env_checker import data_equivalence as same
-from pendulum import PENDULUM, PendulumState, make_pendulum
+from pendulum import MOTOR, PENDULUM, hanging, make_pendulum
 
-from bullet_gazebo.physics.pose import Pose
-from robot_envs.backends.in_process import InProcessRobot
-from robot_envs.backends.session import RosSession
+from robot_envs.backends.in_process import InProcessWorld
+from robot_envs.backends.ros.session import RosSession
 from robot_envs.errors import RobotEnvError, SimulatorError
-from robot_envs.world_state import LinkQuery, Motion, StateQuery
+from robot_envs.scene import Scene
+from robot_envs.world_state import InitialState, LinkQuery, Motion, Pose, StateQuery
 from ros_utils import ros_gazebo
 
 BACKEND = next((argument for argument in sys.argv if argument in ("ros", "ros-realtime")), "ros")
@@ -42,21 +43,23 @@ class SecondRobot(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.said = []
-        cls.session = RosSession(
-            PENDULUM, "/learner", [], realtime=REALTIME, gui=False, seed=0, height=0.3
-        )
+        raised = replace(PENDULUM, pose=Pose((0.0, 0.0, 0.3)))
+        cls.scene = Scene([raised])
+        cls.session = RosSession(raised, "/learner", [], realtime=REALTIME, gui=False, seed=0)
         cls.addClassCleanup(cls.session.close)
         cls.session.start(cls.said.append)
         cls.simulator = simulator()
 
     def test_what_was_missing_was_started_and_told(self):
         controllers = "starting joint_state_controller, hinge_effort_controller"
-        self.assertEqual(self.said, ["starting the simulator", "spawning the robot", controllers])
+        self.assertEqual(
+            self.said, ["starting the simulator", "spawning the robot 'pendulum'", controllers]
+        )
         pose = ros_gazebo.gazebo_get_model_state("pendulum")[1]
         self.assertAlmostEqual(pose.position.z, 0.3)
 
     def test_environments_made_afterwards_use_it_and_start_nothing(self):
-        first, second = (make_pendulum(BACKEND) for _ in range(2))
+        first, second = (make_pendulum(BACKEND, self.scene.robots[0]) for _ in range(2))
         self.assertTrue(first.shares_robot)
         for env in (first, second, first):
             env.reset(seed=1)
@@ -72,17 +75,20 @@ class SecondRobot(unittest.TestCase):
         self.session.close()
         self.assertIsNone(simulator())
         with self.assertRaisesRegex(RobotEnvError, "a process becomes one only once"):
-            make_pendulum(BACKEND)
+            make_pendulum(BACKEND, self.scene.robots[0])
         self.assertIsNone(simulator())
 
 
 @unittest.skipIf(REALTIME, "time runs by itself")
 class Lockstep(SecondRobot):
     def test_the_bits_are_those_of_the_robot_in_process(self):
-        for options in ({}, {"varied": True, "noise": [0.01, 0.1], "delay": 2}):
+        for options in (
+            {},
+            {"varied": True, "sensor_noise": {"hinge": (0.01, 0.1)}, "sensor_delay": 2},
+        ):
             runs = []
             for backend in ("ros", "bullet"):
-                env = make_pendulum(backend, **options)
+                env = make_pendulum(backend, self.scene.robots[0], **options)
                 runs.append(rollout(env, 500, seed=8))
                 env.close()
             with self.subTest(options):
@@ -94,48 +100,61 @@ class Lockstep(SecondRobot):
         )
         turned = {"pendulum": Motion(Pose((0.1, -0.2, 0.4), (0.1, 0.0, 2.0, 0.3)))}
         runs = []
-        for backend in (self.session.connect(0.01), InProcessRobot(PENDULUM, 0.01, height=0.3)):
+        for backend in (self.session.connect(self.scene, 0.01), InProcessWorld(self.scene, 0.01)):
             self.addCleanup(backend.close)
-            backend.reset(PendulumState(0.0, 0.0))  # what it told before isn't told any more
+            backend.reset(InitialState())  # what it told before isn't told any more
             backend.look(query)
             run = []
-            for placed in (turned, None):
-                run.append((backend.reset(PendulumState(0.3, -0.5), placed), backend.world()))
-                run += [(backend.act((0.1 * n,)), backend.world()) for n in range(20)]
+            for placed in (turned, {}):
+                run.append(backend.reset(InitialState({"hinge": (0.3, -0.5)}, placed)))
+                run += [backend.act({MOTOR: 0.1 * n}) for n in range(20)]
             runs.append(run)
         self.assertEqual(runs[0], runs[1])
-        self.assertEqual(runs[0][-1][1].time, 0.2)
+        self.assertEqual(runs[0][-1].time, 0.2)
 
-    def test_a_question_is_answered_at_once_and_taken_back(self):
-        robot = self.session.connect(0.01)
+    def test_a_question_is_answered_from_then_on_and_taken_back(self):
+        robot = self.session.connect(self.scene, 0.01)
         self.addCleanup(robot.close)
-        robot.reset(PendulumState(0.3, 0.0))
-        self.assertEqual(robot.world().links, {})
-        robot.look(StateQuery(links=(LinkQuery("rod"),)))
-        self.assertEqual(list(robot.world().links), ["rod"])
-        robot.look(StateQuery())
-        self.assertEqual(robot.world().links, {})
-        self.assertEqual(robot.world().joints["hinge"].position, 0.3)
+        for query, links in (
+            (StateQuery(), []),
+            (StateQuery(links=(LinkQuery("rod"),)), ["rod"]),
+            (StateQuery(), []),
+        ):
+            robot.look(query)
+            states = [robot.reset(hanging(0.3)), robot.act({})]
+            self.assertEqual([list(state.links) for state in states], [links, links])
+
+    def test_an_episode_that_another_environment_has_ended_goes_no_further(self):
+        first, second = (make_pendulum("ros", self.scene.robots[0]) for _ in range(2))
+        self.addCleanup(first.close)
+        self.addCleanup(second.close)
+        action = np.zeros(1, np.float32)
+        first.reset(seed=1)
+        first.step(action)
+        second.reset(seed=2)
+        with self.assertRaisesRegex(SimulatorError, "another environment .* has moved the same"):
+            first.step(action)
+        second.step(action)
 
     def test_wrong_names_are_refused_at_once(self):
-        robot = self.session.connect(0.01)
+        robot = self.session.connect(self.scene, 0.01)
         self.addCleanup(robot.close)
         with self.assertRaisesRegex(SimulatorError, "no link 'rood'; did you mean 'rod'"):
             robot.look(StateQuery(links=(LinkQuery("rood"),)))
         with self.assertRaisesRegex(SimulatorError, "no model 'ball'"):
-            robot.reset(PendulumState(0.0, 0.0), {"ball": Motion(Pose())})
-        robot.reset(PendulumState(0.0, 0.0))
+            robot.reset(InitialState(models={"ball": Pose()}))
+        robot.reset(InitialState())
 
     def test_it_is_given_back_with_its_own_friction(self):
         def spun_down():
-            robot = self.session.connect(0.01)
-            robot.reset(PendulumState(0.0, 10.0))
-            state = robot.act((0.0,))
+            robot = self.session.connect(self.scene, 0.01)
+            robot.reset(hanging(0.0, 10.0))
+            state = robot.act({MOTOR: 0.0})
             robot.close()
             return state
 
         before = spun_down()
-        env = make_pendulum("ros", varied=True)
+        env = make_pendulum("ros", self.scene.robots[0], varied=True)
         env.reset(seed=0)
         env.close()
         self.assertEqual(spun_down(), before)
@@ -144,19 +163,26 @@ class Lockstep(SecondRobot):
 @unittest.skipUnless(REALTIME, "time moves when asked to")
 class Realtime(SecondRobot):
     def test_links_are_told_in_lock_step_only(self):
-        robot = self.session.connect(0.01)
+        robot = self.session.connect(self.scene, 0.01)
         self.addCleanup(robot.close)
         robot.look(StateQuery())
-        for call in (
-            lambda: robot.look(StateQuery(models=("pendulum",))),
-            lambda: robot.reset(PendulumState(0.0, 0.0), {"pendulum": Motion(Pose())}),
-            robot.world,
-        ):
-            with self.assertRaisesRegex(RobotEnvError, "in real time gives the joints alone"):
-                call()
+        with self.assertRaisesRegex(RobotEnvError, "in real time gives the joints alone"):
+            robot.look(StateQuery(models=("pendulum",)))
+
+    def test_models_are_placed(self):
+        robot = self.session.connect(self.scene, 0.01)
+        self.addCleanup(robot.close)
+        robot.reset(InitialState({"hinge": 0.2}, {"pendulum": Pose((0.1, 0.2, 0.5))}))
+        found = ros_gazebo.gazebo_get_model_state("pendulum")[1].position
+        self.assertEqual([round(each, 6) for each in (found.x, found.y, found.z)], [0.1, 0.2, 0.5])
+        robot.reset(InitialState())
+        found = ros_gazebo.gazebo_get_model_state("pendulum")[1].position
+        self.assertAlmostEqual(found.z, 0.3)
+        with self.assertRaisesRegex(SimulatorError, "model 'ball' can't be placed"):
+            robot.reset(InitialState(models={"ball": Pose()}))
 
     def test_without_a_control_period_it_takes_the_newest_state_and_never_repeats_itself(self):
-        env = make_pendulum("ros-realtime", control_period=None)
+        env = make_pendulum("ros-realtime", self.scene.robots[0], control_period=0.0)
         self.assertFalse(env.backend.deterministic)
         env.reset(seed=2)
         for _ in range(20):
@@ -165,12 +191,14 @@ class Realtime(SecondRobot):
         env.close()
 
     def test_a_motor_turns_it(self):
-        robot = self.session.connect(0.05)
-        robot.reset(PendulumState(0.0, 0.0))
-        states = [robot.act((0.5,)) for _ in range(4)]
+        robot = self.session.connect(self.scene, 0.05)
+        robot.reset(InitialState())
+        states = [robot.act({MOTOR: 0.5}) for _ in range(4)]
         robot.close()
-        self.assertGreater(states[-1].angle, 0.1)
-        self.assertGreater(states[-1].rate, 0.5)
+        self.assertEqual(states[-1].commands, {MOTOR: 0.5})
+        self.assertGreater(states[-1].time, 0.15)
+        self.assertGreater(states[-1].joints["hinge"].position, 0.1)
+        self.assertGreater(states[-1].joints["hinge"].velocity, 0.5)
 
 
 del SecondRobot  # a base of the two, and no test by itself

@@ -57,7 +57,7 @@ def test_flags_of_the_robot_become_options_of_its_environment() -> None:
     assert (options.run.episodes, options.run.seed, options.run.run_dir) == (5, 3, "out")
     assert options.hyperparameters.save_every == 2 and robot.rviz
     assert options.run.train_env_kwargs == {
-        "backend": "ros-realtime", "control_period": None, "noise": 0.05
+        "backend": "ros-realtime", "control_period": 0.0, "noise": 0.05
     }  # fmt: skip
     options, _ = choose(["--backend=bullet", "--train-env-kwargs=max_steps=7"], {})
     assert options.run.train_env_kwargs == {"max_steps": 7, "backend": "bullet"}

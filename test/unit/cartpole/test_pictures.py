@@ -9,9 +9,8 @@ from pictures import pixel
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.environment import CAMERA
-from cartpole.robot import ROBOT
-from cartpole.tasks import CartPoleState
-from robot_envs.picture import RobotPicture
+from cartpole.robot import CART_JOINT, POLE_JOINT, ROBOT
+from robot_envs.pictures.picture import RobotPicture
 
 WIDTH, HEIGHT = 320, 160
 HINGE = 0.18  # [m] above the ground
@@ -21,7 +20,7 @@ BLUE, ORANGE = (lambda r, g, b: b > r + 60), (lambda r, g, b: r > b + 90)
 @pytest.fixture(scope="module")
 def draw():
     picture = RobotPicture(ROBOT, WIDTH, HEIGHT, camera=CAMERA)
-    yield lambda *numbers: picture(CartPoleState(*numbers))
+    yield lambda position, angle: picture({CART_JOINT: position, POLE_JOINT: angle})
     picture.close()
 
 
@@ -34,7 +33,7 @@ def middle(picture, colour):
 @pytest.mark.parametrize("angle", [0.0, 0.2, -0.2, math.pi / 2, -1.2])
 @pytest.mark.parametrize("position", [-0.4, 0.0, 0.3])
 def test_cart_and_pole_are_where_the_state_says(draw, position, angle):
-    picture = draw(position, 0.0, angle, 0.0)
+    picture = draw(position, angle)
     x = position - 0.25 * math.sin(angle)  # a positive angle leans towards -x
     expected = pixel(CAMERA, (x, 0.0, HINGE + 0.25 * math.cos(angle)), WIDTH, HEIGHT)
     assert middle(picture, ORANGE) == pytest.approx(expected, abs=4.0)
@@ -43,7 +42,7 @@ def test_cart_and_pole_are_where_the_state_says(draw, position, angle):
 
 
 def test_a_cart_that_left_the_picture_does_no_harm(draw):
-    assert draw(1e9, 0.0, 0.0, 0.0).shape == (HEIGHT, WIDTH, 3)
+    assert draw(1e9, 0.0).shape == (HEIGHT, WIDTH, 3)
 
 
 def episode(render_mode, **options):
@@ -65,9 +64,9 @@ def test_rendering_between_steps_changes_no_bit():
 def test_the_engine_makes_no_difference_to_the_picture():
     pytest.importorskip("mujoco")
     pictures = []
-    for engine in ("bullet", "mujoco"):
+    for backend in ("bullet", "mujoco"):
         env = gymnasium.make(
-            "cartpole/Classic-v0", render_mode="rgb_array", engine=engine, width=64, height=48
+            "cartpole/Classic-v0", backend=backend, render_mode="rgb_array", width=64, height=48
         )
         env.reset(seed=2)
         pictures.append(env.render())

@@ -1,5 +1,6 @@
 """The cart-pole in a world of this process: what it is made of, resets, variations."""
 
+import dataclasses
 import math
 import subprocess
 import sys
@@ -9,12 +10,14 @@ import numpy as np
 import pytest
 from robots import CartPole
 
-from cartpole import robot
 from cartpole.robot import CONTROL_PERIOD, CONTROLLER, ROBOT
 from cartpole.tasks import CartPoleState
 from cartpole.variation import CartPoleVariation, Randomisation
-from robot_envs.backends.in_process import InProcessRobot
+from robot_envs import files
+from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.errors import RobotEnvError, SimulatorError
+from robot_envs.files import own_file
+from robot_envs.scene import Scene
 
 UPRIGHT = CartPoleState(0.0, 0.0, 0.0, 0.0)
 MOVING = CartPoleState(0.1, -0.3, 0.2, 1.5)
@@ -23,8 +26,23 @@ LIGHT = CartPoleVariation(0.9, 0.9, 1.0, 0.0, 0.0).of_robot()
 NOMINAL = CartPoleVariation().of_robot()
 
 
+class Plant:
+    """The cart-pole in a world of this process, its states as `CartPoleState`."""
+
+    def __init__(self, height=0.0, **options):
+        self._world = InProcessWorld(Scene([ROBOT]), CONTROL_PERIOD, **options)
+        self._height = height
+        self.vary, self.close = self._world.vary, self._world.close
+
+    def reset(self, state):
+        return CartPoleState.of(self._world.reset(state.to_begin(self._height)))
+
+    def act(self, set_point):
+        return CartPoleState.of(self._world.act({CONTROLLER: set_point}))
+
+
 def cartpole(**options):
-    return InProcessRobot(ROBOT, CONTROL_PERIOD, **options)
+    return Plant(**options)
 
 
 @pytest.fixture
@@ -37,7 +55,7 @@ def backend():
 def run(backend, start=MOVING, steps=100):
     return [
         backend.reset(start),
-        *(backend.act((0.1 + 0.02 * (step % 7),)) for step in range(steps)),
+        *(backend.act(0.1 + 0.02 * (step % 7)) for step in range(steps)),
     ]
 
 
@@ -48,7 +66,7 @@ def test_an_episode_starts_where_it_should_positions_and_velocities(backend):
 def test_an_episode_starts_without_a_kick(backend):
     run(backend)
     backend.reset(UPRIGHT._replace(cart_position=0.1))
-    state = backend.act((0.1,))
+    state = backend.act(0.1)
     assert state == UPRIGHT._replace(cart_position=0.1)
 
 
@@ -56,7 +74,7 @@ def test_a_free_fall_is_that_of_the_equations(backend):
     """The pole alone: the controller holds the cart against it, so only the pole's first moment counts."""
     figures, angle = CartPole(), 1e-3
     backend.reset(UPRIGHT._replace(pole_angle=angle))
-    state = backend.act((0.0,))
+    state = backend.act(0.0)
     first = figures.derivative(np.array([0.0, 0.0, angle, 0.0]))[3]
     assert state.pole_velocity == pytest.approx(first * 0.008, rel=0.2)
 
@@ -71,7 +89,7 @@ def test_an_episode_knows_nothing_of_those_before(before):
 def test_not_even_of_the_stops_that_it_hit():
     fresh, used = cartpole(), cartpole()
     used.reset(MOVING)
-    states = [used.act((2.0,)) for _ in range(300)]
+    states = [used.act(2.0) for _ in range(300)]
     assert max(state.cart_position for state in states) > 0.49
     assert run(used) == run(fresh)
 
@@ -113,7 +131,7 @@ def test_a_longer_pole_falls_slower(backend):
 def test_friction_brakes(backend):
     backend.vary(CartPoleVariation(pole_friction=0.05).of_robot())
     backend.reset(UPRIGHT._replace(pole_angle=math.pi, pole_velocity=1.0))
-    assert abs([backend.act((0.0,)) for _ in range(500)][-1].pole_velocity) < 0.05
+    assert abs([backend.act(0.0) for _ in range(500)][-1].pole_velocity) < 0.05
 
 
 def test_friction_of_the_rail_slows_the_cart(backend):
@@ -138,7 +156,7 @@ def test_a_state_that_is_not_a_number_is_an_error_and_can_be_reset(backend):
 
 def test_a_blow_up_is_contained_and_leaves_nothing_behind(backend, caplog):
     backend.reset(UPRIGHT._replace(pole_velocity=1e308))
-    assert all(np.isfinite(backend.act((0.0,))).all() for _ in range(100))
+    assert all(np.isfinite(backend.act(0.0)).all() for _ in range(100))
     assert "joint 'cart_pole' of model 'cartpole' blew up" in caplog.text
     assert run(backend) == run(cartpole())
 
@@ -169,19 +187,20 @@ def test_the_robot_is_found_from_anywhere_without_ros(tmp_path, root: Path):
 def test_files_that_are_nowhere_are_an_error_that_says_where_they_were_sought(
     tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(robot, "TREE", tmp_path)
+    monkeypatch.setattr(files, "TREE", tmp_path)
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
     with pytest.raises(RobotEnvError, match="source the workspace"):
-        ROBOT.parameters(CONTROLLER)
+        own_file("cartpole_controller", "config/joint_position_control.yaml")
 
 
 def test_also_where_there_is_no_ros_to_ask(tmp_path, monkeypatch):
-    monkeypatch.setattr(robot, "TREE", tmp_path)
+    monkeypatch.setattr(files, "TREE", tmp_path)
     monkeypatch.setitem(sys.modules, "rospkg", None)
     with pytest.raises(RobotEnvError, match="'cartpole' is neither beside"):
-        ROBOT.urdf()
+        own_file("cartpole", "urdf/cartpole.urdf.xacro")
 
 
-def test_parameters_of_an_unknown_controller_are_an_error():
-    with pytest.raises(RobotEnvError, match="has no controller 'elbow'"):
-        ROBOT.parameters("elbow")
+def test_a_controller_that_is_none_of_its_own_is_told_with_the_nearest_name():
+    other = dataclasses.replace(ROBOT, run=("stand_cart_position_controler",))
+    with pytest.raises(RobotEnvError, match=f"did you mean '{CONTROLLER}'"):
+        other.check()

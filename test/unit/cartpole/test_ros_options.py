@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from cartpole.ros_options import ros_options
-from robot_envs.backends import node
+from robot_envs.backends.ros import node
 from robot_envs.errors import RobotEnvError
 
 NOBODY = "http://127.0.0.1:1"  # refuses at once

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import torch
+from fake_plant import cartpole_world
 from gymnasium.utils.env_checker import check_env
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -33,8 +34,10 @@ def test_it_makes_an_environment_like_any_other(own_task: Any) -> None:
 
 def test_the_reward_draws_towards_the_place(own_task: Any) -> None:
     env = own_task.make(place=-0.1)
-    state = env.task.start
-    rewards = [env.task.reward(state._replace(cart_position=x)) for x in (-0.3, -0.1, 0.15, 0.4)]
+    places = [
+        cartpole_world(env.task.start._replace(cart_position=x)) for x in (-0.3, -0.1, 0.15, 0.4)
+    ]
+    rewards = [env.task.reward(state, 0) for state in places]
     assert rewards == pytest.approx([0.6, 1.0, 0.5, 0.0])
     start, _ = env.reset(seed=0)
     after, reward, *_ = env.step(0)  # towards the place

@@ -5,7 +5,7 @@ import socket
 import pytest
 from ros_fakes import FakeMaster
 
-from robot_envs.backends import node
+from robot_envs.backends.ros import node
 from robot_envs.errors import RobotEnvError
 
 

@@ -6,7 +6,7 @@ import pytest
 import rospy
 from ros_fakes import FakeMaster
 
-from robot_envs.backends.own_simulator import OwnSimulator
+from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.errors import SimulatorError, SimulatorHangs
 
 

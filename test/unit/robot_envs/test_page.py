@@ -4,12 +4,12 @@ import math
 
 import gymnasium
 import pytest
-from rover import RoverState, rover_robot
+from rover import ROVER_ROBOT
 from viser_recording import Recording
 
 import cartpole  # noqa: F401 - registers its environments
 from bullet_gazebo.physics.pose import Pose
-from robot_envs.picture import Camera, RobotPicture
+from robot_envs.pictures.picture import Camera, RobotPicture
 
 
 def shapes(nodes, kind):
@@ -42,21 +42,21 @@ def test_the_cart_pole_stands_on_the_page_and_follows_the_environment(server):
     assert (-2.0 * w * y, up) == pytest.approx(tuple(observation[2:4]), abs=1e-5)
 
 
-def test_the_page_is_seen_as_the_pictures_are(server, tmp_path):
+def test_the_page_is_seen_as_the_pictures_are(server):
     camera = Camera(target=(0.0, 0.0, 0.1), distance=2.0, yaw=0.0, pitch=0.0, view=30.0)
-    picture = RobotPicture(rover_robot(tmp_path), camera=camera, raised=0.5)
-    picture.draw_on(server, lambda: RoverState(0.0, 0.0))
+    picture = RobotPicture(ROVER_ROBOT, camera=camera)
+    picture.draw_on(server, lambda: {"neck": 0.0})
     page = server.initial_camera
-    assert page.position.tolist() == pytest.approx([0.0, -2.0, 0.6])
-    assert page.look_at.tolist() == pytest.approx([0.0, 0.0, 0.6])
+    assert page.position.tolist() == pytest.approx([0.0, -2.0, 0.1])
+    assert page.look_at.tolist() == pytest.approx([0.0, 0.0, 0.1])
     assert math.degrees(page.fov) == pytest.approx(30.0)
 
 
-def test_the_world_goes_by_a_robot_that_drives_away(server, tmp_path):
+def test_the_world_goes_by_a_robot_that_drives_away(server):
     """So whoever looks at it goes on looking at it."""
     place = [Pose((0.0, 0.0, 0.1))]
-    picture = RobotPicture(rover_robot(tmp_path), base=lambda: place[0])
-    robot = picture.draw_on(server, lambda: RoverState(0.0, 0.0))
+    picture = RobotPicture(ROVER_ROBOT, base=lambda: place[0])
+    robot = picture.draw_on(server, lambda: {"neck": 0.0})
     recording = server.get_scene_serializer()
     place[0] = Pose((7.0, -2.0, 0.1))
     robot()
@@ -67,10 +67,10 @@ def test_the_world_goes_by_a_robot_that_drives_away(server, tmp_path):
     assert found.at()["/world"]["position"] == pytest.approx([-7.0, 2.0, -0.1])
 
 
-def test_several_stand_beside_each_other_with_captions_and_are_all_seen(server, tmp_path):
-    picture = RobotPicture(rover_robot(tmp_path), camera=Camera(distance=1.0, yaw=0.0))
+def test_several_stand_beside_each_other_with_captions_and_are_all_seen(server):
+    picture = RobotPicture(ROVER_ROBOT, camera=Camera(distance=1.0, yaw=0.0))
     robots = [
-        picture.draw_on(server, lambda lean=lean: RoverState(lean, 0.0), number)
+        picture.draw_on(server, lambda lean=lean: {"neck": lean}, number)
         for number, lean in enumerate((0.0, 0.3, -0.3))
     ]
     for count, robot in enumerate(robots):

@@ -1,23 +1,16 @@
 """Pictures of robots by their state."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
-from pendulum import PENDULUM, PendulumState
-from rover import RoverState, rover_robot
+from pendulum import PENDULUM
+from rover import ROVER_ROBOT
 
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from robot_envs.errors import RobotEnvError
-from robot_envs.picture import RobotPicture
-from robot_envs.robot import Robot
-
-
-@pytest.fixture
-def rover(tmp_path: Path) -> Robot[RoverState]:
-    return rover_robot(tmp_path)
+from robot_envs.pictures.picture import RobotPicture
 
 
 def where(picture: np.ndarray, channel: int) -> np.ndarray:
@@ -31,7 +24,7 @@ def where(picture: np.ndarray, channel: int) -> np.ndarray:
 def test_a_robot_is_drawn_as_its_state_says():
     """To the left and to the right of its hinge; whole, wherever it points."""
     picture = RobotPicture(PENDULUM, 200, 200)
-    drawn = [picture(PendulumState(angle, 0.0)).astype(int) for angle in (-1.57, 1.57, 0.0, 3.14)]
+    drawn = [picture({"hinge": angle}).astype(int) for angle in (-1.57, 1.57, 0.0, 3.14)]
     picture.close()
     assert all(each.shape == (200, 200, 3) for each in drawn)
     left, right, up, down = (np.abs(each - np.minimum.reduce(drawn)).sum(axis=-1) for each in drawn)
@@ -41,25 +34,28 @@ def test_a_robot_is_drawn_as_its_state_says():
         assert (border.min(axis=-1) > 180).all()  # sky and ground: nothing is cut off
 
 
-def test_the_camera_follows_what_drives_away(rover):
+def test_the_camera_follows_what_drives_away():
     place = [Pose((0.0, 0.0, 0.1))]
-    picture = RobotPicture(rover, 160, 120, base=lambda: place[0])
-    here = picture(RoverState(0.0, 0.0))
+    picture = RobotPicture(ROVER_ROBOT, 160, 120, base=lambda: place[0])
+    here = picture({"neck": 0.0})
     place[0] = Pose((7.23, -2.98, 0.1))
-    there = picture(RoverState(0.0, 0.0))
+    there = picture({"neck": 0.0})
     assert where(there, 0) == pytest.approx(where(here, 0), abs=0.5)
     assert not np.array_equal(here, there)  # the ground goes by
-    leaning = picture(RoverState(0.5, 0.0))
+    leaning = picture({"neck": 0.5})
     assert where(leaning, 1)[0] > where(there, 1)[0] + 2
     assert where(leaning, 0) == pytest.approx(where(here, 0), abs=1.0)
     picture.close()
 
 
-def test_a_camera_of_ones_own_looks_where_it_should(rover):
+def test_a_camera_of_ones_own_looks_where_it_should():
     camera = Camera(target=(0.0, 0.0, 0.0), distance=2.0, yaw=0.0, pitch=0.0)
-    low, high = (RobotPicture(rover, 160, 120, camera=camera, raised=z) for z in (0.0, 0.7))
-    assert where(low(RoverState(0.0, 0.0)), 0) == pytest.approx((80.0, 60.0), abs=4)
-    assert where(high(RoverState(0.0, 0.0)), 0) == pytest.approx((80.0, 60.0), abs=4)
+    low, high = (
+        RobotPicture(ROVER_ROBOT, 160, 120, camera=camera, base=base)
+        for base in (None, lambda: Pose((0.0, 0.0, 0.7)))
+    )
+    assert where(low({"neck": 0.0}), 0) == pytest.approx((80.0, 60.0), abs=4)
+    assert where(high({"neck": 0.0}), 0) == pytest.approx((80.0, 60.0), abs=4)
     low.close()
     high.close()
 
@@ -73,7 +69,7 @@ def test_sizes_that_no_picture_has_are_refused_at_once(size):
 def test_a_file_that_cannot_be_read_is_an_error_of_one_line(tmp_path):
     path = tmp_path / "broken.urdf"
     path.write_text("<robot name='x'><link/></robot>")
-    picture = RobotPicture(dataclasses.replace(PENDULUM, urdf_file=lambda: path))
+    picture = RobotPicture(dataclasses.replace(PENDULUM, name="pendulum", urdf=path))
     with pytest.raises(RobotEnvError, match="the robot 'pendulum'"):
-        picture(PendulumState(0.0, 0.0))
+        picture({"hinge": 0.0})
     picture.close()

@@ -1,6 +1,7 @@
 """A robot of one joint with an effort controller, through all of robot_envs, which knows no cart-pole."""
 
 import dataclasses
+import math
 import subprocess
 import sys
 
@@ -9,27 +10,44 @@ import pytest
 from environment_conformance import rollout
 from gymnasium.utils.env_checker import check_env
 from gymnasium.utils.env_checker import data_equivalence as same
-from pendulum import FILES, PENDULUM, STRONGEST, PendulumState, make_pendulum
+from pendulum import FILES, MOTOR, PENDULUM, STRONGEST, hanging, make_pendulum
 
-from robot_envs.backends.in_process import InProcessRobot
+from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.errors import RobotEnvError
+from robot_envs.scene import Scene
 from robot_envs.variation import LinkScale, Variation
 from robot_envs.vector.environment import RobotVectorEnv
+from robot_envs.world_state import Pose
 
 MASS, LENGTH, DAMPING, GRAVITY = 0.5, 0.4, 0.01, 9.8  # kg, m, N m s/rad, m/s²
 INERTIA = MASS * LENGTH**2 / 3.0  # [kg m²] of the rod about its hinge
 PERIOD = 0.01  # [s]
+NOISY = {"sensor_noise": {"hinge": (0.01, 0.1)}, "sensor_delay": 1}
+
+
+class Plant:
+    """The pendulum in a world of this process; tells its hinge alone."""
+
+    def __init__(self):
+        self._world = InProcessWorld(Scene([PENDULUM]), PERIOD)
+        self.vary, self.close = self._world.vary, self._world.close
+
+    def reset(self, angle, rate=0.0):
+        return self._world.reset(hanging(angle, rate)).joints["hinge"]
+
+    def act(self, torque):
+        return self._world.act({MOTOR: torque}).joints["hinge"]
 
 
 @pytest.fixture
 def backend():
-    made = InProcessRobot(PENDULUM, PERIOD)
+    made = Plant()
     yield made
     made.close()
 
 
 def test_gymnasiums_checker_has_nothing_to_say(recwarn):
-    env = make_pendulum(noise=[0.01, 0.1], delay=1, varied=True)
+    env = make_pendulum(varied=True, **NOISY)
     check_env(env, skip_render_check=True)
     env.close()
     assert [str(warning.message) for warning in recwarn] == []
@@ -37,25 +55,25 @@ def test_gymnasiums_checker_has_nothing_to_say(recwarn):
 
 def test_it_moves_as_the_equations_say(backend):
     """From upright by its motor, and let go hanging on its side; to the first order of a period."""
-    pushed = [backend.reset(PendulumState(0.0, 0.0)), backend.act((0.3,))][-1]
-    assert pushed.rate == pytest.approx(0.3 / INERTIA * PERIOD, rel=0.02)
-    backend.reset(PendulumState(np.pi / 2, 0.0))
-    falling = backend.act((0.0,))
+    pushed = [backend.reset(0.0, 0.0), backend.act(0.3)][-1]
+    assert pushed.velocity == pytest.approx(0.3 / INERTIA * PERIOD, rel=0.02)
+    backend.reset(np.pi / 2, 0.0)
+    falling = backend.act(0.0)
     weight = MASS * GRAVITY * LENGTH / 2
-    assert falling.rate == pytest.approx(weight / INERTIA * PERIOD, rel=0.02)
-    turning = [backend.reset(PendulumState(0.0, 10.0)), backend.act((0.0,))][-1]
+    assert falling.velocity == pytest.approx(weight / INERTIA * PERIOD, rel=0.02)
+    turning = [backend.reset(0.0, 10.0), backend.act(0.0)][-1]
     lost = DAMPING * 10.0 / INERTIA * PERIOD
-    gained = weight * np.sin(turning.angle / 2) / INERTIA * PERIOD
-    assert turning.rate == pytest.approx(10.0 - lost + gained, abs=0.1 * lost)
+    gained = weight * np.sin(turning.position / 2) / INERTIA * PERIOD
+    assert turning.velocity == pytest.approx(10.0 - lost + gained, abs=0.1 * lost)
 
 
 def test_friction_comes_on_top_of_the_joints_own_and_goes_again(backend):
-    start, rates = PendulumState(0.0, 10.0), []
+    rates = []
     heavier = Variation({"rod": LinkScale()}, {"hinge": DAMPING})
     for variation in (heavier.undone, heavier, heavier.undone):
         backend.vary(variation)
-        backend.reset(start)
-        rates.append(backend.act((0.0,)).rate)
+        backend.reset(0.0, 10.0)
+        rates.append(backend.act(0.0).velocity)
     lost = DAMPING * 10.0 / INERTIA * PERIOD
     assert rates[0] - rates[1] == pytest.approx(lost, rel=0.1)
     assert rates[2] == rates[0]
@@ -63,23 +81,23 @@ def test_friction_comes_on_top_of_the_joints_own_and_goes_again(backend):
 
 def test_a_rod_of_another_mass_and_length_moves_as_its_figures_say(backend):
     backend.vary(Variation({"rod": LinkScale(mass=2.0, length=0.5)}))
-    backend.reset(PendulumState(0.0, 0.0))
-    assert backend.act((0.3,)).rate == pytest.approx(0.3 / (INERTIA / 2) * PERIOD, rel=0.02)
+    backend.reset(0.0, 0.0)
+    assert backend.act(0.3).velocity == pytest.approx(0.3 / (INERTIA / 2) * PERIOD, rel=0.02)
 
 
 def test_the_strongest_action_is_what_the_task_makes_of_it():
-    env, robot = make_pendulum(), InProcessRobot(PENDULUM, PERIOD)
+    env, robot = make_pendulum(), Plant()
     env.task.noise = 0.0
     env.reset(seed=0)
     observation, *_ = env.step(np.ones(1, np.float32))
-    robot.reset(PendulumState(0.0, 0.0))
-    assert observation[2] == np.float32(robot.act((STRONGEST,)).rate)
+    robot.reset(0.0, 0.0)
+    assert observation[2] == np.float32(robot.act(STRONGEST).velocity)
     env.close()
     robot.close()
 
 
 def test_many_give_what_each_gives_alone():
-    options = {"noise": 0.01, "varied": True}
+    options = {"sensor_noise": 0.01, "varied": True}
     alone = []
     for seed in (3, 4, 5):
         env = make_pendulum(**options)
@@ -98,14 +116,14 @@ def test_many_give_what_each_gives_alone():
 def test_on_mujoco_it_moves_nearly_the_same():
     runs = []
     for engine in ("bullet", "mujoco"):
-        env = make_pendulum(engine=engine)
+        env = make_pendulum(engine)
         runs.append(np.array([row[0] for row in rollout(env, 10, seed=2)[1:]]))
         env.close()
     assert 0.0 < np.abs(runs[0] - runs[1]).max() < 1e-3
 
 
 def test_the_same_seed_gives_the_same_bits():
-    env = make_pendulum(noise=0.01, delay=2, varied=True)
+    env = make_pendulum(varied=True, sensor_noise=0.01, sensor_delay=2)
     first, again = (rollout(env, 300, seed=6) for _ in range(2))
     env.close()
     assert all(same(a, b, exact=True) for a, b in zip(first, again, strict=True))
@@ -129,49 +147,29 @@ def test_nothing_of_the_cart_pole_nor_of_ros_is_loaded():
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"joints": ("elbow",)}, "joint 'elbow' has no transmission"),
-        ({"controllers": ("wrist",), "commanded": ()}, "has no controller 'wrist'"),
+        ({"run": ("wrist",)}, "there is no controller 'wrist'"),
+        ({"run": ("hinge_effort_controler",)}, f"did you mean '{MOTOR}'"),
+        ({"commanded": ("wrist",)}, "'wrist' is commanded, but not among the controllers that run"),
+        ({"urdf": FILES / "nowhere.urdf"}, "can't read .*nowhere.urdf"),
+        ({"urdf": FILES / "pendulum.yaml"}, "can't read .*pendulum.yaml: syntax error"),
+        ({"controllers": FILES / "nowhere.yaml"}, "nowhere.yaml: it can't be read: No such file"),
+        ({"controllers": FILES / "pendulum.urdf"}, "pendulum.urdf"),
+        ({"urdf": "package://no_such_package/arm.urdf"}, "no package 'no_such_package'"),
+        ({"pose": Pose((math.nan, 0.0, 0.0))}, "its pose isn't finite"),
         (
-            {"controllers": ("hinge_group_controller",), "commanded": ("hinge_group_controller",)},
-            "doesn't take single numbers",
+            {"urdf": (FILES / "pendulum.urdf").read_text().replace("transmission", "nothing")},
+            "its URDF has no <transmission>",
         ),
-        ({"urdf_file": lambda: FILES / "nowhere.urdf"}, "can't read .*nowhere.urdf"),
-        (
-            {"urdf_file": lambda: FILES / "pendulum.yaml"},
-            "can't read .*pendulum.yaml: syntax error",
-        ),
-        (
-            {"parameters_file": lambda: FILES / "nowhere.yaml"},
-            "nowhere.yaml: it can't be read: No such file",
-        ),
-        ({"parameters_file": lambda: FILES / "pendulum.urdf"}, "pendulum.urdf"),
     ],
 )
 def test_a_description_that_cannot_work_is_an_error_that_says_what_to_mend(changes, text):
     with pytest.raises(RobotEnvError, match=text):
-        InProcessRobot(dataclasses.replace(PENDULUM, **changes), PERIOD)
-
-
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"joints": ("hinge", "elbow")}, "PendulumState has the numbers angle, rate"),
-        ({"commanded": ("wrist",)}, "commanded, but not among the controllers: wrist"),
-    ],
-)
-def test_names_that_do_not_go_together_are_refused_at_once(changes, text):
-    with pytest.raises(ValueError, match=text):
-        dataclasses.replace(PENDULUM, **changes)
-
-
-def test_a_robot_for_this_process_only_says_so_over_ros():
-    with pytest.raises(RobotEnvError, match="'pendulum' doesn't say how it comes up over ROS"):
-        _ = dataclasses.replace(PENDULUM, ros=None).over_ros
+        make_pendulum(robot=dataclasses.replace(PENDULUM, **changes))
 
 
 def test_there_is_no_window_that_nobody_has_described():
     env = make_pendulum()
     assert env.metadata == {"render_modes": ["rgb_array"], "render_fps": 100}
-    with pytest.raises(ValueError, match="render_mode is \"rgb_array\", not 'human'"):
-        type(env)(env.backend, env.task, control_period=0.01, render_mode="human")
     env.close()
+    with pytest.raises(ValueError, match="render_mode is \"rgb_array\", not 'human'"):
+        make_pendulum(render_mode="human")

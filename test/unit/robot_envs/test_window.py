@@ -4,11 +4,11 @@ import time
 
 import pybullet
 import pytest
-from pendulum import PENDULUM, PendulumState
+from pendulum import PENDULUM
 
-from robot_envs import window
 from robot_envs.errors import RobotEnvError
-from robot_envs.window import Window
+from robot_envs.pictures import window
+from robot_envs.pictures.window import Window
 
 CAMERA = (1.0, 0.0, 0.0, (0.0, 0.0, 0.0))
 
@@ -25,8 +25,8 @@ def shown(monkeypatch):
 def test_the_joints_stand_where_the_state_says_at_the_pace_of_real_time(shown):
     begin = time.monotonic()
     for angle in (0.1, 0.2, 0.3):
-        shown.show(PendulumState(angle, 5.0))
-        joint = shown._joints[0]
+        shown.show({"hinge": angle})
+        joint = shown._joints["hinge"]
         assert pybullet.getJointState(shown._body, joint, shown._client)[0] == angle
     assert time.monotonic() - begin >= 0.1
 
@@ -34,4 +34,4 @@ def test_the_joints_stand_where_the_state_says_at_the_pace_of_real_time(shown):
 def test_a_window_that_was_closed_is_an_error(shown):
     pybullet.disconnect(shown._client)
     with pytest.raises(RobotEnvError, match="the window was closed"):
-        shown.show(PendulumState(0.0, 0.0))
+        shown.show({"hinge": 0.0})

@@ -3,12 +3,13 @@
 import math
 
 import pytest
-from pendulum import PENDULUM, PendulumState
+from pendulum import MOTOR, PENDULUM, hanging
 
 from bullet_gazebo.physics.pose import Pose
-from robot_envs.backends.in_process import InProcessRobot
+from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.errors import SimulatorError
-from robot_envs.world_state import LinkQuery, Motion, StateQuery
+from robot_envs.scene import Scene
+from robot_envs.world_state import InitialState, LinkQuery, Motion, StateQuery
 
 HINGE, PERIOD = 1.0, 0.01  # [m] above the model, [s]
 ROD = StateQuery(links=(LinkQuery("rod"),), models=("pendulum",), all_contacts=True)
@@ -16,64 +17,58 @@ ROD = StateQuery(links=(LinkQuery("rod"),), models=("pendulum",), all_contacts=T
 
 @pytest.fixture
 def backend():
-    made = InProcessRobot(PENDULUM, PERIOD)
+    made = InProcessWorld(Scene([PENDULUM]), PERIOD)
     yield made
     made.close()
 
 
 def test_joints_and_time_are_told_without_a_question(backend):
-    state = backend.reset(PendulumState(0.3, -0.5))
-    world = backend.world()
-    assert (world.time, world.joints) == (0.0, {"hinge": (state.angle, state.rate, 0.0)})
-    assert (world.links, world.models, world.contacts) == ({}, {}, [])
-    state = backend.act((0.2,))
-    world = backend.world()
+    world = backend.reset(hanging(0.3, -0.5))
+    assert (world.time, world.joints) == (0.0, {"hinge": (0.3, -0.5, 0.0)})
+    assert (world.links, world.models, world.contacts) == ({}, {}, ())
+    assert world.commands == {MOTOR: 0.0}
+    world = backend.act({MOTOR: 0.2})
     assert world.time == PERIOD
-    assert world.joints["hinge"] == (state.angle, state.rate, 0.2)
-    backend.reset(PendulumState(0.0, 0.0))
-    assert backend.world().time == 0.0
+    assert world.joints["hinge"].effort == 0.2 and world.commands == {MOTOR: 0.2}
+    assert backend.act({}).joints["hinge"].effort == 0.2, "who isn't commanded keeps its own"
+    assert backend.reset(hanging(0.0)).time == 0.0
 
 
 def test_links_and_models_are_told_when_asked_for(backend):
     backend.look(ROD)
-    state = backend.reset(PendulumState(0.3, -0.5))
+    world = backend.reset(hanging(0.3, -0.5))
     for _ in range(2):
-        world = backend.world()
-        rod = world.links["rod"]
+        hinge, rod = world.joints["hinge"], world.links["rod"]
         assert rod.pose.position == pytest.approx((0.0, 0.0, HINGE), abs=1e-6)
-        half = (0.0, math.sin(state.angle / 2), 0.0, math.cos(state.angle / 2))
+        half = (0.0, math.sin(hinge.position / 2), 0.0, math.cos(hinge.position / 2))
         assert rod.pose.orientation == pytest.approx(half, abs=1e-6)
-        assert rod.twist[1] == pytest.approx((0.0, state.rate, 0.0), abs=1e-6)
+        assert rod.twist[1] == pytest.approx((0.0, hinge.velocity, 0.0), abs=1e-6)
         assert world.models["pendulum"].pose == Pose()
         assert world.contacts == []
-        state = backend.act((0.1,))
+        world = backend.act({MOTOR: 0.1})
 
 
 def test_a_model_is_placed_for_the_episode(backend):
     """An orientation needn't have the length of 1, as over ROS."""
     backend.look(ROD)
-    backend.reset(
-        PendulumState(0.0, 0.0), {"pendulum": Motion(Pose((1.0, 2.0, 0.0), (0.0, 0.0, 2.0, 0.0)))}
-    )
-    world = backend.world()
-    assert world.models["pendulum"].pose.position == pytest.approx((1.0, 2.0, 0.0))
-    assert world.links["rod"].pose.position == pytest.approx((1.0, 2.0, HINGE), abs=1e-6)
-    back = world.links["rod"].seen_from(world.models["pendulum"]).pose
-    assert back.position == pytest.approx((0.0, 0.0, HINGE), abs=1e-6)
-    assert back.orientation == pytest.approx((0.0, 0.0, 0.0, 1.0), abs=1e-6)
-    backend.reset(PendulumState(0.0, 0.0))
-    assert backend.world().models["pendulum"].pose == Pose()
+    turned = Pose((1.0, 2.0, 0.0), (0.0, 0.0, 2.0, 0.0))
+    for placed in (turned, Motion(turned)):
+        world = backend.reset(InitialState(models={"pendulum": placed}))
+        assert world.models["pendulum"].pose.position == pytest.approx((1.0, 2.0, 0.0))
+        assert world.links["rod"].pose.position == pytest.approx((1.0, 2.0, HINGE), abs=1e-6)
+        back = world.links["rod"].seen_from(world.models["pendulum"]).pose
+        assert back.position == pytest.approx((0.0, 0.0, HINGE), abs=1e-6)
+        assert back.orientation == pytest.approx((0.0, 0.0, 0.0, 1.0), abs=1e-6)
+        assert backend.reset(InitialState()).models["pendulum"].pose == Pose()
 
 
 def test_asking_changes_no_bit(backend):
     runs = []
     for query in (StateQuery(), ROD):
         backend.look(query)
-        run = [backend.reset(PendulumState(0.1, 0.2))]
-        for step in range(50):
-            run.append(backend.act((0.1 * math.sin(step),)))
-            backend.world()
-        runs.append(run)
+        run = [backend.reset(hanging(0.1, 0.2))]
+        run += [backend.act({MOTOR: 0.1 * math.sin(step)}) for step in range(50)]
+        runs.append([(state.time, state.joints) for state in run])
     assert runs[0] == runs[1]
 
 
@@ -89,6 +84,7 @@ def test_wrong_names_are_refused_at_once_and_the_old_question_stays(backend):
     with pytest.raises(ValueError, match="links names 'rod' twice"):
         backend.look(StateQuery(links=(LinkQuery("rod"), LinkQuery("rod", "rod"))))
     with pytest.raises(SimulatorError, match="no model 'ball'"):
-        backend.reset(PendulumState(0.0, 0.0), {"ball": Motion(Pose())})
-    backend.reset(PendulumState(0.0, 0.0))
-    assert list(backend.world().links) == ["rod"]
+        backend.reset(InitialState(models={"ball": Pose()}))
+    with pytest.raises(ValueError, match="no joint 'hing' to place; did you mean 'hinge'"):
+        backend.reset(InitialState({"hing": 0.1}))
+    assert list(backend.reset(InitialState()).links) == ["rod"]

@@ -94,7 +94,7 @@ class LockstepWorld:
             if isinstance(command, float):
                 numbers.append(command)
             else:
-                numbers += command  # type: ignore[arg-type]
+                numbers += command
         self._advance.controllers = [self._full[name] for name in commands]
         self._advance.commands = numbers
         self._held = {**self._held, **commands}
