@@ -59,7 +59,7 @@ class WorldState(NamedTuple):
     |---|---|
     | `time` | simulated time since the reset [s] |
     | `joints` | those with a transmission, by name; as "model::joint" where a world has several robots |
-    | `commands` | what each controller that is commanded holds, by its name: a number, or a tuple for a group |
+    | `commands` | what each commanded controller holds, by its name: a number, or a tuple for a group |
     | `links` | those that the task's query names, by that name; each in the frame asked for |
     | `models` | those that the query names, in the world |
     | `contacts` | of the last physics step, as the query names them; none right after a reset |
