@@ -108,7 +108,8 @@ class BalanceTask(CartPoleTask):
 
     def observe(self, state: WorldState) -> np.ndarray:
         """The state as the learner sees it: float32, shape (4,), in the order of `CartPoleState`."""
-        return np.array(CartPoleState.of(state), dtype=np.float32)
+        cart, pole = state.joints[CART_JOINT], state.joints[POLE_JOINT]
+        return np.array((*cart[:2], *pole[:2]), dtype=np.float32)
 
     def is_terminal(self, state: WorldState) -> bool:
         """Whether the cart or the pole has left its range."""

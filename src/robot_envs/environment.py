@@ -107,11 +107,12 @@ class RobotEnv(gymnasium.Env[Any, Any]):
             raise ValueError(f"max_steps must be at least 1, not {self.max_steps}")
         self.action_space = task.action_space()
         self._read_action = action_reader(self.action_space)
-        self._task_space = task.observation_space()
-        self._read = observation_reader(self._task_space, type(task).__name__)
-        self.observation_space = self._task_space
+        space = task.observation_space()
+        self._read = observation_reader(space, type(task).__name__)
+        self.observation_space = space
+        self._aimed = isinstance(task, GoalTask)
         if isinstance(task, GoalTask):
-            self.observation_space = _with_goals(task, self._task_space)
+            self.observation_space = _goal_space(task, space)
             self.compute_reward = task.compute_reward  # environments without goals have none
         self._sensor = _sensor(self.scene, sensor_noise, sensor_delay)
         self._randomisation = randomisation
@@ -128,6 +129,8 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         self._window = window(shown) if window and render_mode == "human" else None
         self._spec: EnvSpec | None = None
         self._state: WorldState | None = None
+        self._commands = self.scene.commands
+        self._first: dict[str, Any] = {}  # to be commanded with an episode's first action
         self._initial = InitialState()
         self._steps: int | None = None  # None: no episode is under way
         made = backend is None or isinstance(backend, str)
@@ -179,17 +182,20 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         drawn = self.task.initial_state(self.np_random)
         self._initial = initial = options.get("initial_state", drawn)
         state = self.backend.reset(initial)
-        if initial.commands:
-            held = {**state.commands, **self.scene.commands(initial.commands)}
-            state = state._replace(commands=held)
+        self._first = self._commands(initial.commands)
+        if self._first:
+            state = state._replace(commands={**state.commands, **self._first})
         self._state = state
         if isinstance(self.task, GoalTask):
             self._aim(self.task, state, options.get("goal"))
-        seen = state if self._sensor is None else self._sensor.begin(state, self.np_random)
-        observation = self._observation(seen)
+        measured = state if self._sensor is None else self._sensor.begin(state, self.np_random)
+        seen = self._read(self.task.observe(measured))
         self._steps = 0
-        self._show(state)
-        return observation, {**self.task.info(state), **info}
+        if self._window is not None:
+            self._window.show(self._positions())
+        if self._aimed:
+            seen = self._with_goals(seen, measured)
+        return seen, {**self.task.info(state), **info}
 
     def _known_options(self, options: dict[str, Any]) -> dict[str, Any]:
         for name in options:
@@ -232,36 +238,36 @@ class RobotEnv(gymnasium.Env[Any, Any]):
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         task = self.task
         action = self._read_action(action)
-        commands = self.scene.commands(task.apply(action, self._state))
-        if self._steps == 0 and self._initial.commands:
-            commands = {**self.scene.commands(self._initial.commands), **commands}
+        commands = self._commands(task.apply(action, self._state))
+        if self._first:  # what the controllers held until now goes along
+            commands = {**self._first, **commands}
+            self._first = {}
         self._state = state = self.backend.act(commands)
         self._steps += 1
         terminated = bool(task.is_terminal(state))
         truncated = not terminated and self._steps == self.max_steps
         if terminated or truncated:
             self._steps = None
-        seen = state if self._sensor is None else self._sensor.measure(state, self.np_random)
-        self._show(state)
+        measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)
+        if self._window is not None:
+            self._window.show(self._positions())
         reward = float(task.reward(state, action))
         if not math.isfinite(reward):
             raise ValueError(f"{type(task).__name__}.reward() returned {reward}")
-        return self._observation(seen), reward, terminated, truncated, task.info(state)
+        seen = self._read(task.observe(measured))
+        if self._aimed:
+            seen = self._with_goals(seen, measured)
+        return seen, reward, terminated, truncated, task.info(state)
 
-    def _observation(self, state: WorldState) -> Any:
-        seen, task = self._read(self.task.observe(state)), self.task
-        if not isinstance(task, GoalTask):
-            return seen
-        achieved = np.asarray(task.achieved(state), task.desired.dtype)
+    def _with_goals(self, seen: Any, state: WorldState) -> dict[str, Any]:
+        """An observation beside the goal that the state achieves, and that of the episode."""
+        desired = self.task.desired  # type: ignore[attr-defined]  # of a GoalTask
+        achieved = self.task.achieved(state)  # type: ignore[attr-defined]
         return {
             "observation": seen,
-            "achieved_goal": achieved,
-            "desired_goal": task.desired.copy(),
+            "achieved_goal": np.asarray(achieved, desired.dtype),
+            "desired_goal": desired.copy(),
         }
-
-    def _show(self, state: WorldState) -> None:
-        if self._window is not None:
-            self._window.show(self._positions())
 
     def _positions(self) -> dict[str, float]:
         """Of the joints [rad, m], of the first robot, by plain name."""
@@ -337,7 +343,7 @@ def _sensor(scene: Scene, noise: Any, delay: int) -> Sensor | None:
     return None if sensor.is_exact else sensor
 
 
-def _with_goals(task: GoalTask, space: gymnasium.Space[Any]) -> gymnasium.Space[Any]:
+def _goal_space(task: GoalTask, space: gymnasium.Space[Any]) -> gymnasium.Space[Any]:
     return gymnasium.spaces.Dict(
         {"observation": space, "achieved_goal": task.goals(), "desired_goal": task.goals()}
     )

@@ -92,6 +92,9 @@ class Scene:
         """
         found: dict[str, float | tuple[float, ...]] = {}
         for name, value in given.items():
+            if type(value) is float and name in self._singles and math.isfinite(value):
+                found[name] = value  # nearly always
+                continue
             port = self._port(name)
             if port.single:
                 number = found[name] = float(value)  # type: ignore[arg-type]
@@ -105,6 +108,11 @@ class Scene:
                 )
                 raise ValueError(f"the command of '{name}' must be {wanted}, not {value}")
         return found
+
+    @cached_property
+    def _singles(self) -> frozenset[str]:
+        """Controllers that take one number."""
+        return frozenset(name for name, (_, port) in self.ports.items() if port.single)
 
     def _port(self, name: str) -> CommandPort:
         found = self.ports.get(name)

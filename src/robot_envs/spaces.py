@@ -87,8 +87,9 @@ def _numbers_reader(space: gymnasium.spaces.Box, task: str) -> Callable[[Any], n
             raise ValueError(
                 f"{task}.observe() returned the shape {array.shape}; its observation_space has {shape}"
             )
-        finite = all(map(math.isfinite, array.tolist())) if few else np.isfinite(array).all()
-        if not finite:
+        if few and math.isfinite(sum(array.tolist())):  # which is quicker, for few numbers
+            return array
+        if not np.isfinite(array).all():
             raise ValueError(f"{task}.observe() returned numbers that aren't finite: {array}")
         return array
 
