@@ -14,6 +14,7 @@ import rospy
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros import bring_up, node
 from robot_envs.backends.ros.bring_up import STEP_SERVICE, Say, Undo
+from robot_envs.backends.ros.objects import Objects
 from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.backends.ros.rviz import check_rviz, open_rviz
 from robot_envs.backends.ros.turn import Turn
@@ -62,7 +63,8 @@ class RosSession:
         curves: Path | None = None,
     ) -> None:
         self._scene = Scene([robots] if isinstance(robots, Robot) else robots)
-        self._turn = Turn()
+        self._objects = Objects()
+        self._turn = Turn(self._objects)
         self._name = name
         self._argv = argv
         self._realtime = realtime
@@ -100,7 +102,7 @@ class RosSession:
         if self._curves is not None:
             self._undo.callback(show_curves(self._curves))
         changes = bring_up.bring_up(self._scene, say)
-        self._undo_at_living_simulator(changes)
+        self._undo_at_living_simulator([*changes, lambda: self._objects(())])
         if self._gui and not own and is_open():
             tell_open(say)
         elif self._gui:
@@ -121,7 +123,7 @@ class RosSession:
         """A connection of its own to the robots; whoever asks for it closes it.
 
         Args:
-            scene: the session's robots, and objects, which are spawned where they aren't there.
+            scene: the session's robots, and objects, which are in the world while it is this one's turn.
             control_period: simulated time [s] of one action; in real time 0 takes the newest
                 joint state without waiting for another one.
 
@@ -130,8 +132,6 @@ class RosSession:
             RobotEnvError: if the simulator doesn't answer, or an object can't be spawned.
         """
         ticks = ticks_per_action(control_period, _physics_step()) if control_period else 0
-        changes = bring_up.bring_objects(scene.objects)
-        self._undo_at_living_simulator(changes)
         if self._realtime:
             from robot_envs.backends.ros.realtime import RealtimeWorld
 
