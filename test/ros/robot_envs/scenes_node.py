@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Two arms with a ball, or a rover with a crate, over ROS in lock-step: the bits are those in-process."""
+"""Over ROS in lock-step, one after the other in one process: two arms with a ball, a rover with a crate."""
 
 import sys
 import tempfile
@@ -15,11 +15,8 @@ from scenes.rollout import rollout, same
 from scenes.rover import ROVER, Push
 from scenes.two_arms import LEFT, RIGHT, Volley
 
-from robot_envs import InitialState, Pose, RobotEnv, SimulatorError
+from robot_envs import InitialState, Pose, RobotEnv, RobotEnvError, SimulatorError
 from robot_envs.backends.ros import bring_up
-
-NAME = next((argument for argument in sys.argv if argument in ("arms", "rover")), "arms")
-ROBOTS = [LEFT, RIGHT] if NAME == "arms" else [ROVER]
 
 
 def models():
@@ -27,22 +24,13 @@ def models():
     return set(bring_up.models())
 
 
-class Scenes(unittest.TestCase):
-    """All environments of the process share one simulator, which the first one starts."""
-
-    @classmethod
-    def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(folder.cleanup)
-        cls.folder = Path(folder.name)
+class Scenes:
+    """The tests. All environments of the same robots share one simulator, which the first one starts."""
 
     def make(self, backend="ros", task=None):
-        made = RobotEnv(ROBOTS, task or self.task(), backend=backend)
+        made = RobotEnv(self.robots, task or self.task(), backend=backend)
         self.addCleanup(made.close)
         return made
-
-    def task(self):
-        return Volley(self.folder) if NAME == "arms" else Push()
 
     def test_the_bits_are_those_of_the_world_in_process(self):
         over_ros, here = self.make(), self.make("bullet")
@@ -89,13 +77,35 @@ class Scenes(unittest.TestCase):
         env = self.make()
         with self.assertRaisesRegex(SimulatorError, "no model 'bxll'"):
             env.reset(options={"initial_state": InitialState(models={"bxll": Pose()})})
-        near = ROBOTS[0].joints[0]
-        wrong = near[:-1] if NAME == "rover" else f"left::{near[:-1]}"
-        with self.assertRaisesRegex(
-            ValueError, f"no joint '{wrong}' to place; did you mean '{wrong}"
-        ):
-            env.reset(options={"initial_state": InitialState(joints={wrong: 0.0})})
+        near = next(iter(env.scene.joints))
+        with self.assertRaisesRegex(ValueError, f"to place; did you mean '{near}'"):
+            env.reset(options={"initial_state": InitialState(joints={near[:-1]: 0.0})})
+
+
+class Arms(Scenes, unittest.TestCase):
+    robots = (LEFT, RIGHT)
+
+    def task(self):
+        folder = self.enterContext(tempfile.TemporaryDirectory())
+        return Volley(Path(folder))
+
+
+class Rover(Scenes, unittest.TestCase):
+    """After the arms: their simulator, whose world is another one, has ended."""
+
+    robots = (ROVER,)
+
+    def task(self):
+        return Push()
+
+    def test_other_robots_have_to_wait_until_environments_are_closed(self):
+        first = self.make()
+        first.reset(seed=0)
+        other = replace(ROVER, name="other")
+        with self.assertRaisesRegex(RobotEnvError, r"of 'rover' is open; close\(\) it first"):
+            RobotEnv(other, Push(), "ros")
+        first.step(first.action_space.sample())
 
 
 if __name__ == "__main__":
-    rostest.rosrun("cartpole", f"scenes_{NAME}", Scenes)
+    rostest.rosrun("cartpole", "scenes", "__main__")

@@ -49,6 +49,7 @@ class LockstepWorld:
         self._begun = StepWorldResponse()
         self._held: dict[str, Any] = {}
         self._variation = RosVariation(scene.robots[0])
+        turn.join(self)
 
     def look(self, query: StateQuery) -> None:
         """See `RobotBackend.look`.

@@ -166,6 +166,7 @@ class RealtimeWorld:
         }
         self._newest: tuple[JointStateMsg, float] | None = None  # with its wall time [s]
         self._arrived = threading.Condition()
+        turn.join(self)
         self._subscriber = rospy.Subscriber(
             full_name(robot, "joint_states"),
             JointStateMsg,

@@ -1,6 +1,7 @@
 """Whose episode is under way, where several environments of a process move the same robots."""
 
 from collections.abc import Callable, Sequence
+from weakref import WeakSet
 
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.errors import SimulatorError
@@ -17,6 +18,16 @@ class Turn:
     def __init__(self, furnish: Callable[[Sequence[Object]], None]) -> None:
         self._furnish = furnish
         self._holder: object = None
+        self._players: WeakSet[RobotBackend] = WeakSet()  # one that is just dropped has left, too
+
+    @property
+    def is_used(self) -> bool:
+        """Whether somebody has joined, and not left."""
+        return bool(self._players)
+
+    def join(self, who: RobotBackend) -> None:
+        """Takes part from now on, until `release`."""
+        self._players.add(who)
 
     def take_if_free(self, who: RobotBackend) -> bool:
         """Takes it unless somebody has it; returns whether the one who asks has it now."""
@@ -35,7 +46,8 @@ class Turn:
         self._holder = who
 
     def release(self, who: RobotBackend) -> None:
-        """Gives it back, if it is that one's, and takes away what stood there for it."""
+        """Leaves; gives it back, if it is that one's, and takes away what stood there for it."""
+        self._players.discard(who)
         if self._holder is who:
             self._holder = None
             self._furnish(())
