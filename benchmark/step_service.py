@@ -25,6 +25,7 @@ from cartpole.environment import CartPoleEnv
 from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
 from robot_envs.backends.ros.lockstep import LockstepWorld
+from robot_envs.backends.ros.objects import Objects
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.scene import Scene
 from ros_utils.simulation import Simulation
@@ -67,7 +68,7 @@ def environment_rate(count: int, rounds: int) -> float:
     """Environment steps a second, resets included."""
     with Simulation(lockstep=True) as simulation, simulation.active():
         add_cartpole()
-        env = CartPoleEnv(BalanceTask(), LockstepWorld(Scene([ROBOT]), TICKS, Turn()))
+        env = CartPoleEnv(BalanceTask(), LockstepWorld(Scene([ROBOT]), TICKS, Turn(Objects())))
         env.reset(seed=0)
 
         def step(index: int) -> None:

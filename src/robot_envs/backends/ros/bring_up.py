@@ -16,10 +16,8 @@ from robot_envs.backends.ros import node
 from robot_envs.backends.ros.service import ServiceClient
 from robot_envs.backends.world_files import world_models
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorHangs
-from robot_envs.files import read_text
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.task import Object
 from ros_calls.waiting import wait_until
 from ros_utils import ros_controllers, ros_gazebo
 from ros_utils.readiness import NotReady, Ready
@@ -43,7 +41,7 @@ def simulator_answers() -> bool:
     if not node.service_is_registered(WORLD_SERVICE):
         return False
     try:
-        _models()
+        models()
         return True
     except SimulatorHangs:
         raise
@@ -55,7 +53,7 @@ def bring_up(scene: Scene, say: Say) -> list[Undo]:
     """Spawns robots and starts their controllers, each only if it isn't there.
 
     Args:
-        scene: the robots; its objects are `bring_objects`'s.
+        scene: the robots; its objects are for `Objects`.
         say: is told what is done.
 
     Returns:
@@ -88,27 +86,13 @@ def ready(scene: Scene) -> Ready:
     return Ready(models, list(dict.fromkeys(full_name(*each) for each in wanted)))
 
 
-def bring_objects(objects: Sequence[Object]) -> list[Undo]:
-    """Spawns what a task needs beside robots, where it isn't there.
-
-    Raises:
-        RobotEnvError: if something can't be read or spawned.
-    """
-    there = _models() if objects else []
-    return [
-        _spawn(each.name, read_text(each.file), each.pose)
-        for each in objects
-        if each.name not in there
-    ]
-
-
 def check_world(robot: Robot) -> None:
     """Makes sure that a simulator that runs has what the robot's world file brings.
 
     Raises:
         RobotEnvError: if it hasn't.
     """
-    there = _models()
+    there = models()
     missing = [name for name in world_models(robot.world) if name not in there]
     if missing:
         raise RobotEnvError(
@@ -117,22 +101,42 @@ def check_world(robot: Robot) -> None:
         )
 
 
-def _models() -> list[str]:
+def models() -> list[str]:
+    """Names of what is in the world.
+
+    Raises:
+        SimulatorError: if the simulator doesn't answer.
+    """
     return ServiceClient(WORLD_SERVICE, GetWorldProperties)().model_names
 
 
 def _bring_model(robot: Robot, say: Say) -> list[Undo]:
-    if robot.model in _models():
+    if robot.model in models():
         return []
     say(f"spawning the robot '{robot.model}'")
     # Before it comes: its drives read them. As text: packages of the user's may have the names of ours.
     for name, value in robot.parameters.items():
         rospy.set_param(full_name(robot, name), value)
     rospy.set_param(full_name(robot, robot.description), robot.xml)
-    return [_spawn(robot.model, robot.xml, robot.pose, f"/{robot.namespace.strip('/')}")]
+    return [spawn(robot.model, robot.xml, robot.pose, f"/{robot.namespace.strip('/')}")]
 
 
-def _spawn(name: str, text: str, pose: Pose, namespace: str = "") -> Undo:
+def spawn(name: str, text: str, pose: Pose, namespace: str = "") -> Undo:
+    """Adds a model.
+
+    Args:
+        name: of the model.
+        text: its URDF or SDF.
+        pose: in the world.
+        namespace: of what its plugins offer.
+
+    Returns:
+        What takes it away.
+
+    Raises:
+        RobotEnvError: if it is refused.
+        SimulatorError: if the simulator doesn't answer.
+    """
     kind = "urdf" if "<robot" in text else "sdf"
     at = PoseMsg(Point(*pose.position), Quaternion(*pose.orientation))
     answer = ServiceClient(f"/gazebo/spawn_{kind}_model", SpawnModel)(

@@ -1,5 +1,6 @@
 """Robots in a simulator over ROS that moves in lock-step."""
 
+import contextlib
 from typing import Any
 
 import genpy
@@ -48,6 +49,7 @@ class LockstepWorld:
         self._begun = StepWorldResponse()
         self._held: dict[str, Any] = {}
         self._variation = RosVariation(scene.robots[0])
+        turn.join(self)
 
     def look(self, query: StateQuery) -> None:
         """See `RobotBackend.look`.
@@ -57,8 +59,10 @@ class LockstepWorld:
             SimulatorError: for a name of nothing in the simulator's world, or if it doesn't answer.
         """
         link_keys(query)
+        with self._simulator:
+            its_turn = self._turn.take_if_free(self)
         ask_for(self._look, query)
-        if query != StateQuery():
+        if query != StateQuery() and its_turn:  # otherwise its reset tells what isn't there
             self._call(self._look)  # no ticks: it only looks
         for request in (self._begin, self._advance):
             ask_for(request, query)
@@ -75,7 +79,8 @@ class LockstepWorld:
         self._begin.positions = [position for position, _ in joints]
         self._begin.velocities = [velocity for _, velocity in joints]
         place(self._begin, self.scene.placed_models(initial))
-        self._turn.take(self)
+        with self._simulator:
+            self._turn.take(self)
         self._begun = answer = self._call(self._begin)
         state = self._state(answer)
         self._held = self.scene.starting_commands(state.joints)
@@ -126,6 +131,8 @@ class LockstepWorld:
             return base_pose(self.scene.robots[0])
 
     def close(self) -> None:
-        """Closes the connection to the simulator; the robots are as they were found."""
+        """Closes the connection to the simulator; robots and objects are as they were found."""
         self._step.close()
         self._variation.undo()
+        with contextlib.suppress(SimulatorError):  # one that is gone has no objects any more
+            self._turn.release(self)

@@ -1,5 +1,6 @@
 """A robot in a simulator over ROS whose time runs by itself: Gazebo's own services and topics alone."""
 
+import contextlib
 import threading
 import time
 from collections.abc import Mapping
@@ -165,6 +166,7 @@ class RealtimeWorld:
         }
         self._newest: tuple[JointStateMsg, float] | None = None  # with its wall time [s]
         self._arrived = threading.Condition()
+        turn.join(self)
         self._subscriber = rospy.Subscriber(
             full_name(robot, "joint_states"),
             JointStateMsg,
@@ -191,8 +193,8 @@ class RealtimeWorld:
             SimulatorError: if the simulator refuses, or doesn't answer.
         """
         positions = {name: at for name, (at, _) in self.scene.placed_joints(initial).items()}
-        self._turn.take(self)
         with self._simulator:
+            self._turn.take(self)
             for topic in self._topics.values():
                 topic.wait()
             self._pause()
@@ -281,8 +283,10 @@ class RealtimeWorld:
             return base_pose(self._robot)
 
     def close(self) -> None:
-        """Leaves the topics; the world stays as it is, the robot as it was found."""
+        """Leaves the topics; the world stays as it is, robot and objects as they were found."""
         self._subscriber.unregister()
         for topic in self._topics.values():
             topic.close()
         self._variation.undo()
+        with contextlib.suppress(SimulatorError):  # one that is gone has no objects any more
+            self._turn.release(self)

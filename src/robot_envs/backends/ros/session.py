@@ -14,6 +14,7 @@ import rospy
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros import bring_up, node
 from robot_envs.backends.ros.bring_up import STEP_SERVICE, Say, Undo
+from robot_envs.backends.ros.objects import Objects
 from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.backends.ros.rviz import check_rviz, open_rviz
 from robot_envs.backends.ros.turn import Turn
@@ -62,7 +63,8 @@ class RosSession:
         curves: Path | None = None,
     ) -> None:
         self._scene = Scene([robots] if isinstance(robots, Robot) else robots)
-        self._turn = Turn()
+        self._objects = Objects()
+        self._turn = Turn(self._objects)
         self._name = name
         self._argv = argv
         self._realtime = realtime
@@ -71,6 +73,9 @@ class RosSession:
         self._rviz = rviz
         self._curves = curves
         self._undo = contextlib.ExitStack()
+        self._node = (
+            contextlib.ExitStack()
+        )  # outlives the world: a process becomes a node only once
         self._own_simulator = False
 
     def start(self, say: Say) -> None:
@@ -100,7 +105,7 @@ class RosSession:
         if self._curves is not None:
             self._undo.callback(show_curves(self._curves))
         changes = bring_up.bring_up(self._scene, say)
-        self._undo_at_living_simulator(changes)
+        self._undo_at_living_simulator([*changes, lambda: self._objects(())])
         if self._gui and not own and is_open():
             tell_open(say)
         elif self._gui:
@@ -121,7 +126,7 @@ class RosSession:
         """A connection of its own to the robots; whoever asks for it closes it.
 
         Args:
-            scene: the session's robots, and objects, which are spawned where they aren't there.
+            scene: the session's robots, and objects, which are in the world while it is this one's turn.
             control_period: simulated time [s] of one action; in real time 0 takes the newest
                 joint state without waiting for another one.
 
@@ -130,8 +135,6 @@ class RosSession:
             RobotEnvError: if the simulator doesn't answer, or an object can't be spawned.
         """
         ticks = ticks_per_action(control_period, _physics_step()) if control_period else 0
-        changes = bring_up.bring_objects(scene.objects)
-        self._undo_at_living_simulator(changes)
         if self._realtime:
             from robot_envs.backends.ros.realtime import RealtimeWorld
 
@@ -189,7 +192,7 @@ class RosSession:
             return
         node.refuse_twin(self._name)
         rospy.init_node(os.path.basename(self._name), argv=["", *self._argv], disable_signals=True)
-        self._undo.callback(rospy.signal_shutdown, "training ended")
+        self._node.callback(rospy.signal_shutdown, "training ended")
 
     def _check_mode(self) -> None:
         lockstep = node.service_is_registered(STEP_SERVICE)
@@ -204,9 +207,26 @@ class RosSession:
                 "(roslaunch gazebo_ros empty_world.launch takes it), or train with --realtime"
             )
 
-    def close(self) -> None:
-        """Ends what `start()` started, newest first; may be called twice."""
+    def make_room(self) -> None:
+        """Ends what `start()` started, all but the node: another world comes.
+
+        Raises:
+            RobotEnvError: if an environment still uses it.
+        """
+        if self._turn.is_used:
+            raise RobotEnvError(
+                "over ROS a process moves one world at a time, and an environment of "
+                f"'{self._scene.robots[0].model}' is open; close() it first, or put several robots into "
+                "one world: RobotEnv([first, second], task)"
+            )
         self._undo.close()
+
+    def close(self) -> None:
+        """Ends what `start()` started; may be called twice."""
+        try:
+            self._undo.close()
+        finally:
+            self._node.close()
 
 
 def _at_living_simulator(simulator: OwnSimulator, undo: Undo) -> None:
@@ -219,16 +239,21 @@ def _at_living_simulator(simulator: OwnSimulator, undo: Undo) -> None:
 def running_session(scene: Scene, realtime: bool) -> RosSession:
     """The process's session, started if there is none; that one runs until the process ends.
 
-    Where its simulator has died, another one is started.
+    Where its simulator has died, another one is started. A session of other robots, or in the other mode,
+    ends for it.
 
     Raises:
-        RobotEnvError: if something can't be started, or what runs doesn't fit.
+        RobotEnvError: if something can't be started, or what runs doesn't fit, or an environment of other
+            robots is open.
     """
-    for session in reversed(_started()):
+    for session in reversed(_started()[:]):
+        lives = bring_up.simulator_answers()
         if session.serves(scene, realtime):
-            if bring_up.simulator_answers():
+            if lives:
                 return session
             break
+        if lives:
+            session.make_room()
     name = f"/{_name(scene)}_env_{os.getpid()}"
     session = RosSession(scene.robots, name, [], realtime=realtime, gui=False, seed=0)
     try:

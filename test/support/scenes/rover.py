@@ -1,0 +1,87 @@
+"""A rover that rolls over a ground plane: two wheels of a velocity group, and a castor that nobody drives."""
+
+import numpy as np
+from gymnasium.spaces import Box
+
+from robot_envs import (
+    Commands,
+    InitialState,
+    LinkQuery,
+    Motion,
+    Object,
+    Pose,
+    Robot,
+    StateQuery,
+    Task,
+    WorldState,
+)
+from scenes.parts import joint, link, plugin, transmission
+
+WHEEL = '<cylinder radius="0.1" length="0.04"/>'
+PARTS = [
+    link("hull", '<box size="0.4 0.2 0.08"/>', 3.0),
+    link("left_wheel", WHEEL, 0.3, turned="1.5708 0 0"),
+    link("right_wheel", WHEEL, 0.3, turned="1.5708 0 0"),
+    link("castor", '<sphere radius="0.05"/>', 0.2),
+    joint("left_axle", "continuous", "hull", "left_wheel", "0.1 0.13 0"),
+    joint("right_axle", "continuous", "hull", "right_wheel", "0.1 -0.13 0"),
+    joint("pivot", "continuous", "hull", "castor", "-0.15 0 -0.05"),
+    transmission("left_axle", "Velocity"),
+    transmission("right_axle", "Velocity"),
+    plugin(),
+]
+ROVER = Robot(
+    urdf=f'<robot name="rover">{"".join(PARTS)}</robot>',
+    controllers={
+        "wheels": {
+            "type": "velocity_controllers/JointGroupVelocityController",
+            "joints": ["right_axle", "left_axle"],
+        }
+    },
+    run=("wheels",),
+    pose=Pose((0.0, 0.0, 0.1)),
+    control_period=0.02,
+)
+CRATE = """<robot name="crate"><link name="crate">
+  <inertial><mass value="0.5"/>
+    <inertia ixx="0.003" ixy="0" ixz="0" iyy="0.003" iyz="0" izz="0.003"/></inertial>
+  <visual><geometry><box size="0.2 0.2 0.2"/></geometry>
+    <material name="yellow"><color rgba="1 0.8 0 1"/></material></visual>
+  <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link></robot>"""
+
+
+class Push(Task):
+    """The rover, put somewhere else in each episode, pushes a crate forward; none of its joints is named."""
+
+    max_steps = 50
+    objects = (Object("crate", CRATE, Pose((3.0, 0.0, 0.1))),)
+    query = StateQuery(
+        all_models=True, links=(LinkQuery("crate::crate", "hull"),), contacts_of=("rover::hull",)
+    )
+
+    def action_space(self) -> Box:
+        return Box(-1.0, 1.0, (2,), np.float32)
+
+    def observation_space(self) -> Box:
+        return Box(-np.inf, np.inf, (10,), np.float64)
+
+    def initial_state(self, rng: np.random.Generator) -> InitialState:
+        x, y = rng.uniform(-0.2, 0.2, 2)
+        return InitialState(
+            models={
+                "rover": Motion(Pose((x, y, 0.1)), ((0.5, 0.0, 0.0), (0.0, 0.0, 0.0))),
+                "crate": Pose((x + 0.4, y, 0.1)),
+            }
+        )
+
+    def apply(self, action: np.ndarray, state: WorldState) -> Commands:
+        right, left = (10.0 * action).tolist()
+        return {"wheels": (right, left)}
+
+    def observe(self, state: WorldState) -> np.ndarray:
+        crate = state.links["crate::crate"].pose
+        here = state.models["rover"]
+        return np.array([*crate.position, *here.pose.position, *here.twist[0], len(state.contacts)])
+
+    def reward(self, state: WorldState, action: np.ndarray) -> float:
+        return state.models["crate"].pose.position[0]

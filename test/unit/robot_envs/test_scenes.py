@@ -1,0 +1,253 @@
+"""Worlds with several robots, objects, a file's obstacle, or a robot that drives; in this process."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gymnasium.spaces import Box
+from scenes.rollout import rollout, same
+from scenes.rover import ROVER, Push
+from scenes.two_arms import LEFT, RIGHT, SKIN, Volley
+
+from robot_envs import (
+    InitialState,
+    LinkQuery,
+    Motion,
+    Pose,
+    RobotEnv,
+    RobotEnvError,
+    SimulatorError,
+    StateQuery,
+)
+
+BOX3 = Box(-np.inf, np.inf, (3,), np.float64)
+HIT = np.array(
+    [0.3, 0.3, 0.6, 0.0]
+)  # the right arm swings to the left, through where the ball lies
+
+
+@pytest.fixture
+def make(request, tmp_path):
+    """Makes environments that are closed in the end."""
+
+    def made(name="arms", task=None, **options):
+        robots = {"arms": [LEFT, RIGHT], "rover": ROVER}[name]
+        task = task or {"arms": lambda: Volley(tmp_path), "rover": Push}[name]()
+        env = RobotEnv(robots, task, **options)
+        request.addfinalizer(env.close)
+        return env
+
+    return made
+
+
+class Seen:
+    """A task whose states are looked at from outside."""
+
+    def __init__(self, task):
+        self.states, observe = [], task.observe
+
+        def seen(state):
+            self.states.append(state)
+            return observe(state)
+
+        task.observe = seen
+
+    @property
+    def last(self):
+        return self.states[-1]
+
+
+def test_joints_and_commands_are_told_apart_by_robot(make):
+    env = make()
+    seen = Seen(env.task)
+    env.reset(seed=0)
+    names = ["left::elbow", "left::shoulder", "right::elbow", "right::shoulder"]
+    assert list(seen.last.joints) == names
+    lift = seen.last.joints["right::shoulder"].position
+    assert seen.last.commands == {
+        "/left/pair": (0.0, 0.3),
+        "/right/lift": lift,
+        "/right/swing": 0.0,
+    }
+    for _ in range(4):  # as fast as the limit of its speed allows
+        env.step(HIT)
+    assert seen.last.commands["/left/pair"] == (0.3, 0.3)
+    assert seen.last.joints["left::elbow"].position == pytest.approx(0.3, abs=1e-4)
+    assert seen.last.joints["left::shoulder"].position == pytest.approx(0.3, abs=1e-4)
+
+
+def test_an_arm_hits_the_ball_off_its_plinth_and_contacts_say_so(make):
+    env = make()
+    seen = Seen(env.task)
+    env.reset(seed=0)
+    told = [env.step(HIT)[4]["touched"] for _ in range(40)]
+    assert ["plinth"] in told
+    assert ["plinth", "right"] in told
+    hit = seen.states[1 + told.index(["plinth", "right"])]
+    contact = next(each for each in hit.contacts if each.second.startswith("right"))
+    assert contact.first == SKIN
+    assert contact.second.startswith("right::fore::")
+    assert contact.total[0][0] < 0.0  # to the left
+    assert hit.models["plinth"].pose.position == (0.0, 0.0, 0.125)
+
+
+def test_limits_of_the_parameters_hold(make):
+    env = make()
+    seen = Seen(env.task)
+    env.reset(seed=0)
+    for _ in range(20):
+        env.step(np.ones(4))
+    efforts = [abs(state.joints["right::elbow"].effort) for state in seen.states]
+    assert max(efforts) == 1.5
+
+
+def test_an_arm_stops_at_the_files_wall(make, tmp_path):
+    """The right arm, turned round by a quarter, swings towards it."""
+    task = Volley(tmp_path)
+    task.query = StateQuery(links=(LinkQuery("right::tip"),), contacts_of=("wall",))
+    task.reward = lambda state, action: 0.0
+    task.info = lambda state: {}
+    task.observe = lambda state: np.array([*state.links["right::tip"].pose.position])
+    task.observation_space = lambda: BOX3
+    half = math.sqrt(0.5)
+    turned = Motion(Pose((1.0, 0.0, 0.0), (0.0, 0.0, -half, half)))
+    task.initial_state = lambda rng: InitialState(models={"right": turned})
+    env = make(task=task)
+    seen = Seen(task)
+    start = env.reset(seed=0)[0]
+    assert start == pytest.approx([1.0, 0.0, 0.23], abs=1e-6)
+    ends = [env.step(np.array([0.0, 0.0, 0.4, 1.0]))[0] for _ in range(60)]
+    assert 0.45 < max(y for _, y, _ in ends) < 0.55
+    assert any(state.contacts for state in seen.states)
+    assert {each.first for state in seen.states for each in state.contacts} == {"wall::link::stone"}
+
+
+def test_what_nobody_drives_begins_each_episode_anew_as_well(make, tmp_path):
+    task = Volley(tmp_path)
+    task.query = replace(
+        task.query, links=(*task.query.links, LinkQuery("left::tassel", "left::fore"))
+    )
+    env, seen = make(task=task), Seen(task)
+    tassels = []
+    for _ in range(2):
+        env.reset(seed=3)
+        tassels.append(seen.last.links["left::tassel"])
+        for _ in range(25):
+            env.step(env.action_space.sample())
+    assert tassels[0] == tassels[1]
+    turned = tassels[0].pose.orientation
+    assert turned[0] == pytest.approx(math.sin(0.25), abs=1e-6)
+    assert tassels[0].twist[1][0] == pytest.approx(1.0, abs=1e-6)
+    swung = seen.last.links["left::tassel"].pose.orientation
+    assert abs(swung[0] - turned[0]) > 0.05
+
+
+def test_what_isnt_placed_stands_where_it_was_spawned(make):
+    env = make()
+    seen = Seen(env.task)
+    env.reset(seed=0)
+    for _ in range(30):
+        env.step(HIT)
+    env.reset(options={"initial_state": InitialState()})
+    assert seen.last.models["ball"] == Motion(Pose((0.0, 0.0, 2.0)))
+    assert [each.position for each in seen.last.joints.values()] == [0.0] * 4
+    assert seen.last.links["right::tip"].pose.position == pytest.approx((1.0, 0.0, 0.0), abs=1e-6)
+
+
+def test_the_rover_rolls_to_the_crate_and_pushes_it(make):
+    env = make("rover")
+    seen = Seen(env.task)
+    start = env.reset(seed=0)[0]
+    assert seen.last.models["rover"].twist[0] == (0.5, 0.0, 0.0)
+    assert start[3:5] == pytest.approx(
+        seen.last.models["crate"].pose.position[:2] - np.array([0.4, 0.0])
+    )
+    steps = [env.step(np.ones(2, np.float32)) for _ in range(50)]
+    assert steps[-1][1] > 1.0  # [m]
+    assert steps[-1][3]
+    assert "crate" in {
+        each.second.partition("::")[0] for state in seen.states for each in state.contacts
+    }
+    again = env.reset(seed=0)[0]
+    assert np.array_equal(start, again)
+
+
+def test_the_rover_turns_with_one_wheel(make):
+    env = make("rover")
+    seen = Seen(env.task)
+    env.reset(seed=0, options={"initial_state": InitialState()})
+    for _ in range(49):
+        env.step(np.array([1.0, -1.0], np.float32))  # right, left: as the group names them
+    z, w = seen.last.models["rover"].pose.orientation[2:]
+    assert 2 * math.atan2(z, w) > 0.3
+    assert seen.last.joints["right_axle"].velocity == pytest.approx(10.0, abs=0.1)
+    assert seen.last.joints["left_axle"].velocity == pytest.approx(-10.0, abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["arms", "rover"])
+@pytest.mark.parametrize(
+    "engine", ["bullet", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
+)
+def test_the_same_seed_gives_the_same_bits_whatever_was_before(make, name, engine):
+    first, again, other = (
+        make(name, backend=engine),
+        make(name, backend=engine),
+        make(name, backend=engine),
+    )
+    rollout(again, 30, seed=9)
+    expected, found = rollout(first, 130, seed=5), rollout(again, 130, seed=5)
+    assert same(expected, found)
+    assert not same(expected, rollout(other, 130, seed=6))
+
+
+def test_worlds_of_one_process_know_nothing_of_each_other(make):
+    alone = [
+        rollout(make(name), 40, seed) for name, seed in (("arms", 1), ("rover", 2), ("arms", 3))
+    ]
+    envs = [make(name) for name in ("arms", "rover", "arms")]
+    runs = [[env.reset(seed=seed)] for env, seed in zip(envs, (1, 2, 3), strict=True)]
+    for env, seed in zip(envs, (1, 2, 3), strict=True):
+        env.action_space.seed(seed)
+    for _ in range(40):
+        for env, run in zip(envs, runs, strict=True):
+            run.append(env.step(env.action_space.sample()))
+    assert all(map(same, alone, runs))
+
+
+def test_names_that_are_there_twice_are_told(tmp_path):
+    for robots, message in (
+        ([LEFT, LEFT], "a world has each model once, and 'left' is there twice"),
+        ([LEFT, replace(LEFT, name="third")], "namespace once, and 'left' is there twice"),
+        ([replace(LEFT, name="ball"), RIGHT], "model once, and 'ball' is there twice"),
+        (
+            [replace(LEFT, name="wall"), RIGHT],
+            "the world has a model 'wall'; give the robot another name",
+        ),
+        ([], "needs a robot"),
+    ):
+        with pytest.raises(RobotEnvError, match=message):
+            RobotEnv(robots, Volley(tmp_path))
+
+
+def test_wrong_names_of_links_and_models_are_told_with_the_nearest(make, tmp_path):
+    for query, message in (
+        (
+            StateQuery(links=(LinkQuery("left::tp"),)),
+            "no link 'left::tp'; did you mean 'left::tip'",
+        ),
+        (StateQuery(links=(LinkQuery("tip"),)), "several models have a link 'tip'"),
+        (StateQuery(models=("bal",)), "no model 'bal'; did you mean 'ball'"),
+        (StateQuery(contacts_of=("plinth::bloc",)), "did you mean 'plinth::block'"),
+    ):
+        task = Volley(tmp_path)
+        task.query = query
+        with pytest.raises(SimulatorError, match=message):
+            make(task=task)
+    env = make()
+    with pytest.raises(SimulatorError, match="no model 'bal'; did you mean 'ball'"):
+        env.reset(options={"initial_state": InitialState(models={"bal": Pose()})})
+    with pytest.raises(
+        ValueError, match="no joint 'left::elbo' to place; did you mean 'left::elbow'"
+    ):
+        env.reset(options={"initial_state": InitialState(joints={"left::elbo": 0.0})})
