@@ -1,20 +1,25 @@
 """The double pendulum: a cart keeps two rods upright, one on top of the other."""
 
 import math
+from functools import partial
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from robot_envs import InitialState, Robot, Task, WorldState
+from robot_envs.files import own_file
+from robot_envs.robot import Robot
+from robot_envs.robots import spaces
+from robot_envs.task import Task
+from robot_envs.world_state import InitialState, WorldState
 
 STRONGEST = 15.0  # [N] that an action asks for
 LEAN = 0.5  # [rad] of a rod from the vertical, at which it counts as fallen
 EDGE = 0.95  # [m] of the cart from the rail's middle
 
 DOUBLE_PENDULUM = Robot(
-    urdf="package://cartpole/urdf/double_pendulum.urdf.xacro",
-    controllers="package://cartpole/config/robots/double_pendulum.yaml",
+    urdf=partial(own_file, "cartpole", "urdf/double_pendulum.urdf.xacro"),
+    controllers=partial(own_file, "cartpole", "config/robots/double_pendulum.yaml"),
     run=("joint_state_controller", "cart_controller"),
     commanded=("cart_controller",),
     name="double_pendulum",
@@ -41,11 +46,11 @@ class Balance(Task):
 
     def action_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float32)
+        return spaces.actions(1)
 
     def observation_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-np.inf, np.inf, (6,), np.float32)
+        return spaces.numbers(6)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         """Draws how far it is off."""
@@ -59,7 +64,7 @@ class Balance(Task):
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, float]:
         """The force on the cart."""
-        return {"cart_controller": STRONGEST * float(np.clip(action, -1.0, 1.0)[0])}
+        return {"cart_controller": STRONGEST * float(action[0])}
 
     def observe(self, state: WorldState) -> np.ndarray:
         """See the class."""

@@ -1,19 +1,24 @@
 """The Furuta pendulum: its arm swings the rod up, and keeps it there."""
 
 import math
+from functools import partial
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from robot_envs import InitialState, Robot, Task, WorldState
+from robot_envs.files import own_file
+from robot_envs.robot import Robot
+from robot_envs.robots import spaces
+from robot_envs.task import Task
+from robot_envs.world_state import InitialState, WorldState
 
 STRONGEST = 0.3  # [N m] that an action asks for
 TURNS = 2.0 * math.pi  # [rad] that the arm may be away from where it points at the start
 
 FURUTA = Robot(
-    urdf="package://cartpole/urdf/furuta.urdf.xacro",
-    controllers="package://cartpole/config/robots/furuta.yaml",
+    urdf=partial(own_file, "cartpole", "urdf/furuta.urdf.xacro"),
+    controllers=partial(own_file, "cartpole", "config/robots/furuta.yaml"),
     run=("joint_state_controller", "arm_controller"),
     commanded=("arm_controller",),
     name="furuta",
@@ -41,11 +46,11 @@ class SwingUp(Task):
 
     def action_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float32)
+        return spaces.actions(1)
 
     def observation_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-np.inf, np.inf, (5,), np.float32)
+        return spaces.numbers(5)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         """Draws how the rod hangs."""
@@ -56,7 +61,7 @@ class SwingUp(Task):
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, float]:
         """The motor's torque."""
-        return {"arm_controller": STRONGEST * float(np.clip(action, -1.0, 1.0)[0])}
+        return {"arm_controller": STRONGEST * float(action[0])}
 
     def observe(self, state: WorldState) -> np.ndarray:
         """See the class."""

@@ -1,12 +1,17 @@
 """The hopper: one leg with a foot, which hops forward without falling over."""
 
 import math
+from functools import partial
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from robot_envs import InitialState, LinkQuery, Robot, StateQuery, Task, WorldState
+from robot_envs.files import own_file
+from robot_envs.robot import Robot
+from robot_envs.robots import spaces
+from robot_envs.task import Task
+from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
 LEG = ("hip", "knee", "ankle")
 STANCE = (-0.45, 0.9, -0.45)  # [rad] of the leg's joints: bent, the foot flat below the hip
@@ -15,8 +20,8 @@ LOW = 0.16  # [m] that the hip may sink below that of a stretched leg
 LEAN = 0.6  # [rad] of the torso
 
 HOPPER = Robot(
-    urdf="package://cartpole/urdf/hopper.urdf.xacro",
-    controllers="package://cartpole/config/robots/hopper.yaml",
+    urdf=partial(own_file, "cartpole", "urdf/hopper.urdf.xacro"),
+    controllers=partial(own_file, "cartpole", "config/robots/hopper.yaml"),
     run=("joint_state_controller", "leg_controller"),
     commanded=("leg_controller",),
     name="hopper",
@@ -42,11 +47,11 @@ class HopForward(Task):
 
     def action_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
+        return spaces.actions(3)
 
     def observation_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-np.inf, np.inf, (12,), np.float32)
+        return spaces.numbers(12)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         """The stance, a little off it."""
@@ -58,7 +63,7 @@ class HopForward(Task):
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
         """Angles of the leg."""
-        moves = np.clip(action, -1.0, 1.0).tolist()
+        moves = action.tolist()
         return {
             "leg_controller": tuple(
                 stance + swing * move

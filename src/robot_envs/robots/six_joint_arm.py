@@ -1,12 +1,17 @@
 """The six-joint arm: its tip reaches a point in space, by positions of its joints."""
 
 import math
+from functools import partial
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from robot_envs import InitialState, LinkQuery, Robot, StateQuery, Task, WorldState
+from robot_envs.files import own_file
+from robot_envs.robot import Robot
+from robot_envs.robots import spaces
+from robot_envs.task import Task
+from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
 JOINTS = ("waist", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "hand_roll")
 HOME = (0.0, 0.4, 0.6, 0.0, 0.6, 0.0)  # [rad]: the hand hangs in front of the arm
@@ -16,8 +21,8 @@ CENTRE, HALF = (0.45, 0.0, 0.40), (0.15, 0.30, 0.20)  # [m] of the box that targ
 CLOSE = 0.02  # [m]: the tip is there
 
 ARM = Robot(
-    urdf="package://cartpole/urdf/six_joint_arm.urdf.xacro",
-    controllers="package://cartpole/config/robots/six_joint_arm.yaml",
+    urdf=partial(own_file, "cartpole", "urdf/six_joint_arm.urdf.xacro"),
+    controllers=partial(own_file, "cartpole", "config/robots/six_joint_arm.yaml"),
     run=("joint_state_controller", "arm_controller"),
     commanded=("arm_controller",),
     name="six_joint_arm",
@@ -46,11 +51,11 @@ class Reach(Task):
 
     def action_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-1.0, 1.0, (6,), np.float32)
+        return spaces.actions(6)
 
     def observation_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-np.inf, np.inf, (15,), np.float32)
+        return spaces.numbers(15)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         """Draws a pose, and the target."""
@@ -69,7 +74,7 @@ class Reach(Task):
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
         """Moves the set-points on, within the joints' ranges."""
-        moves = STEP * np.clip(action, -1.0, 1.0)
+        moves = STEP * action
         wanted = np.clip(np.add(set_points(state), moves), np.negative(RANGES), RANGES)
         return {"arm_controller": tuple(wanted.tolist())}
 

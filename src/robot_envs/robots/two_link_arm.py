@@ -1,12 +1,17 @@
 """The two-link arm: its tip reaches a point of the plane, with a dense reward or with a goal."""
 
 import math
+from functools import partial
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from robot_envs import GoalTask, InitialState, LinkQuery, Robot, StateQuery, Task, WorldState
+from robot_envs.files import own_file
+from robot_envs.robot import Robot
+from robot_envs.robots import spaces
+from robot_envs.task import GoalTask, Task
+from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
 UPPER_ARM, FOREARM = 0.30, 0.25  # [m]
 NEAREST, FURTHEST = 0.20, 0.50  # [m] of targets from the shoulder
@@ -15,8 +20,8 @@ CLOSE = 0.02  # [m]: the tip is there
 FASTEST = 3.0  # [rad/s] that an action asks for
 
 ARM = Robot(
-    urdf="package://cartpole/urdf/two_link_arm.urdf.xacro",
-    controllers="package://cartpole/config/robots/two_link_arm.yaml",
+    urdf=partial(own_file, "cartpole", "urdf/two_link_arm.urdf.xacro"),
+    controllers=partial(own_file, "cartpole", "config/robots/two_link_arm.yaml"),
     run=("joint_state_controller", "shoulder_controller", "elbow_controller"),
     commanded=("shoulder_controller", "elbow_controller"),
     name="two_link_arm",
@@ -45,11 +50,11 @@ class Reach(Task):
 
     def action_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+        return spaces.actions(2)
 
     def observation_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-np.inf, np.inf, (10,), np.float32)
+        return spaces.numbers(10)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         """Draws a pose, and the target."""
@@ -99,21 +104,21 @@ class ReachGoal(GoalTask):
 
     def action_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+        return spaces.actions(2)
 
     def observation_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return gymnasium.spaces.Box(-np.inf, np.inf, (6,), np.float32)
+        return spaces.numbers(6)
 
-    def goal_space(self) -> gymnasium.spaces.Box:
-        """A point of the plane [m]."""
+    def goals(self) -> gymnasium.spaces.Box:
+        """Points of the plane (x, y) [m]."""
         return gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         """Draws a pose."""
         return draw_pose(rng)
 
-    def goal(self, rng: np.random.Generator) -> np.ndarray:
+    def goal(self, rng: np.random.Generator, state: WorldState) -> np.ndarray:
         """Draws a point that the tip can reach [m]."""
         return np.array(draw_target(rng), np.float32)
 
@@ -133,10 +138,6 @@ class ReachGoal(GoalTask):
         """Whether the tip is there; vectorised."""
         return np.linalg.norm(achieved - desired, axis=-1) <= CLOSE
 
-    def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> np.ndarray:
-        """See the class; vectorised."""
-        return self.is_success(achieved, desired).astype(np.float32) - 1.0
-
 
 def draw_pose(rng: np.random.Generator) -> InitialState:
     """A pose within 0.8 of the joints' ranges, at rest."""
@@ -153,7 +154,7 @@ def draw_target(rng: np.random.Generator) -> tuple[float, float]:
 
 def speeds(action: np.ndarray) -> dict[str, float]:
     """What the controllers are told [rad/s]."""
-    shoulder, elbow = np.clip(action, -1.0, 1.0) * FASTEST
+    shoulder, elbow = action * FASTEST
     return {"shoulder_controller": float(shoulder), "elbow_controller": float(elbow)}
 
 
