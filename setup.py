@@ -14,8 +14,9 @@ from setuptools.command.build_py import build_py
 # Files that are needed at run time and lie outside of src, and the folders of a wheel for them.
 DATA = {
     "config/*.yaml": "rl_workbench/share/config",
-    "urdf/*": "cartpole/share/cartpole/urdf",
-    "companions/cartpole_controller/config/*": "cartpole/share/cartpole_controller/config",
+    "urdf/*": "robot_envs/share/cartpole/urdf",
+    "config/robots/*": "robot_envs/share/cartpole/config/robots",
+    "companions/cartpole_controller/config/*": "robot_envs/share/cartpole_controller/config",
 }
 
 

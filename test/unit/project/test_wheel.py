@@ -88,14 +88,32 @@ def test_all_libraries_come_from_the_wheel(python: Path, tmp_path: Path) -> None
     assert printed.count(str(python.parents[1] / "lib")) == 2
 
 
+def as_in_the_workspace(python: Path, code: str, cwd: Path) -> str:
+    """The last line that code prints in the wheel's environment, which is that of the workspace's."""
+    ours = run(sys.executable, "-c", f"import sys; sys.path = {sys.path}; {code}", cwd=cwd)
+    (*_, printed) = run(python, "-c", code, cwd=cwd).splitlines()
+    assert printed == ours.splitlines()[-1]
+    return printed
+
+
 def test_the_robot_moves_as_in_the_workspace(python: Path, tmp_path: Path) -> None:
     code = (
         "import gymnasium, cartpole; env = gymnasium.make('cartpole/Balance-v0'); env.reset(seed=0);"
         "print([env.step(k % 2)[0].tolist() for k in range(20)])"
     )
-    ours = run(sys.executable, "-c", f"import sys; sys.path = {sys.path}; {code}", cwd=tmp_path)
-    assert len(ours.splitlines()[-1].split(",")) == 80
-    assert run(python, "-c", code, cwd=tmp_path).splitlines()[-1] == ours.splitlines()[-1]
+    assert len(as_in_the_workspace(python, code, tmp_path).split(",")) == 80
+
+
+def test_the_robots_that_come_along_move_as_in_the_workspace(python: Path, tmp_path: Path) -> None:
+    code = (
+        "import gymnasium, robot_envs.robots;"
+        "ids = sorted(each for each in gymnasium.registry if each.startswith('robot_envs/'));"
+        "envs = [gymnasium.make(each) for each in ids];"
+        "[env.reset(seed=0) for env in envs];"
+        "steps = [env.step(env.action_space.sample() * 0.0 + 0.5) for env in envs];"
+        "print([(str(step[0]).split(), step[1]) for step in steps])"
+    )
+    assert as_in_the_workspace(python, code, tmp_path).count("([") == 6
 
 
 def test_rl_workbench_trains(python: Path, tmp_path: Path) -> None:

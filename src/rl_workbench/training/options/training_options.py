@@ -118,7 +118,8 @@ def choose(
     path = Path(special["config"]) if "config" in special else default_file(kind.config)
     preset = special.get("preset")
     wanted = given.get("env_id", None if preset else default)
-    section = read_section(path, wanted and kind.section.format(env_id=wanted), preset)
+    registered = wanted and wanted.rpartition(":")[2]  # without the module that registers it
+    section = read_section(path, registered and kind.section.format(env_id=registered), preset)
     merged = ({"env_id": wanted} if wanted else {}) | options.read(section, origin)
     return make_options(kind, until_the_steps(merged, given))._replace(showing=showing)
 

@@ -1,0 +1,102 @@
+"""The double pendulum: a cart keeps two rods upright, one on top of the other."""
+
+import math
+from functools import partial
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from robot_envs.files import own_file
+from robot_envs.robot import Robot
+from robot_envs.robots import spaces
+from robot_envs.task import Task
+from robot_envs.world_state import InitialState, WorldState
+
+STRONGEST = 15.0  # [N] that an action asks for
+LEAN = 0.5  # [rad] of a rod from the vertical, at which it counts as fallen
+EDGE = 0.95  # [m] of the cart from the rail's middle
+
+DOUBLE_PENDULUM = Robot(
+    urdf=partial(own_file, "cartpole", "urdf/double_pendulum.urdf.xacro"),
+    controllers=partial(own_file, "cartpole", "config/robots/double_pendulum.yaml"),
+    run=("joint_state_controller", "cart_controller"),
+    commanded=("cart_controller",),
+    name="double_pendulum",
+    control_period=0.02,
+)
+
+
+class Balance(Task):
+    """Both rods are kept upright, and the cart in the middle of its rail.
+
+    | | |
+    |---|---|
+    | actions | Box(-1, 1, (1,)): force on the cart, in units of 15 N |
+    | observations | Box(6): the cart's position [m] and speed [m/s]; angle of each rod from the vertical [0.2 rad] and its speed [2 rad/s], the lower one first |
+    | reward | 1 for each step, less 0.5 x² for the cart's position [m] and 0.01 (action)² |
+    | start | all within 0.03 [m, m/s, rad, rad/s] of upright and at rest in the middle |
+    | end | terminated when a rod is 0.5 rad from the vertical or the cart 0.95 m from the middle; truncated after 500 steps (10 s) |
+    """
+
+    max_steps = 500
+
+    def __init__(self, noise: float = 0.03) -> None:
+        self.noise = noise
+
+    def action_space(self) -> gymnasium.spaces.Box:
+        """See the class."""
+        return spaces.actions(1)
+
+    def observation_space(self) -> gymnasium.spaces.Box:
+        """See the class."""
+        return spaces.numbers(6)
+
+    def initial_state(self, rng: np.random.Generator) -> InitialState:
+        """Draws how far it is off."""
+        names = ("cart_joint", "lower_joint", "upper_joint")
+        off = rng.uniform(-self.noise, self.noise, (3, 2)).tolist()
+        return InitialState(
+            joints={
+                name: (position, speed) for name, (position, speed) in zip(names, off, strict=True)
+            }
+        )
+
+    def apply(self, action: np.ndarray, state: WorldState) -> dict[str, float]:
+        """The force on the cart."""
+        return {"cart_controller": STRONGEST * float(action[0])}
+
+    def observe(self, state: WorldState) -> np.ndarray:
+        """See the class."""
+        cart, lower, upper = rods(state)
+        seen = [
+            cart[0],
+            cart[1],
+            lower[0] / 0.2,
+            lower[1] / 2.0,
+            upper[0] / 0.2,
+            upper[1] / 2.0,
+        ]
+        return np.array(seen, np.float32)
+
+    def reward(self, state: WorldState, action: np.ndarray) -> float:
+        """See the class."""
+        off = state.joints["cart_joint"].position
+        return 1.0 - 0.5 * off * off - 0.01 * float(np.square(action).sum())
+
+    def is_terminal(self, state: WorldState) -> bool:
+        """Whether a rod has fallen, or the cart is at the rail's end."""
+        cart, lower, upper = rods(state)
+        return abs(cart[0]) > EDGE or abs(lower[0]) > LEAN or abs(upper[0]) > LEAN
+
+
+def rods(state: WorldState) -> list[tuple[float, float]]:
+    """Position and speed of the cart [m, m/s], and of both rods against the vertical [rad, rad/s]."""
+    cart, lower, upper = (
+        state.joints[name] for name in ("cart_joint", "lower_joint", "upper_joint")
+    )
+    return [
+        (cart.position, cart.velocity),
+        (lower.position, lower.velocity),
+        (lower.position + upper.position, lower.velocity + upper.velocity),
+    ]

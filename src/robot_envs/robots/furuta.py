@@ -1,0 +1,92 @@
+"""The Furuta pendulum: its arm swings the rod up, and keeps it there."""
+
+import math
+from functools import partial
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from robot_envs.files import own_file
+from robot_envs.robot import Robot
+from robot_envs.robots import spaces
+from robot_envs.task import Task
+from robot_envs.world_state import InitialState, WorldState
+
+STRONGEST = 0.3  # [N m] that an action asks for
+TURNS = 2.0 * math.pi  # [rad] that the arm may be away from where it points at the start
+
+FURUTA = Robot(
+    urdf=partial(own_file, "cartpole", "urdf/furuta.urdf.xacro"),
+    controllers=partial(own_file, "cartpole", "config/robots/furuta.yaml"),
+    run=("joint_state_controller", "arm_controller"),
+    commanded=("arm_controller",),
+    name="furuta",
+    control_period=0.02,
+)
+
+
+class SwingUp(Task):
+    """The rod hangs, and is to be swung up and held upright, with the arm near where it began.
+
+    | | |
+    |---|---|
+    | actions | Box(-1, 1, (1,)): torque of the motor, in units of 0.3 N m |
+    | observations | Box(5): cos and sin of the rod's angle (upright: 1, 0); its speed [10 rad/s]; the arm's angle [pi rad] and speed [10 rad/s] |
+    | reward | between 0 and 1: (1 + cos rod) / 2, times what is left of 1 for the arm's angle and speed, the rod's speed near the top, and the action |
+    | start | the rod hangs within 0.1 rad, the arm points ahead within 0.1 rad, speeds within 0.1 rad/s |
+    | end | terminated when the arm is a whole turn away from its start; truncated after 300 steps (6 s) |
+    | info | `upright`: the rod is within 0.2 rad of it |
+    """
+
+    max_steps = 300
+
+    def __init__(self) -> None:
+        self._last = 0.0
+
+    def action_space(self) -> gymnasium.spaces.Box:
+        """See the class."""
+        return spaces.actions(1)
+
+    def observation_space(self) -> gymnasium.spaces.Box:
+        """See the class."""
+        return spaces.numbers(5)
+
+    def initial_state(self, rng: np.random.Generator) -> InitialState:
+        """Draws how the rod hangs."""
+        arm, arm_speed, rod, rod_speed = (float(each) for each in rng.uniform(-0.1, 0.1, 4))
+        return InitialState(
+            joints={"arm_joint": (arm, arm_speed), "rod_joint": (math.pi + rod, rod_speed)}
+        )
+
+    def apply(self, action: np.ndarray, state: WorldState) -> dict[str, float]:
+        """The motor's torque."""
+        return {"arm_controller": STRONGEST * float(action[0])}
+
+    def observe(self, state: WorldState) -> np.ndarray:
+        """See the class."""
+        arm, rod = state.joints["arm_joint"], state.joints["rod_joint"]
+        seen = [
+            math.cos(rod.position),
+            math.sin(rod.position),
+            rod.velocity / 10.0,
+            arm.position / math.pi,
+            arm.velocity / 10.0,
+        ]
+        return np.array(seen, np.float32)
+
+    def reward(self, state: WorldState, action: np.ndarray) -> float:
+        """See the class."""
+        arm, rod = state.joints["arm_joint"], state.joints["rod_joint"]
+        height = (1.0 + math.cos(rod.position)) / 2.0
+        calm = 1.0 / (1.0 + 0.01 * (arm.velocity**2 + rod.velocity**2))
+        near = 1.0 / (1.0 + 0.3 * arm.position**2)
+        return height * (0.4 + 0.3 * calm + 0.3 * near)
+
+    def is_terminal(self, state: WorldState) -> bool:
+        """Whether the arm has gone round."""
+        return abs(state.joints["arm_joint"].position) > TURNS
+
+    def info(self, state: WorldState) -> dict[str, Any]:
+        """See the class."""
+        return {"upright": math.cos(state.joints["rod_joint"].position) > math.cos(0.2)}

@@ -1,0 +1,16 @@
+"""Spaces that the tasks of this folder have in common."""
+
+import gymnasium
+import numpy as np
+
+_ANY = float(np.finfo(np.float32).max)
+
+
+def actions(size: int) -> gymnasium.spaces.Box:
+    """So many numbers from -1 to 1."""
+    return gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float32)
+
+
+def numbers(size: int) -> gymnasium.spaces.Box:
+    """So many finite numbers."""
+    return gymnasium.spaces.Box(-_ANY, _ANY, (size,), np.float32)

@@ -1,0 +1,101 @@
+"""The robots that come along: their files, and that their environments are what Gymnasium wants."""
+
+import subprocess
+import sys
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.utils.env_checker import data_equivalence as same
+
+import robot_envs.robots
+from robot_envs.making import named
+
+IDS = sorted(each for each in gymnasium.registry if each.startswith("robot_envs/"))
+
+
+def rollout(env: gymnasium.Env[Any, Any], steps: int) -> list[Any]:
+    """All that an environment gives for seeded random actions; episodes follow one another."""
+    env.action_space.seed(1)
+    given: list[Any] = [env.reset(seed=1)]
+    for _ in range(steps):
+        given.append(env.step(env.action_space.sample()))
+        if given[-1][2] or given[-1][3]:
+            given.append(env.reset())
+    return given
+
+
+def test_the_page_and_the_registration_name_the_same_environments() -> None:
+    told = robot_envs.robots.__doc__ or ""
+    assert len(IDS) == 6
+    assert [each for each in IDS if f"| `{each}` |" not in told] == []
+
+
+def test_registering_them_loads_neither_their_files_nor_a_physics_engine() -> None:
+    code = "import robot_envs.robots, sys; print([m for m in sys.modules if 'pybullet' in m or 'robots.' in m])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+@pytest.mark.parametrize("identifier", IDS)
+class TestEach:
+    def test_gymnasiums_checker_has_nothing_to_say(self, identifier: str) -> None:
+        env = gymnasium.make(identifier, render_mode="rgb_array")
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            check_env(env.unwrapped)
+        assert [str(each.message) for each in caught] == []
+        env.close()
+
+    def test_its_description_is_sound_and_names_all_that_its_task_asks_for(
+        self, identifier: str
+    ) -> None:
+        made = gymnasium.registry[identifier].kwargs
+        robot, task = named(made["robot"]), named(made["task"])()
+        robot.check()
+        assert robot.links.warnings == []
+        links = {*robot.links.links, *robot.links.lumped}
+        assert {each.link for each in task.query.links} <= links
+        assert set(task.query.contacts_of) <= links
+
+    def test_the_same_seed_and_actions_give_the_same_bits(self, identifier: str) -> None:
+        first, second = gymnasium.make(identifier), gymnasium.make(identifier)
+        assert same(rollout(first, 120), rollout(second, 120))
+        assert same(rollout(first, 120), rollout(second, 120))  # whatever went before
+        first.close()
+        second.close()
+
+    def test_every_number_of_an_action_does_something(self, identifier: str) -> None:
+        env = gymnasium.make(identifier)
+        size = env.action_space.shape[0]
+        ends = []
+        for action in (np.zeros(size), *np.eye(size)):
+            env.reset(seed=3)
+            for _ in range(3):
+                env.step(action.astype(np.float32))
+            ends.append([j.position for j in env.unwrapped._state.joints.values()])
+        for end in ends[1:]:
+            assert np.abs(np.subtract(end, ends[0])).max() > 1e-3
+        env.close()
+
+    def test_observations_are_of_order_one(self, identifier: str) -> None:
+        env = gymnasium.make(identifier)
+        for given in rollout(env, 200):
+            seen = given[0]["observation"] if isinstance(given[0], dict) else given[0]
+            assert np.abs(seen).max() < 10.0
+        env.close()
+
+    def test_pictures_show_the_whole_robot(self, identifier: str) -> None:
+        """Its colours are there, and nothing of them is cut off at an edge."""
+        env = gymnasium.make(identifier, render_mode="rgb_array", width=160, height=120)
+        env.reset(seed=0)
+        picture = env.render().astype(int)
+        env.close()
+        coloured = picture.max(axis=2) - picture.min(axis=2) > 60
+        assert coloured.sum() > 40
+        edge = np.ones_like(coloured)
+        edge[2:-2, 2:-2] = False
+        assert not (coloured & edge).any()

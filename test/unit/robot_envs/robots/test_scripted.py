@@ -1,0 +1,218 @@
+"""That the tasks can be done: control by hand, from figures of the robots' files, does each of them."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+import robot_envs.robots  # noqa: F401 - registers the environments
+from robot_envs.robots import six_joint_arm, two_link_arm
+from robot_envs.world_state import InitialState, WorldState
+
+Policy = Callable[[WorldState], np.ndarray]
+
+
+def play(env: gymnasium.Env[Any, Any], policy: Policy) -> tuple[float, int, list[dict[str, Any]], bool]:
+    """Return, steps, infos and whether it terminated, of the episode that has begun."""
+    total, infos, terminated, truncated = 0.0, [], False, False
+    while not (terminated or truncated):
+        action = np.clip(policy(env.unwrapped._state), -1.0, 1.0).astype(np.float32)
+        _, reward, terminated, truncated, info = env.step(action)
+        total += reward
+        infos.append(info)
+    return total, len(infos), infos, terminated
+
+
+def state_of(state: WorldState, *names: str) -> np.ndarray:
+    """Positions, then velocities."""
+    joints = [state.joints[name] for name in names]
+    return np.array([j.position for j in joints] + [j.velocity for j in joints])
+
+
+class TestTwoLinkArm:
+    def angles(self, x: float, y: float) -> np.ndarray:
+        """Shoulder and elbow [rad] that put the tip there: the law of cosines."""
+        upper, fore = two_link_arm.UPPER_ARM, two_link_arm.FOREARM
+        elbow = math.acos((x * x + y * y - upper**2 - fore**2) / (2.0 * upper * fore))
+        inner = math.atan2(fore * math.sin(elbow), upper + fore * math.cos(elbow))
+        return np.array([math.atan2(y, x) - inner, elbow])
+
+    def towards(self, x: float, y: float) -> Policy:
+        wanted = self.angles(x, y)
+        return lambda state: 3.0 * (wanted - state_of(state, "shoulder", "elbow")[:2])
+
+    def test_the_tip_is_where_the_angles_say(self) -> None:
+        env = gymnasium.make("robot_envs/TwoLinkReachGoal-v0")
+        shoulder, elbow = self.angles(0.3, -0.2)
+        begin = InitialState(joints={"shoulder": shoulder, "elbow": elbow})
+        observation, info = env.reset(seed=0, options={"initial_state": begin, "goal": (0.3, -0.2)})
+        assert observation["achieved_goal"] == pytest.approx((0.3, -0.2), abs=1e-6)
+        assert info["is_success"]
+
+    def test_every_target_is_reached_and_held(self) -> None:
+        env = gymnasium.make("robot_envs/TwoLinkReach-v0")
+        for seed in range(20):
+            env.reset(seed=seed)
+            total, _, infos, _ = play(env, self.towards(*env.unwrapped.task.target))
+            assert all(info["is_success"] for info in infos[40:])
+            assert total > 0.0
+        env.close()
+
+    def test_every_goal_is_reached_and_held(self) -> None:
+        env = gymnasium.make("robot_envs/TwoLinkReachGoal-v0")
+        for seed in range(20):
+            observation, _ = env.reset(seed=seed)
+            total, _, infos, _ = play(env, self.towards(*observation["desired_goal"].tolist()))
+            assert all(info["is_success"] for info in infos[40:])
+            assert total > -40.0
+        env.close()
+
+    def test_rewards_of_many_goals_at_once_are_those_of_each(self) -> None:
+        env: Any = gymnasium.make("robot_envs/TwoLinkReachGoal-v0").unwrapped
+        achieved = np.array([[0.3, 0.0], [0.3, 0.019], [0.3, 0.021]], np.float32)
+        desired = np.array([[0.3, 0.0]] * 3, np.float32)
+        assert env.compute_reward(achieved, desired, [{}] * 3).tolist() == [0.0, 0.0, -1.0]
+        assert env.compute_reward(achieved[2], desired[2], {}) == -1.0
+
+
+class TestSixJointArm:
+    OFFSETS = ((0.0, 0.0, 0.10), (0.0, 0.0, 0.20), (0.0, 0.0, 0.30), (0.20, 0.0, 0.0),
+               (0.12, 0.0, 0.0), (0.08, 0.0, 0.0))  # fmt: skip # [m] from joint to joint
+    TIP = (0.05, 0.0, 0.0)
+    AXES = "zyyxyx"
+
+    def tip(self, angles: np.ndarray) -> np.ndarray:
+        """Where the tip is [m], from the joints' places and axes."""
+        place, turned = np.zeros(3), np.eye(3)
+        for offset, axis, angle in zip(self.OFFSETS, self.AXES, angles, strict=True):
+            place = place + turned @ np.array(offset)
+            turned = turned @ rotation(axis, angle)
+        return place + turned @ np.array(self.TIP)
+
+    def policy(self, target: tuple[float, float, float]) -> Policy:
+        """Damped least squares on the set-points."""
+
+        def act(state: WorldState) -> np.ndarray:
+            angles = np.array(six_joint_arm.set_points(state))
+            here, step = self.tip(angles), 1e-5
+            slopes = np.array([(self.tip(angles + step * e) - here) / step for e in np.eye(6)]).T
+            way = np.subtract(target, here)
+            moves = slopes.T @ np.linalg.solve(slopes @ slopes.T + 1e-3 * np.eye(3), way)
+            return moves / max(six_joint_arm.STEP, float(np.abs(moves).max()))
+
+        return act
+
+    def test_the_tip_is_where_the_angles_say(self) -> None:
+        env: Any = gymnasium.make("robot_envs/SixJointReach-v0").unwrapped
+        angles = (0.5, -0.4, 0.9, -1.1, 0.7, 2.0)
+        joints = dict(zip(six_joint_arm.JOINTS, angles, strict=True))
+        env.reset(seed=0, options={"initial_state": InitialState(joints=joints)})
+        found = env._state.links["tip"].pose.position
+        assert found == pytest.approx(self.tip(np.array(angles)), abs=1e-6)
+
+    def test_every_target_is_reached_and_held(self) -> None:
+        env = gymnasium.make("robot_envs/SixJointReach-v0")
+        for seed in range(10):
+            env.reset(seed=seed)
+            total, _, infos, _ = play(env, self.policy(env.unwrapped.task.target))
+            assert all(info["is_success"] for info in infos[40:])
+            assert total > 0.0
+        env.close()
+
+
+def rotation(axis: str, angle: float) -> np.ndarray:
+    """About an axis of the frame."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array(
+        {
+            "x": [[1, 0, 0], [0, c, -s], [0, s, c]],
+            "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]],
+            "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
+        }[axis]
+    )
+
+
+class TestFuruta:
+    BALANCE = np.array([-0.27, 4.39, -0.25, 0.49])  # LQR at the top
+    INERTIA, WEIGHT = 0.00208, 0.1 * 9.81 * 0.125  # [kg m²], [N m] of the rod
+
+    def act(self, state: WorldState) -> np.ndarray:
+        """Energy into the rod until it is near the top, then held there."""
+        arm, rod, arm_speed, rod_speed = state_of(state, "arm_joint", "rod_joint")
+        lean = math.remainder(rod, 2.0 * math.pi)
+        missing = self.WEIGHT * (1.0 - math.cos(lean)) - 0.5 * self.INERTIA * rod_speed**2  # [J]
+        if abs(lean) < 0.4 and abs(missing) < 0.05:
+            return np.array([-self.BALANCE @ (arm, lean, arm_speed, rod_speed)])
+        pumped = 15.0 * missing * rod_speed * math.cos(lean)
+        return np.array([pumped - 0.5 * arm - 0.05 * arm_speed])
+
+    def test_it_swings_up_and_stays_up(self) -> None:
+        env = gymnasium.make("robot_envs/Furuta-v0")
+        for seed in range(3):
+            env.reset(seed=seed)
+            total, steps, infos, _ = play(env, self.act)
+            assert steps == 300
+            assert all(info["upright"] for info in infos[250:])
+            assert 100.0 < total < 300.0
+        env.close()
+
+    def test_left_alone_it_hangs(self) -> None:
+        env = gymnasium.make("robot_envs/Furuta-v0")
+        env.reset(seed=0)
+        total, steps, infos, _ = play(env, lambda state: np.zeros(1))
+        assert (steps, any(info["upright"] for info in infos)) == (300, False)
+        assert total < 3.0
+
+    def test_an_arm_that_goes_round_ends_the_episode(self) -> None:
+        env = gymnasium.make("robot_envs/Furuta-v0")
+        env.reset(seed=0)
+        _, steps, _, terminated = play(env, lambda state: np.ones(1))
+        assert terminated
+        assert steps < 200
+        assert abs(env.unwrapped._state.joints["arm_joint"].position) > 2.0 * math.pi
+
+
+class TestDoublePendulum:
+    BALANCE = np.array([0.52, 3.88, 11.46, 0.70, 1.55, 1.40])  # LQR
+
+    def act(self, state: WorldState) -> np.ndarray:
+        return np.array([-self.BALANCE @ state_of(state, "cart_joint", "lower_joint", "upper_joint")])
+
+    def test_it_stays_up(self) -> None:
+        env = gymnasium.make("robot_envs/DoublePendulum-v0")
+        for seed in range(3):
+            env.reset(seed=seed)
+            total, steps, _, terminated = play(env, self.act)
+            assert (steps, terminated) == (500, False)
+            assert total > 495.0
+        env.close()
+
+    def test_left_alone_it_falls(self) -> None:
+        env = gymnasium.make("robot_envs/DoublePendulum-v0")
+        env.reset(seed=0)
+        _, steps, _, terminated = play(env, lambda state: np.zeros(1))
+        assert terminated
+        assert steps < 150
+
+
+class TestHopper:
+    def test_it_stands_in_its_stance_on_its_foot(self) -> None:
+        env = gymnasium.make("robot_envs/Hopper-v0")
+        env.reset(seed=0)
+        assert env.unwrapped._state.contacts == []
+        _, steps, infos, terminated = play(env, lambda state: np.zeros(3))
+        assert (steps, terminated) == (250, False)
+        assert abs(infos[-1]["x"]) < 0.1
+        touching = {each for pair in env.unwrapped._state.contacts for each in (pair.first, pair.second)}
+        assert any("foot" in name for name in touching)
+        assert any("ground" in name for name in touching)
+
+    def test_a_knee_that_gives_way_makes_it_fall(self) -> None:
+        env = gymnasium.make("robot_envs/Hopper-v0")
+        env.reset(seed=0)
+        _, steps, _, terminated = play(env, lambda state: np.array([1.0, 0.0, -1.0]))
+        assert terminated
+        assert steps < 250
