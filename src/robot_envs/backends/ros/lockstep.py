@@ -47,7 +47,7 @@ class LockstepWorld:
         self._query = StateQuery()
         self._begun = StepWorldResponse()
         self._held: dict[str, Any] = {}
-        self._variation = RosVariation(scene.robots[0])
+        self._variation = RosVariation(scene)
 
     def look(self, query: StateQuery) -> None:
         """See `RobotBackend.look`.
