@@ -57,7 +57,9 @@ class InProcessChanges:
         try:
             set_link_friction(self._model(link), link.name, factor)
         except PropertyError as error:
-            raise SimulatorError(f"surfaces of link {link.name} can't be changed: {error}") from error
+            raise SimulatorError(
+                f"surfaces of link {link.name} can't be changed: {error}"
+            ) from error
 
     def pids(self, controller: Part) -> Mapping[str, PidFigures]:
         pids = self._robots[controller.robot.model].manager.get(controller.name).pids.items()

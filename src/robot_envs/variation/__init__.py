@@ -4,7 +4,8 @@
 |---|---|
 | variation.py | what can differ of a robot |
 | randomisation.py | draws that for each episode, from options.py, by the names of parts.py |
-| applying.py | changes a robot, wherever it moves, and gives it back as it was found; inertia.py: what becomes of a link's figures |
+| applying.py | changes a robot, wherever it moves, and gives it back as it was found |
+| inertia.py | what becomes of a link's figures |
 | sensing.py | what is measured: noise, encoders, delay |
 | actuation.py | what becomes of commands: delay, limits, lag |
 

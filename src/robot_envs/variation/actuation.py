@@ -23,8 +23,8 @@ class Actuator:
     Args:
         holds: by controller, whether it takes positions; others take velocities or efforts.
         period: of control [s].
-        delay: how many control steps pass before a command arrives. Until the first one does, controllers hold
-            what they held at the episode's start.
+        delay: how many control steps pass before a command arrives. Until the first one does, controllers
+            hold what they held at the episode's start.
         limit: one for all, or by controller. Efforts [N, N m] and velocities [m/s, rad/s] are cut at it,
             either way; positions follow no faster than that [m/s, rad/s].
         lag: time constant of a first-order lag [s]: one for all, or by controller; 0: none. For a control

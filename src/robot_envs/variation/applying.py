@@ -1,4 +1,4 @@
-"""Changes robots as a variation says, in one order on all backends, and gives them back as they were found."""
+"""Changes robots as a variation says, in one order on all backends, and gives them back as found."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol

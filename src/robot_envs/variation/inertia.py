@@ -12,11 +12,18 @@ _AXES = {  # of a length: its index, and the moments and products that each powe
     "y": (1, ("ixx", "izz"), ("ixy", "iyz")),
     "z": (2, ("ixx", "iyy"), ("ixz", "iyz")),
 }
-_ENTRIES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+_ENTRIES = {
+    "ixx": (0, 0),
+    "ixy": (0, 1),
+    "ixz": (0, 2),
+    "iyy": (1, 1),
+    "iyz": (1, 2),
+    "izz": (2, 2),
+}
 
 
 def length_axis(inertia: Inertia) -> str:
-    """The axis of the link's frame along which it is long: the one on which its centre of mass lies furthest out."""
+    """The axis of the link's frame along which it is long: where its centre of mass lies furthest out."""
     x, y, z = (abs(value) for value in inertia.com.position)
     return "z" if z >= max(x, y) else "x" if x >= y else "y"
 

@@ -17,7 +17,9 @@ def is_number(value: Any) -> bool:
         return False
 
 
-def by_name(option: str, given: Any, names: Sequence[str], kind: str, which: str = "") -> dict[str, Any]:
+def by_name(
+    option: str, given: Any, names: Sequence[str], kind: str, which: str = ""
+) -> dict[str, Any]:
     """What is given for each of `names`, unchecked; without those that a mapping leaves out.
 
     Args:
@@ -57,5 +59,7 @@ def steps(option: str, given: Any, most: int) -> int:
         ValueError: for anything else.
     """
     if not is_number(given) or not 0 <= given <= most or given != int(given):
-        raise ValueError(f"{option} must be a number of control steps from 0 to {most}, not {given!r}")
+        raise ValueError(
+            f"{option} must be a number of control steps from 0 to {most}, not {given!r}"
+        )
     return int(given)

@@ -55,6 +55,7 @@ OPTIONS = (  # in the order in which numbers are drawn: new ones go to the end
     Option("gains", CONTROLLERS, 0.1, 10.0),
     Option("gravity", WORLD, 0.0, 10.0),
 )
+ROUNDING = 1e-9  # 1 - 0.9 is a little less than 0.1
 
 
 class Range(NamedTuple):
@@ -93,13 +94,17 @@ def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, Range]
         ValueError: for what it can't be, or a name that isn't there.
     """
     if not names:
-        raise ValueError(f"randomisation of {option.name}: the robot has no {option.of.name} {option.of.which}")
+        raise ValueError(
+            f"randomisation of {option.name}: the robot has no {option.of.name} {option.of.which}"
+        )
     if not isinstance(given, Mapping):
         return dict.fromkeys(names, _range(option, given, option.name))
     if option.of == WORLD:
         raise ValueError(f"randomisation of {option.name} is one for the world, not {dict(given)}")
     found = by_name(f"randomisation of {option.name}", given, names, *option.of)
-    return {name: _range(option, value, f"{option.name} of '{name}'") for name, value in found.items()}
+    return {
+        name: _range(option, value, f"{option.name} of '{name}'") for name, value in found.items()
+    }
 
 
 def _range(option: Option, given: Any, what: str) -> Range:
@@ -111,12 +116,15 @@ def _range(option: Option, given: Any, what: str) -> Range:
     if len(numbers) == 1:
         size = numbers[0]
         if size < 0.0:
-            raise ValueError(f"randomisation of {what} is one number: it must be >= 0, not {given!r}")
+            raise ValueError(
+                f"randomisation of {what} is one number: it must be >= 0, not {given!r}"
+            )
         numbers = [option.nominal - size * option.either_way, option.nominal + size]
     low, high = map(float, numbers)
-    if not option.least <= low <= high <= option.most:
+    least, most = option.least, option.most
+    if not least - ROUNDING <= low <= high <= most + ROUNDING:
         raise ValueError(
-            f"randomisation of {what} from {low:g} to {high:g}: it must lie within {option.least:g} and "
-            f"{option.most:g}, the lower number first"
+            f"randomisation of {what} from {low:g} to {high:g}: it must lie within {least:g} and {most:g}, "
+            "the lower number first"
         )
-    return Range(low, high)
+    return Range(max(low, least), min(high, most))

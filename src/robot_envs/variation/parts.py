@@ -15,7 +15,13 @@ from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.variation.inertia import length_axis
 
-MOST_GAINS = {"p": 1e5, "i": 1e5, "d": 1e3, "i_max": 1e5, "i_min": 1e5}  # of control_toolbox's server
+MOST_GAINS = {
+    "p": 1e5,
+    "i": 1e5,
+    "d": 1e3,
+    "i_max": 1e5,
+    "i_min": 1e5,
+}  # of control_toolbox's server
 
 
 class Part(NamedTuple):
@@ -116,9 +122,7 @@ def gains_of(controller: Part) -> dict[str, Gains]:
     return {place: pid.gains for place, pid in loaded[name].pids.items()}
 
 
-def check_tunable(
-    pids: Mapping[str, Mapping[str, Gains]], factors: Mapping[str, float]
-) -> None:
+def check_tunable(pids: Mapping[str, Mapping[str, Gains]], factors: Mapping[str, float]) -> None:
     """Sees to it that gains can be changed over ROS, so that they are the same on all backends.
 
     Args:

@@ -10,8 +10,8 @@ from robot_envs.variation.options import (
     CONTROLLERS,
     JOINTS,
     LINKS,
-    SOLIDS,
     OPTIONS,
+    SOLIDS,
     WORLD,
     Option,
     Range,
@@ -94,7 +94,7 @@ class UniformRandomisation:
             drawn.get("gains", {}),
             drawn.get("gravity"),
         )
-        return variation, drawn
+        return variation, {name: _told(value) for name, value in drawn.items()}
 
     def _drawn(self, option: Option, shares: Sequence[float]) -> Any:
         places, several = self._places[option.name], option.numbers
@@ -108,5 +108,17 @@ class UniformRandomisation:
         }
 
     def _scale(self, link: str, drawn: Drawn) -> LinkScale:
-        given = {key: drawn[key][link] for key in ("mass", "length", "com") if link in drawn.get(key, ())}
+        given = {
+            key: drawn[key][link] for key in ("mass", "length", "com") if link in drawn.get(key, ())
+        }
         return LinkScale(**given, axis=self._axes[link])
+
+
+def _told(drawn: Any) -> Any:
+    """A copy, with arrays for what has several numbers, which vectors of environments can stack."""
+    if not isinstance(drawn, Mapping):
+        return drawn
+    return {
+        name: np.array(value) if isinstance(value, tuple) else value
+        for name, value in drawn.items()
+    }

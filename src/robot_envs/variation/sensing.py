@@ -33,7 +33,7 @@ class Encoder(NamedTuple):
 
 
 class Sensor:
-    """Measures the joints. What else a state tells is as it was, and as late; commands are those of the moment.
+    """Measures the joints. What else a state tells is as it was, and as late, but for the commands.
 
     A joint with an `encoder_step` has a velocity that its driver takes from two positions: their difference
     over the control period. It is a multiple of step / period, and its only noise is that of the positions.

@@ -106,7 +106,9 @@ class Lockstep(Session):
         self.assertTrue(gravity_mode)
         self.assertEqual(gravity, -9.8 * info["gravity"])
         factor = info["gains"]["/rig/servo_position"]
-        self.assertEqual(gains, {"p": 20.0 * factor, "i": 0.5 * factor, "d": 2.0 * factor, "i_clamp_max": 1.0})
+        self.assertEqual(
+            gains, {"p": 20.0 * factor, "i": 0.5 * factor, "d": 2.0 * factor, "i_clamp_max": 1.0}
+        )
         varied.close()
         self.assertEqual(figures(), OWN)
         for one, other in zip(plain, rollout(make_both("ros")), strict=True):
@@ -128,7 +130,9 @@ class Realtime(Session):
     def test_surfaces_are_refused_with_the_reason(self):
         env = make_rig("ros-realtime")
         self.addCleanup(env.close)
-        with self.assertRaisesRegex(SimulatorError, "set_link_friction: the simulator isn't in lock-step"):
+        with self.assertRaisesRegex(
+            SimulatorError, "set_link_friction: the simulator isn't in lock-step"
+        ):
             env.backend.vary(Variation(surfaces={"cart": 0.5}))
 
 

@@ -64,7 +64,12 @@ def test_positions_follow_no_faster_than_the_limit(wanted, held, speed):
 
 
 def test_a_limited_position_arrives_exactly():
-    assert run(Actuator({"servo": True}, 0.5, limit=1.0), "servo", [1.2] * 4) == [0.5, 1.0, 1.2, 1.2]
+    assert run(Actuator({"servo": True}, 0.5, limit=1.0), "servo", [1.2] * 4) == [
+        0.5,
+        1.0,
+        1.2,
+        1.2,
+    ]
     assert run(Actuator({"servo": True}, 0.5, limit=1.0), "servo", [-0.6] * 2, 0.1) == [-0.4, -0.6]
 
 
@@ -110,7 +115,10 @@ def test_what_is_given_is_not_changed():
         ({"delay": "2"}, "action_delay"),
         ({"lag": -0.1}, "actuator_lag must be a number >= 0, not -0.1"),
         ({"lag": float("inf")}, "actuator_lag"),
-        ({"lag": {"motr": 0.1}}, "actuator_lag: there is no controller 'motr'; did you mean 'motor'?"),
+        (
+            {"lag": {"motr": 0.1}},
+            "actuator_lag: there is no controller 'motr'; did you mean 'motor'?",
+        ),
         ({"lag": {"x": 0.1}}, "there is no controller 'x'; there are motor, servo"),
         ({"limit": -1.0}, "actuator_limit must be a number >= 0"),
         ({"limit": True}, "actuator_limit"),

@@ -7,6 +7,7 @@ import pytest
 from rig import INERTIA, MASS, PERIOD, RIG, Watch, make_both, make_rig
 
 from robot_envs import RobotEnv
+from robot_envs.vector.environment import RobotVectorEnv
 
 G = 9.8  # [m/s²]
 REST = np.zeros(3)
@@ -25,7 +26,10 @@ def joints_after(env: RobotEnv, action, steps: int = 1) -> dict[str, tuple[float
 
 def vary(backend: str = "bullet", start=None, tick: bool = False, **randomisation):
     """The rig with options that have one value each: low is high; with `tick`, each step is one."""
-    fixed = {name: (value, value) if np.isscalar(value) else value for name, value in randomisation.items()}
+    fixed = {
+        name: (value, value) if np.isscalar(value) else value
+        for name, value in randomisation.items()
+    }
     period = 0.001 if tick else PERIOD
     return make_rig(backend, start, randomisation=fixed, control_period=period)
 
@@ -77,7 +81,7 @@ def test_gains_drive_so_many_times_as_hard(factor):
 
 
 def test_a_length_moves_the_centre_and_its_moments():
-    """The wheel, turned about z, is as heavy as before; its moments about x and y are those of a longer rod."""
+    """The wheel is as heavy as before; its moments about x and y are those of a longer rod."""
     env = vary(length={"wheel": (2.0, 2.0)}, com={"cart": (0.1, 0.1)})
     env.reset(seed=0)
     robot = next(each for each in env.backend._sim.robots)
@@ -185,3 +189,20 @@ def test_robots_that_share_a_world_are_named_with_their_model():
     assert list(told["mass"]) == ["rig::cart"]
     assert list(told["gains"]) == ["/rig/servo_position"]
     assert 0.9 <= told["gravity"] <= 1.1
+
+
+def test_a_vector_of_environments_gives_each_its_own_robot():
+    options = {"randomisation": {"mass": 0.2, "com": {"cart": 0.01}}, "actuator_lag": 0.02}
+    many = RobotVectorEnv(3, "rig:make_rig", workers=0, **options)
+    infos = many.reset(seed=4)[1]["variation"]
+    pushed = [many.step(np.tile([5.0, 0.0, 0.0], (3, 1)))[0] for _ in range(3)][-1]
+    many.close()
+    for index in range(3):
+        env = make_rig(**options)
+        info = env.reset(seed=4 + index)[1]["variation"]
+        for _ in range(3):
+            alone, *_ = env.step(np.array([5.0, 0.0, 0.0]))
+        env.close()
+        assert (pushed[index] == alone).all()
+        assert infos["mass"]["cart"][index] == info["mass"]["cart"]
+        assert (infos["com"]["cart"][index] == info["com"]["cart"]).all()

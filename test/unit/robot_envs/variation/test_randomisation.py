@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import data_equivalence as same
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig import RIG, SLEDGE, make_rig
@@ -57,13 +58,17 @@ def test_a_pair_is_a_range(one, other, seed):
 
 
 @settings(max_examples=50)
-@given(st.sets(st.sampled_from([option.name for option in OPTIONS if option.name != "surface_friction"])))
+@given(
+    st.sets(
+        st.sampled_from([option.name for option in OPTIONS if option.name != "surface_friction"])
+    )
+)
 def test_options_do_not_change_what_others_draw_nor_the_stream(chosen):
     everything = dict.fromkeys([*NAMES, "gravity"], 0.5)
     rng, other = np.random.default_rng(3), np.random.default_rng(3)
     _, all_told = UniformRandomisation(SCENE, everything).draw(rng)
-    _, told = UniformRandomisation(SCENE, {name: 0.5 for name in chosen}).draw(other)
-    assert told == {name: all_told[name] for name in told}
+    _, told = UniformRandomisation(SCENE, dict.fromkeys(chosen, 0.5)).draw(other)
+    assert same(told, {name: all_told[name] for name in told}, exact=True)
     assert set(told) == chosen
     assert rng.random() == other.random()
 
@@ -82,7 +87,7 @@ def test_a_variation_has_what_was_told():
     assert {name: link.mass for name, link in variation.links.items()} == told["mass"]
     assert variation.links["wheel"].length == told["length"]["wheel"]
     assert variation.links["cart"].length == 1.0
-    assert variation.links["cart"].com == told["com"]["cart"]
+    assert variation.links["cart"].com == tuple(told["com"]["cart"])
     assert (variation.damping, variation.friction) == (told["damping"], told["friction"])
     assert (variation.gains, variation.gravity) == (told["gains"], told["gravity"])
 
@@ -97,7 +102,8 @@ def test_draws_are_spread_over_the_range():
 
 def test_options_may_be_what_a_command_line_makes_of_them():
     given = {"mass": [1, 2], "com": {"cart": np.array([0.0, 0.1])}, "gravity": np.float32(0.5)}
-    assert draw(given)[1] == draw({"mass": (1.0, 2.0), "com": {"cart": (0.0, 0.1)}, "gravity": 0.5})[1]
+    meant = {"mass": (1.0, 2.0), "com": {"cart": (0.0, 0.1)}, "gravity": 0.5}
+    assert same(draw(given)[1], draw(meant)[1], exact=True)
 
 
 @pytest.mark.parametrize(
@@ -107,8 +113,14 @@ def test_options_may_be_what_a_command_line_makes_of_them():
         ({"colour": 0.1}, "no option 'colour'; there are mass, length, com, damping"),
         ({"mass": -0.1}, "randomisation of mass is one number: it must be >= 0, not -0.1"),
         ({"mass": 0.95}, "of mass from 0.05 to 1.95: it must lie within 0.1 and 10"),
-        ({"mass": (1.2, 0.8)}, "of mass from 1.2 to 0.8: it must lie within 0.1 and 10, the lower number"),
-        ({"mass": (0.8, 1.0, 1.2)}, "of mass is a number or a pair (low, high), not (0.8, 1.0, 1.2)"),
+        (
+            {"mass": (1.2, 0.8)},
+            "of mass from 1.2 to 0.8: it must lie within 0.1 and 10, the lower number",
+        ),
+        (
+            {"mass": (0.8, 1.0, 1.2)},
+            "of mass is a number or a pair (low, high), not (0.8, 1.0, 1.2)",
+        ),
         ({"mass": "0.1"}, "of mass is a number or a pair"),
         ({"mass": None}, "of mass is a number or a pair"),
         ({"mass": True}, "of mass is a number or a pair"),
@@ -117,11 +129,20 @@ def test_options_may_be_what_a_command_line_makes_of_them():
         ({"damping": (-1.0, 1.0)}, "of damping from -1 to 1: it must lie within 0 and"),
         ({"gravity": (-1.0, 1.0)}, "of gravity from -1 to 1: it must lie within 0 and 10"),
         ({"gravity": {"z": 0.1}}, "of gravity is one for the world"),
-        ({"mass": {"kart": 0.1}}, "of mass: there is no link 'kart' that moves and has a mass; did you mean 'cart'?"),
-        ({"mass": {"world": 0.1}}, "there is no link 'world' that moves and has a mass; there are cart,"),
+        (
+            {"mass": {"kart": 0.1}},
+            "of mass: there is no link 'kart' that moves and has a mass; did you mean 'cart'?",
+        ),
+        (
+            {"mass": {"world": 0.1}},
+            "there is no link 'world' that moves and has a mass; there are cart,",
+        ),
         ({"mass": {"cart": -1}}, "of mass of 'cart' is one number"),
         ({"damping": {"rial": 0.1}}, "there is no joint 'rial' that moves; did you mean 'rail'?"),
-        ({"gains": {"motors": 0.1}}, "there is no controller 'motors' with a PID; there are servo_position"),
+        (
+            {"gains": {"motors": 0.1}},
+            "there is no controller 'motors' with a PID; there are servo_position",
+        ),
         ({"surface_friction": 0.1}, "of surface_friction: the robot has no link with a collision"),
     ],
 )
@@ -137,14 +158,22 @@ def test_an_environment_refuses_it_before_there_is_a_world():
 
 
 def test_surfaces_are_those_of_links_with_a_collision():
-    assert list(draw({"surface_friction": 0.5}, scene=BOTH)[1]["surface_friction"]) == ["sledge::body"]
+    assert list(draw({"surface_friction": 0.5}, scene=BOTH)[1]["surface_friction"]) == [
+        "sledge::body"
+    ]
 
 
 @pytest.mark.parametrize(
     ("pid", "text"),
     [
-        ({"p": 9e4}, "p of servo_position/pid would be up to 108000, and dynamic_reconfigure takes 100000"),
-        ({"p": 1, "d": -900}, "d of servo_position/pid would be up to -1080, and dynamic_reconfigure takes 1000"),
+        (
+            {"p": 9e4},
+            "p of servo_position/pid would be up to 108000, and dynamic_reconfigure takes 100000",
+        ),
+        (
+            {"p": 1, "d": -900},
+            "d of servo_position/pid would be up to -1080, and dynamic_reconfigure takes 1000",
+        ),
         ({"p": 1, "i_clamp": 2e5}, "i_max of servo_position/pid would be up to 200000"),
     ],
 )

@@ -137,7 +137,10 @@ def test_noise_comes_before_the_steps(rng):
         ({"noise": [0.1, 0.2, 0.3]}, r"sensor_noise is a number or a pair \(position, velocity\)"),
         ({"noise": []}, "sensor_noise"),
         ({"noise": {"elbow": (0.1, -1.0)}}, "sensor_noise"),
-        ({"noise": {"elbo": 0.1}}, r"sensor_noise: there is no joint 'elbo'; did you mean 'elbow'\?"),
+        (
+            {"noise": {"elbo": 0.1}},
+            r"sensor_noise: there is no joint 'elbo'; did you mean 'elbow'\?",
+        ),
         ({"delay": -1}, "sensor_delay must be a number of control steps from 0 to 1000, not -1"),
         ({"delay": 1001}, "sensor_delay"),
         ({"delay": 1.5}, "sensor_delay"),

@@ -34,7 +34,12 @@ def test_products_of_a_length_grow_with_it():
 
 @pytest.mark.parametrize(
     ("place", "axis"),
-    [((0.0, 0.0, 0.5), "z"), ((0.3, 0.1, 0.0), "x"), ((0.0, -0.4, 0.1), "y"), ((0.0, 0.0, 0.0), "z")],
+    [
+        ((0.0, 0.0, 0.5), "z"),
+        ((0.3, 0.1, 0.0), "x"),
+        ((0.0, -0.4, 0.1), "y"),
+        ((0.0, 0.0, 0.0), "z"),
+    ],
 )
 def test_a_link_is_long_where_its_centre_lies(place, axis):
     assert length_axis(Inertia(1.0, Pose(place))) == axis
@@ -89,4 +94,8 @@ def test_a_variation_undone_is_nominal_and_names_the_same(variation):
     assert variation.undone.is_nominal
     for name, value in vars(variation).items():
         undone = getattr(variation.undone, name)
-        assert undone.keys() == value.keys() if isinstance(value, dict) else (undone is None) == (value is None)
+        assert (
+            undone.keys() == value.keys()
+            if isinstance(value, dict)
+            else (undone is None) == (value is None)
+        )

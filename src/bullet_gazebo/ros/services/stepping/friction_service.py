@@ -12,7 +12,7 @@ from bullet_gazebo.simulator import Simulator
 
 
 class FrictionService:
-    """What no service of Gazebo's does, so that surfaces differ from episode to episode; in lock-step only."""
+    """What no service of Gazebo's does, for surfaces that differ from episode to episode; in lock-step."""
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
