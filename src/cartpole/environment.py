@@ -1,6 +1,6 @@
 """The cart-pole's environments and their manual page, the docstring of `CartPoleEnv`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -106,8 +106,10 @@ class CartPoleEnv(RobotEnv):
         )
 
 
-def _by_joint(noise: float | Sequence[float] | np.ndarray) -> Any:
+def _by_joint(noise: float | Sequence[float] | np.ndarray | Mapping[str, Any]) -> Any:
     """Noise as `CartPoleState` has its numbers, by the name of the joint."""
+    if isinstance(noise, Mapping):
+        return noise
     sizes = np.ravel(noise).tolist() * (1 if np.ndim(noise) else 4)
     if len(sizes) != 4:
         raise ValueError(f"sensor noise must be one or 4 numbers >= 0, not {noise}")

@@ -1,6 +1,7 @@
 """The cart-pole's environments by task and plain options: what stands behind `gymnasium.make`."""
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 from cartpole.environment import CartPoleEnv
@@ -8,13 +9,15 @@ from cartpole.tasks import TASKS, CartPoleTask
 from cartpole.variation import Randomisation
 from robot_envs.making import check_options
 
+OWN = tuple(each.name for each in fields(Randomisation))
+
 
 def make_environment(
     task: str,
     backend: str | None = None,
     *,
     noise: float | None = None,
-    randomisation: Mapping[str, float] | None = None,
+    randomisation: Mapping[str, Any] | None = None,
     **options: Any,
 ) -> CartPoleEnv:
     """Makes an environment; the options are explained in `CartPoleEnv`.
@@ -24,8 +27,10 @@ def make_environment(
         RobotEnvError: if the robot can't be brought up.
     """
     check_options(options, ("noise",))
-    drawn = Randomisation(**randomisation) if randomisation else None
-    return CartPoleEnv(make_task(task, noise), backend, randomisation=drawn, **options)
+    varied: Randomisation | Mapping[str, Any] | None = randomisation
+    if randomisation and set(randomisation) <= set(OWN):
+        varied = Randomisation(**randomisation)
+    return CartPoleEnv(make_task(task, noise), backend, randomisation=varied, **options)
 
 
 def make_task(name: str, noise: float | None = None) -> CartPoleTask:

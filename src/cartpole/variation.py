@@ -29,7 +29,7 @@ class CartPoleVariation(NamedTuple):
                 CART_LINK: LinkScale(self.cart_mass),
                 POLE_LINK: LinkScale(self.pole_mass, self.pole_length),
             },
-            {CART_JOINT: self.cart_friction, POLE_JOINT: self.pole_friction},
+            damping={CART_JOINT: self.cart_friction, POLE_JOINT: self.pole_friction},
         )
 
 

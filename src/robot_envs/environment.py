@@ -16,11 +16,13 @@ from robot_envs.backends.choice import make_backend
 from robot_envs.pictures.picture import HEIGHT, WIDTH, RobotPicture
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.sensing import Noise, Sensor
 from robot_envs.spaces import action_reader, observation_reader
 from robot_envs.task import GoalTask, Task
 from robot_envs.variation import Randomisation
-from robot_envs.world_state import InitialState, WorldState
+from robot_envs.variation.actuation import Actuator
+from robot_envs.variation.randomisation import UniformRandomisation
+from robot_envs.variation.sensing import Noise, Sensor
+from robot_envs.world_state import Commands, InitialState, WorldState
 from web_page.display import hindrance
 
 if TYPE_CHECKING:
@@ -69,7 +71,12 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         max_steps: after how many steps an episode is cut off; None: the task's.
         sensor_noise: standard deviation of noise on joints' positions and velocities; see `Sensor`.
         sensor_delay: how many control steps old an observation is.
-        randomisation: what differs from episode to episode; nothing by default.
+        encoder_step: what positions are rounded to [rad, m]; see `Sensor`, too.
+        action_delay: how many control steps pass before a command arrives.
+        actuator_limit: of commands; see `Actuator`.
+        actuator_lag: time constant of what follows commands [s]; see `Actuator`.
+        randomisation: what differs from episode to episode: options of `UniformRandomisation` by name, or a
+            `Randomisation` of one's own. What was drawn stands in the reset's `info["variation"]`.
         camera: where pictures are taken from, see `robot_envs.pictures.picture`.
         width: of the pictures [pixels].
         height: of the pictures [pixels].
@@ -92,7 +99,11 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         max_steps: int | None = None,
         sensor_noise: Noise = 0.0,
         sensor_delay: int = 0,
-        randomisation: Randomisation | None = None,
+        encoder_step: float | Mapping[str, float] = 0.0,
+        action_delay: int = 0,
+        actuator_limit: float | Mapping[str, float] | None = None,
+        actuator_lag: float | Mapping[str, float] = 0.0,
+        randomisation: Mapping[str, Any] | Randomisation | None = None,
         camera: Camera | None = None,
         width: int = WIDTH,
         height: int = HEIGHT,
@@ -114,10 +125,18 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         if isinstance(task, GoalTask):
             self.observation_space = _goal_space(task, space)
             self.compute_reward = task.compute_reward  # environments without goals have none
-        self._sensor = _sensor(self.scene, sensor_noise, sensor_delay)
-        self._randomisation = randomisation
         period = self.scene.robots[0].control_period if control_period is None else control_period
         shown = period if period > 0.0 else self.scene.robots[0].control_period  # [s] a picture
+        sensor = Sensor(self.scene.joints, shown, sensor_noise, sensor_delay, encoder_step)
+        self._sensor = None if sensor.is_exact else sensor
+        holds = {name: port.holds for name, (_, port) in self.scene.ports.items()}
+        actuator = Actuator(holds, shown, action_delay, actuator_limit, actuator_lag)
+        self._actuator = None if actuator.is_ideal else actuator
+        if isinstance(randomisation, Mapping):
+            randomisation = (
+                UniformRandomisation(self.scene, randomisation) if randomisation else None
+            )
+        self._randomisation = randomisation
         self.metadata = {
             "render_modes": ["human", "rgb_array"] if window and not hindrance() else ["rgb_array"],
             "render_fps": max(1, round(1.0 / shown)),
@@ -186,6 +205,8 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         if self._first:
             state = state._replace(commands={**state.commands, **self._first})
         self._state = state
+        if self._actuator is not None:
+            self._actuator.begin(state.commands)
         if isinstance(self.task, GoalTask):
             self._aim(self.task, state, options.get("goal"))
         measured = state if self._sensor is None else self._sensor.begin(state, self.np_random)
@@ -242,7 +263,7 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         if self._first:  # what the controllers held until now goes along
             commands = {**self._first, **commands}
             self._first = {}
-        self._state = state = self.backend.act(commands)
+        self._state = state = self._act(commands)
         self._steps += 1
         terminated = bool(task.is_terminal(state))
         truncated = not terminated and self._steps == self.max_steps
@@ -258,6 +279,13 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         if self._aimed:
             seen = self._with_goals(seen, measured)
         return seen, reward, terminated, truncated, task.info(state)
+
+    def _act(self, commands: Commands) -> WorldState:
+        """The state after a control period; it tells commands as they were sent, whatever arrived of them."""
+        if self._actuator is None or self._state is None:
+            return self.backend.act(commands)
+        sent = {**self._state.commands, **commands}
+        return self.backend.act(self._actuator(sent))._replace(commands=sent)
 
     def _with_goals(self, seen: Any, state: WorldState) -> dict[str, Any]:
         """An observation beside the goal that the state achieves, and that of the episode."""
@@ -336,11 +364,6 @@ def _known_mode(mode: str | None, has_window: bool) -> str | None:
         names = " or ".join(f'"{name}"' for name in known)
         raise ValueError(f"render_mode is {names}, not {mode!r}")
     return mode
-
-
-def _sensor(scene: Scene, noise: Any, delay: int) -> Sensor | None:
-    sensor = Sensor(scene.joints, noise, delay)
-    return None if sensor.is_exact else sensor
 
 
 def _goal_space(task: GoalTask, space: gymnasium.Space[Any]) -> gymnasium.Space[Any]:

@@ -7,7 +7,7 @@ from ros_calls.xmlrpc import NoAnswer, Refused
 
 START = "roslaunch gazebo_ros empty_world.launch"
 WORLD = "get_world_properties"  # every simulator has it
-LOCKSTEP = ("step_world", "advance_world")
+LOCKSTEP = ("step_world", "advance_world", "set_link_friction")
 MANAGER = "controller_manager"
 OF_A_WORLD = (
     *(WORLD, "pause_physics", "unpause_physics", "reset_world", "reset_simulation", "delete_model"),
@@ -19,6 +19,7 @@ OF_A_WORLD = (
         "get_link_state",
     ),
     *("set_model_configuration", "get_physics_properties", "set_physics_properties"),
+    *("get_link_properties", "set_link_properties", "set_joint_properties"),
 )
 
 

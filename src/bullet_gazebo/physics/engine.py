@@ -88,6 +88,10 @@ class Body(ABC):
         """
 
     @abstractmethod
+    def set_friction(self, link: str, factor: float) -> None:
+        """Gives the collisions of `link` so many times the friction that they were loaded with."""
+
+    @abstractmethod
     def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
         """Puts joint `index` at `position` with `velocity`, without touching the other joints."""
 

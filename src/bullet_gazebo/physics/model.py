@@ -28,6 +28,7 @@ class Model:
         self._damped: dict[str, float] = {}  # the engine's damping [N m s/rad, N s/m] by joint
         self.damping_added: Mapping[str, float] = {}  # [N m s/rad, N s/m] beside the file's
         self._motors: dict[str, tuple[float, float]] = {}  # speed [rad/s, m/s] and effort [N m, N]
+        self._grip: dict[str, float] = {}  # factors of the friction of links
         self._joints = {joint: index for index, joint in enumerate(body.joint_names)}
 
     @property
@@ -140,6 +141,11 @@ class Model:
         self._motors[name] = (max(-FASTEST, min(FASTEST, speed)), min(most, NO_STOP))
         self.body.set_motor(self._joints[name], *self._motors[name])
 
+    def set_friction(self, link: str, factor: float) -> None:
+        """Gives the collisions of `link` so many times the friction of its file."""
+        self._grip[link] = factor
+        self.body.set_friction(link, factor)
+
     def apply_damping(self, time_step: float) -> None:
         """Hands the joints' damping to the engine, which would blow up if it were stiffer than a step."""
         self.time_step = time_step
@@ -190,6 +196,8 @@ class Model:
             body.set_motor(self._joints[name], *motor)
         for name, damping in self._damped.items():
             body.set_damping(self._joints[name], damping)
+        for link, factor in self._grip.items():
+            body.set_friction(link, factor)
 
     def joint_states(self) -> list[tuple[float, float]]:
         """Returns position [rad, m] and velocity [rad/s, m/s] of each movable joint."""

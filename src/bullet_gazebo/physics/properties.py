@@ -1,5 +1,6 @@
 """Properties of links and joints that change while the world runs."""
 
+import math
 from dataclasses import dataclass, replace
 
 from bullet_gazebo.physics.description import Inertia
@@ -69,6 +70,17 @@ def set_joint_properties(
         model.set_stops(name, wanted.lower, wanted.upper)
     if wanted.motor_effort is not None or wanted.motor_velocity is not None:
         model.set_motor(name, wanted.motor_velocity, wanted.motor_effort)
+
+
+def set_link_friction(model: Model, link: str, factor: float) -> None:
+    """Gives the collisions of a link so many times the friction of its file.
+
+    Raises:
+        PropertyError: if it is negative, or not finite.
+    """
+    if not 0.0 <= factor < math.inf:
+        raise PropertyError(f"friction of '{link}' must be a factor >= 0, not {factor}")
+    model.set_friction(link, factor)
 
 
 def at(inertia: Inertia, position: tuple[float, float, float]) -> Inertia:

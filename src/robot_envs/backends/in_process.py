@@ -3,7 +3,6 @@
 import contextlib
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from operator import attrgetter
 from typing import Any
 
@@ -17,25 +16,21 @@ from bullet_gazebo.physics.engines.registry import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose, normalized
-from bullet_gazebo.physics.properties import (
-    JointProperties,
-    link_inertia,
-    set_joint_properties,
-    set_link_properties,
-)
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 from bullet_gazebo.state.names import UnknownName, find_model
 from bullet_gazebo.state.query import NOTHING, StateReader
 from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action
+from robot_envs.backends.in_process_variation import InProcessChanges
 from robot_envs.backends.world_files import fill, spawn
 from robot_envs.controllers import Loaded, load
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.files import resources
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.variation import LinkFigures, Variation
+from robot_envs.variation import Variation
+from robot_envs.variation.applying import Applier
 from robot_envs.world_state import (
     Commands,
     InitialState,
@@ -86,8 +81,7 @@ class InProcessWorld:
         self._model = self._robots[scene.robots[0].model][0]  # that varies
         self._joints = self._found_joints()
         self._receivers = self._found_receivers()
-        self._nominal: dict[str, LinkFigures] = {}
-        self._damping: dict[str, float] = {}
+        self._apply = Applier(scene, InProcessChanges(self._sim))
         self._reader = StateReader(world, NOTHING)
         self._links: list[str] = []
         self._asked = False  # for more than the joints
@@ -206,29 +200,12 @@ class InProcessWorld:
         )
 
     def vary(self, variation: Variation) -> None:
-        """See `RobotBackend.vary`."""
-        if variation.is_nominal and not self._nominal and not self._damping:
-            return
-        for link, scale in variation.links.items():
-            nominal = self._nominal.setdefault(link, self._figures(link))
-            self._set_link(link, nominal.scaled(scale))
-        for joint, friction in variation.friction.items():
-            own = self._damping.setdefault(joint, self._model.description.joints[joint].damping)
-            wanted = JointProperties(damping=own + friction)
-            set_joint_properties(self._model, joint, wanted, self._sim.world.time_step)
+        """See `RobotBackend.vary`.
 
-    def _figures(self, link: str) -> LinkFigures:
-        inertia = link_inertia(self._model, link)
-        return LinkFigures(
-            inertia.mass, inertia.com.position, inertia.ixx, inertia.ixy, inertia.ixz,
-            inertia.iyy, inertia.iyz, inertia.izz,
-        )  # fmt: skip
-
-    def _set_link(self, link: str, figures: LinkFigures) -> None:
-        old = link_inertia(self._model, link)
-        com = old.com._replace(position=figures.com)
-        inertia = replace(old, mass=figures.mass, com=com, **figures.tensor)
-        set_link_properties(self._sim.world, self._model, link, inertia, gravity=True)
+        Raises:
+            SimulatorError: for a name that isn't there, or figures that no robot can have.
+        """
+        self._apply(variation)
 
     def base(self) -> Pose:
         """See `RobotBackend.base`."""

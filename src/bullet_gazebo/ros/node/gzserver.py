@@ -35,6 +35,7 @@ from bullet_gazebo.ros.plugins import PluginRegistry
 from bullet_gazebo.ros.scene.scene_offer import SceneOffer
 from bullet_gazebo.ros.services.spawn_services import SpawnServices
 from bullet_gazebo.ros.services.stepping.advance_service import AdvanceService
+from bullet_gazebo.ros.services.stepping.friction_service import FrictionService
 from bullet_gazebo.ros.services.stepping.step_service import StepService
 from bullet_gazebo.ros.services.world_services import advertise_world_services
 from bullet_gazebo.ros.wire.names import full_name, one_at_a_time
@@ -106,6 +107,7 @@ class GazeboNode:
             stepping = [
                 StepService(self.sim, self._watchdog, one_at_a_time),
                 AdvanceService(self.sim, self._watchdog, thinner, one_at_a_time),
+                FrictionService(self.sim),
             ]
         self._services = [
             *stepping,

@@ -10,6 +10,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 import yaml
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.options.mappings import read_mapping
 
 RENAMED = {"algorithm": "algo", "stop_at": "stop_at_length"}  # options that earlier versions had
 
@@ -149,7 +150,7 @@ def _converted(kind: Any, value: Any) -> Any:
         return plain_value(value)
     if get_origin(kind) is tuple:
         return _sizes(value, get_args(kind)[0])
-    return _mapping(value)
+    return read_mapping(value)
 
 
 def plain_value(value: Any) -> Any:
@@ -217,26 +218,3 @@ def _sizes(value: Any, kind: type) -> tuple[Any, ...]:
     except ValueError:
         example = "whole numbers, as in 128,128" if kind is int else "numbers, as in 0.5,2"
         raise ValueError(example) from None
-
-
-def _scalar(text: str) -> Any:
-    """As YAML, but 1e-3 is a number."""
-    value = yaml.safe_load(text)
-    try:
-        return float(value) if isinstance(value, str) and value[-1:].isdigit() else value
-    except ValueError:
-        return value
-
-
-def _mapping(value: Any) -> dict[str, Any]:
-    if isinstance(value, str):
-        pairs = [pair.partition("=") for pair in value.replace(",", " ").split()]
-        try:
-            value = {name: _scalar(text) for name, _, text in pairs}
-        except yaml.YAMLError:
-            value = None
-        if not all(sign for _, sign, _ in pairs):
-            value = None
-    if not isinstance(value, dict):
-        raise ValueError("KEY=VALUE, several with commas")
-    return value

@@ -48,7 +48,7 @@ class LockstepWorld:
         self._query = StateQuery()
         self._begun = StepWorldResponse()
         self._held: dict[str, Any] = {}
-        self._variation = RosVariation(scene.robots[0])
+        self._variation = RosVariation(scene)
         turn.join(self)
 
     def look(self, query: StateQuery) -> None:

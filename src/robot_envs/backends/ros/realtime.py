@@ -153,7 +153,7 @@ class RealtimeWorld:
         self._robot = robot = scene.robots[0]
         self._period = control_period or None
         self._simulator = OwnSimulator()
-        self._variation = RosVariation(robot)
+        self._variation = RosVariation(scene)
         self._reset = _Resetter(scene)
         self._read = JointReader(scene)
         self._held: dict[str, Any] = {}

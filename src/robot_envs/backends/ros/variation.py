@@ -1,34 +1,131 @@
-"""A robot's masses, lengths and friction over ROS, by Gazebo's own services."""
+"""Robots' figures over ROS, by Gazebo's own services and ros_control's dynamic_reconfigure."""
 
 import contextlib
+from collections.abc import Mapping
+from typing import Any
 
+import rospy
+from bullet_gazebo_msgs.srv import SetLinkFriction
+from dynamic_reconfigure.msg import Config, DoubleParameter
+from dynamic_reconfigure.srv import Reconfigure
 from gazebo_msgs.msg import ODEJointProperties
 from gazebo_msgs.srv import (
     GetLinkProperties,
     GetLinkPropertiesResponse,
+    GetPhysicsProperties,
+    GetPhysicsPropertiesResponse,
     SetJointProperties,
     SetLinkProperties,
     SetLinkPropertiesRequest,
+    SetPhysicsProperties,
 )
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.pid import Gains
+from bullet_gazebo.physics.description import Inertia
+from bullet_gazebo.physics.pose import IDENTITY, Vector
+from bullet_gazebo.physics.pose import Pose as Frame
+from robot_envs.backends.ros.bring_up import full_name
 from robot_envs.backends.ros.service import ServiceClient
 from robot_envs.errors import SimulatorError
-from robot_envs.robot import Robot
-from robot_envs.variation import LinkFigures, Variation
+from robot_envs.scene import Scene
+from robot_envs.variation import Variation
+from robot_envs.variation.applying import Applier, JointFigures, PidFigures
+from robot_envs.variation.parts import Part, gains_of
+
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+class RosChanges:
+    """What can be changed of robots; see `robot_envs.variation.applying.Changeable`."""
+
+    def __init__(self) -> None:
+        self._get_link = _client("get_link_properties", GetLinkProperties)
+        self._set_link = _client("set_link_properties", SetLinkProperties)
+        self._set_joint = _client("set_joint_properties", SetJointProperties)
+        self._set_friction = _client("set_link_friction", SetLinkFriction)
+        self._get_physics = _client("get_physics_properties", GetPhysicsProperties)
+        self._set_physics = _client("set_physics_properties", SetPhysicsProperties)
+        self._tuners: dict[str, ServiceClient] = {}
+        self._weightless: set[str] = set()
+
+    def link(self, link: Part) -> Inertia:
+        name = _scoped(link)
+        answer: GetLinkPropertiesResponse = self._get_link(name)
+        _check(answer.success, f"link {name} can't be read", answer.status_message)
+        if not answer.gravity_mode:
+            self._weightless.add(name)
+        own = link.robot.links.links[link.name].inertia
+        axes = own.com.orientation if own else IDENTITY  # Gazebo doesn't tell them
+        com, tensor = answer.com.position, {key: getattr(answer, key) for key in TENSOR}
+        return Inertia(answer.mass, Frame((com.x, com.y, com.z), axes), **tensor)
+
+    def set_link(self, link: Part, inertia: Inertia) -> None:
+        name = _scoped(link)
+        request = SetLinkPropertiesRequest(
+            link_name=name,
+            com=Pose(Point(*inertia.com.position), Quaternion(0.0, 0.0, 0.0, 1.0)),
+            gravity_mode=name not in self._weightless,
+            mass=inertia.mass,
+            **{key: getattr(inertia, key) for key in TENSOR},
+        )
+        answer = self._set_link(request)
+        _check(answer.success, f"link {name} can't be changed", answer.status_message)
+
+    def set_joint(self, joint: Part, figures: JointFigures) -> None:
+        """ODE's dry friction is a motor of speed 0, whose most effort is `fmax`."""
+        wanted = ODEJointProperties(damping=_one(figures.damping), fmax=_one(figures.friction))
+        answer = self._set_joint(_scoped(joint), wanted)
+        _check(answer.success, f"joint {joint.name} can't be changed", answer.status_message)
+
+    def set_surface(self, link: Part, factor: float) -> None:
+        """Gazebo has no service for it, nor has a world in real time."""
+        answer = self._set_friction(_scoped(link), factor)
+        reason = answer.status_message
+        _check(answer.success, f"surfaces of link {link.name} can't be changed", reason)
+
+    def pids(self, controller: Part) -> Mapping[str, PidFigures]:
+        """From the parameters, to which ros_control writes gains that have changed."""
+        own = full_name(*controller)
+        return {place: _gains(f"{own}/{place}") for place in gains_of(controller)}
+
+    def set_pid(self, controller: Part, place: str, gains: PidFigures) -> None:
+        name = f"{full_name(*controller)}/{place}/set_parameters"
+        if name not in self._tuners:
+            self._tuners[name] = ServiceClient(name, Reconfigure)
+        wanted = [DoubleParameter(key, value) for key, value in gains._asdict().items()]
+        answer = self._tuners[name](Config(doubles=wanted))
+        now = {each.name: each.value for each in answer.config.doubles}
+        if any(now.get(each.name) != each.value for each in wanted):
+            raise SimulatorError(f"{name} was asked for {gains}, and gave {now}")
+
+    def gravity(self) -> Vector:
+        gravity = self._physics().gravity
+        return (gravity.x, gravity.y, gravity.z)
+
+    def set_gravity(self, gravity: Vector) -> None:
+        now = self._physics()
+        answer = self._set_physics(
+            now.time_step, now.max_update_rate, Vector3(*gravity), now.ode_config
+        )
+        _check(answer.success, "gravity can't be changed", answer.status_message)
+
+    def _physics(self) -> GetPhysicsPropertiesResponse:
+        answer = self._get_physics()
+        _check(answer.success, "the world's gravity can't be read", answer.status_message)
+        return answer
 
 
 class RosVariation:
-    """Changes a robot that a simulator has, and gives it back as it was found."""
+    """Changes robots that a simulator has, and gives them back as they were found.
 
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
-        self._get = ServiceClient("/gazebo/get_link_properties", GetLinkProperties)
-        self._set_link = ServiceClient("/gazebo/set_link_properties", SetLinkProperties)
-        self._set_joint = ServiceClient("/gazebo/set_joint_properties", SetJointProperties)
-        self._nominal: dict[str, LinkFigures] = {}
-        self._damping: dict[str, float] = {}
-        self._last: Variation | None = None
+    Args:
+        scene: the robots.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._apply = Applier(scene, RosChanges())
 
     def __call__(self, variation: Variation) -> None:
         """See `RobotBackend.vary`.
@@ -36,53 +133,33 @@ class RosVariation:
         Raises:
             SimulatorError: if the simulator refuses, or doesn't answer.
         """
-        if variation.is_nominal and self._last is None:
-            return
-        for link in variation.links.keys() - self._nominal.keys():
-            self._nominal[link] = self._figures(link)
-        self._last = variation
-        for link, scale in variation.links.items():
-            self._put_link(link, self._nominal[link].scaled(scale))
-        for joint, friction in variation.friction.items():
-            self._put_joint(joint, self._own_damping(joint) + friction)
-
-    def _own_damping(self, joint: str) -> float:
-        """What the robot's file says, since Gazebo's services don't tell it."""
-        if not self._damping:
-            joints = self._robot.links.joints
-            self._damping = {name: each.damping for name, each in joints.items()}
-        return self._damping[joint]
+        self._apply(variation)
 
     def undo(self) -> None:
-        """Gives the robot its own figures back, if they were changed and there still is one."""
-        if self._last is not None:
-            with contextlib.suppress(SimulatorError):
-                self(self._last.undone)
-        self._nominal, self._last = {}, None
+        """Gives the robots their own figures back, if they were changed and there still are any."""
+        with contextlib.suppress(SimulatorError):
+            self._apply.undo()
 
-    def _figures(self, link: str) -> LinkFigures:
-        answer: GetLinkPropertiesResponse = self._get(f"{self._robot.model}::{link}")
-        _check(answer.success, f"link {link} can't be read", answer.status_message)
-        com = answer.com.position
-        return LinkFigures(
-            answer.mass, (com.x, com.y, com.z),
-            answer.ixx, answer.ixy, answer.ixz, answer.iyy, answer.iyz, answer.izz,
-        )  # fmt: skip
 
-    def _put_link(self, link: str, figures: LinkFigures) -> None:
-        request = SetLinkPropertiesRequest(
-            link_name=f"{self._robot.model}::{link}",
-            com=Pose(Point(*figures.com), Quaternion(0.0, 0.0, 0.0, 1.0)),
-            gravity_mode=True,
-            mass=figures.mass,
-            **figures.tensor,
-        )
-        answer = self._set_link(request)
-        _check(answer.success, f"link {link} can't be changed", answer.status_message)
+def _scoped(part: Part) -> str:
+    return f"{part.robot.model}::{part.name}"
 
-    def _put_joint(self, joint: str, friction: float) -> None:
-        answer = self._set_joint(joint, ODEJointProperties(damping=[friction]))
-        _check(answer.success, f"joint {joint} can't be changed", answer.status_message)
+
+def _gains(namespace: str) -> PidFigures:
+    try:
+        gains = Gains.from_params(rospy.get_param(namespace), namespace)
+    except (KeyError, OSError, rospy.ROSException, ControlError) as error:
+        raise SimulatorError(f"the gains {namespace} can't be read: {error}") from error
+    return PidFigures(gains.p, gains.i, gains.d)
+
+
+def _client(name: str, kind: Any) -> ServiceClient:
+    return ServiceClient(f"/gazebo/{name}", kind)
+
+
+def _one(value: float | None) -> list[float]:
+    """For the first axis; an empty list changes nothing."""
+    return [] if value is None else [value]
 
 
 def _check(success: bool, what: str, reason: str) -> None:

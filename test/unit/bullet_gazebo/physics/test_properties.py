@@ -1,6 +1,7 @@
 """Properties of links and joints, wrenches and placed links, against the laws of motion."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from bullet_gazebo.physics.properties import (
     PropertyError,
     link_inertia,
     set_joint_properties,
+    set_link_friction,
     set_link_properties,
 )
 from bullet_gazebo.physics.settings import SolverSettings
@@ -364,3 +366,35 @@ def test_moments_that_no_real_body_has_are_taken_as_in_ode(world, box, com):
     box.body.add_wrench("body", (0.0, 0.0, 0.0), (0.1, 0.0, 5.0))
     world.step()
     assert box.state()[1][1] == pytest.approx((0.001, 0.0, 0.001))
+
+
+SLEDGE = """<robot name="sledge"><link name="body"><inertial><mass value="1"/><inertia ixx="0.02" ixy="0"
+ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial><collision><geometry><box size="0.4 0.4 0.1"/></geometry>
+</collision></link><gazebo reference="body"><mu1>0.2</mu1></gazebo></robot>"""
+
+
+@pytest.mark.parametrize("reloaded", [False, True])
+def test_surfaces_have_so_many_times_the_friction_of_their_file(world, reloaded):
+    """A sledge at 1 m/s loses mu g each second; also after its body was loaded anew, and given back."""
+    sledge = world.spawn("sledge", parse_urdf(SLEDGE), Pose((0.0, 0.0, 0.05)))
+    lost = []
+    for factor in (1.0, 2.0, 0.5, 1.0):
+        set_link_friction(sledge, "body", factor)
+        if reloaded:
+            own = link_inertia(sledge, "body")
+            off = Pose((0.0, 0.0, own.com.position[2] + 1e-6))
+            set_link_properties(world, sledge, "body", replace(own, com=off), gravity=True)
+        sledge.place(Pose((0.0, 0.0, 0.05)))
+        run(world, 10)
+        pose = sledge.state()[0]
+        sledge.place(pose, ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+        run(world, 200)
+        lost.append(1.0 - sledge.state()[1][0][0])
+    once = 0.2 * 9.8 * 0.2
+    assert lost == pytest.approx([once, 2 * once, once / 2, once], rel=0.03)
+
+
+@pytest.mark.parametrize("factor", [-0.1, math.nan, math.inf])
+def test_friction_that_no_surface_has_is_refused(box, factor):
+    with pytest.raises(PropertyError, match="friction of 'body' must be a factor >= 0"):
+        set_link_friction(box, "body", factor)

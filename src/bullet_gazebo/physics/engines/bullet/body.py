@@ -35,6 +35,7 @@ class BulletBody(Body):
         self.id = body
         self._client = client
         self._weightless = weightless
+        self._description = description
         self._offsets = offsets
         joints = {name: i for i, name in enumerate(self._engine_joints())}
         self.joint_names = tuple(
@@ -169,6 +170,9 @@ class BulletBody(Body):
         pybullet.changeDynamics(
             self.id, BASE, maxJointVelocity=fastest, physicsClientId=self._client
         )
+
+    def set_friction(self, link: str, factor: float) -> None:
+        set_friction(self._client, self.id, self._links, self._description, link, factor)
 
     def set_limits(self, index: int, lower: float, upper: float) -> None:
         if lower > upper:  # the engine would keep those that it has

@@ -11,12 +11,26 @@ from bullet_gazebo.physics.pose import Vector, add, scale
 
 
 def set_friction(
-    client: int, body: int, links: Mapping[str, int], description: ModelDescription
+    client: int,
+    body: int,
+    links: Mapping[str, int],
+    description: ModelDescription,
+    of: str | None = None,
+    factor: float = 1.0,
 ) -> None:
-    """Hands friction to the engine, which has one figure for a link (engine_form.py)."""
+    """Hands friction to the engine, which has one figure for a link (engine_form.py).
+
+    Args:
+        client: the world.
+        body: the model's.
+        links: the engine's number of each.
+        description: in the engine's form.
+        of: the link, with the pieces that it was split into; None: all.
+        factor: of the description's friction.
+    """
     for name, link in description.links.items():
-        if name in links and link.collisions:
-            friction = _friction(link.collisions[0], description.static)
+        if name in links and link.collisions and of in (None, name, link.part_of):
+            friction = factor * _friction(link.collisions[0], description.static)
             pybullet.changeDynamics(
                 body, links[name], lateralFriction=friction, physicsClientId=client
             )

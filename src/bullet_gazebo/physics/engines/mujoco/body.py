@@ -12,7 +12,7 @@ from bullet_gazebo.physics.description import (
     ModelDescription,
 )
 from bullet_gazebo.physics.engine import Body, Twist
-from bullet_gazebo.physics.engines.mujoco.model import Elements, wxyz
+from bullet_gazebo.physics.engines.mujoco.model import Elements, priority, wxyz
 from bullet_gazebo.physics.engines.mujoco.state import BodyArrays, MujocoState
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, conjugate, rotate
 
@@ -55,6 +55,7 @@ class MujocoBody(Body):
         self.joint_names = tuple(joint.name for joint in joints)
         self.inertias = {name: link.inertia for name, link in description.links.items()}
         self._gravity = {name: link.gravity for name, link in description.links.items()}
+        self._frictions: dict[str, float] = {}  # factors, by link
         self._joints = [JointSettings.of(joint) for joint in joints]
         self._state = state
         self._compile_anew = compile_anew
@@ -76,6 +77,8 @@ class MujocoBody(Body):
             model.body_inertia[self._ids[link]] = moments
         for name, on in self._gravity.items():
             self._weigh(name, on)
+        for link, factor in self._frictions.items():
+            self.set_friction(link, factor)
         for index, joint in enumerate(self._joints):
             self.set_damping(index, joint.damping)
             self.set_limits(index, joint.lower, joint.upper)
@@ -137,6 +140,13 @@ class MujocoBody(Body):
     def set_damping(self, index: int, damping: float) -> None:
         self._joints[index].damping = damping
         self._state.model.dof_damping[self._v[index]] = damping
+
+    def set_friction(self, link: str, factor: float) -> None:
+        self._frictions[link] = factor
+        model, first = self._state.model, int(self._state.model.body_geomadr[self._ids[link]])
+        for place, shape in enumerate(self.description.links[link].collisions):
+            model.geom_friction[first + place, 0] = factor * shape.mu
+            model.geom_priority[first + place] = priority(factor * shape.mu)
 
     def set_limits(self, index: int, lower: float, upper: float) -> None:
         joint, model = self._joints[index], self._state.model

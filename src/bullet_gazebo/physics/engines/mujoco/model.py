@@ -118,8 +118,7 @@ class ModelWriter:
             condim=3,
         )  # fmt: skip
         geom.friction[0] = shape.mu
-        # Of two coefficients ODE takes the smaller one, and MuJoCo that of the higher priority.
-        geom.priority = -int(min(shape.mu * MU_STEPS, MOST_PRIORITY))
+        geom.priority = priority(shape.mu)
         if shape.kind == "mesh":
             geom.meshname = self._add_mesh(shape)
         elif shape.kind == "box":
@@ -180,6 +179,11 @@ def wxyz(q: Quaternion) -> Quaternion:
 def xyzw(q: np.ndarray) -> Quaternion:
     """Our order of a quaternion."""
     return (float(q[1]), float(q[2]), float(q[3]), float(q[0]))
+
+
+def priority(mu: float) -> int:
+    """Of two coefficients of friction ODE takes the smaller one, and MuJoCo that of the higher priority."""
+    return -int(min(mu * MU_STEPS, MOST_PRIORITY))
 
 
 def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:

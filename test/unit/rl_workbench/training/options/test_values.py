@@ -32,7 +32,10 @@ def test_options_of_the_environment(tmp_path: Path, name: str) -> None:
     flag = f"--{name.replace('_', '-')}"
     for text, wanted in [("max_steps=5,backend=bullet", {"max_steps": 5, "backend": "bullet"}),
                          ("noise=1e-3,render_mode=1e,backend=null",
-                          {"noise": 0.001, "render_mode": "1e", "backend": None})]:  # fmt: skip
+                          {"noise": 0.001, "render_mode": "1e", "backend": None}),
+                         ("randomisation={mass: 1e-1, com: {pole: [0, 2e-2]}} backend=ros,sizes=[1, 2]",
+                          {"randomisation": {"mass": 0.1, "com": {"pole": [0, 0.02]}}, "backend": "ros",
+                           "sizes": [1, 2]})]:  # fmt: skip
         assert getattr(read(tmp_path, EMPTY, DQN, f"{flag}={text}").run, name) == wanted
 
 
@@ -43,7 +46,7 @@ def test_which_of_them_count_where(tmp_path: Path) -> None:
     assert run.evaluation_environment == {"a": 1, "b": 2, "c": 3}
 
 
-@pytest.mark.parametrize("text", ["noise=[1", "noise", "a={"])
+@pytest.mark.parametrize("text", ["noise=[1", "noise", "a={", "a={b: 1}}", "a={b: [1}"])
 def test_options_of_the_environment_that_cannot_be_read(text: str, capsys) -> None:
     with pytest.raises(SystemExit):
         choose(DQN, [f"--env-kwargs={text}"])

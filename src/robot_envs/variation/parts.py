@@ -1,0 +1,143 @@
+"""What of a scene's robots can differ from episode to episode: links, joints and controllers, by name.
+
+Names are those that a state has for joints, and commands for controllers; a link's is made like a joint's.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.pid import Gains
+from bullet_gazebo.state.names import did_you_mean
+from robot_envs.controllers import load
+from robot_envs.errors import RobotEnvError, SimulatorError
+from robot_envs.robot import Robot
+from robot_envs.scene import Scene
+from robot_envs.variation.inertia import length_axis
+
+MOST_GAINS = {
+    "p": 1e5,
+    "i": 1e5,
+    "d": 1e3,
+    "i_max": 1e5,
+    "i_min": 1e5,
+}  # of control_toolbox's server
+
+
+class Part(NamedTuple):
+    """A link, joint or controller: whose, and its plain name."""
+
+    robot: Robot
+    name: str
+
+
+class Parts:
+    """Those of a scene by the names that variations have for them, in the order in which numbers are drawn.
+
+    | attribute | what it has |
+    |---|---|
+    | `links` | all |
+    | `axes` | of the length of links that move and have a mass |
+    | `solids` | links with a collision |
+    | `joints` | those that move |
+    | `controllers` | those that run |
+
+    Args:
+        scene: the robots.
+
+    Raises:
+        RobotEnvError: if something in a robot's description is wrong.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.links: dict[str, Part] = {}
+        self.axes: dict[str, str] = {}
+        self.solids: list[str] = []
+        self.joints = {name: Part(*at) for name, at in scene.moved.items()}
+        self.controllers: dict[str, Part] = {}
+        for robot in scene.robots:
+            fixed = robot.links.root if robot.links.fixed_base else None
+            for plain, link in robot.links.links.items():
+                name = scene.joint(robot, plain)
+                self.links[name] = Part(robot, plain)
+                if link.inertia is not None and plain != fixed:
+                    self.axes[name] = length_axis(link.inertia)
+                if link.collisions:
+                    self.solids.append(name)
+            for plain in robot.run:
+                self.controllers[scene.controller(robot, plain)] = Part(robot, plain)
+
+    def link(self, name: str) -> Part:
+        """The link of that name.
+
+        Raises:
+            SimulatorError: if there is none.
+        """
+        return _found("link", self.links, name)
+
+    def joint(self, name: str) -> Part:
+        """The joint of that name, which moves.
+
+        Raises:
+            SimulatorError: if there is none.
+        """
+        return _found("joint", self.joints, name)
+
+    def controller(self, name: str) -> Part:
+        """The controller of that name, which runs.
+
+        Raises:
+            SimulatorError: if there is none.
+        """
+        return _found("controller", self.controllers, name)
+
+    def pids(self) -> dict[str, dict[str, Gains]]:
+        """The gains of all PIDs, by controller and by place below it; without controllers that have none.
+
+        Raises:
+            RobotEnvError: if something in a robot's description is wrong.
+        """
+        found = {name: gains_of(part) for name, part in self.controllers.items()}
+        return {name: gains for name, gains in found.items() if gains}
+
+
+def _found(kind: str, parts: Mapping[str, Part], name: str) -> Part:
+    if name not in parts:
+        hint = did_you_mean(name, parts) or f"; there are {', '.join(parts) or 'none'}"
+        raise SimulatorError(f"there is no {kind} '{name}' to vary{hint}")
+    return parts[name]
+
+
+def gains_of(controller: Part) -> dict[str, Gains]:
+    """The gains of a controller's PIDs by their place below it, as the robot's files have them.
+
+    Raises:
+        RobotEnvError: if something in the robot's description is wrong.
+    """
+    robot, name = controller
+    try:
+        loaded = load([name], robot.parameters, robot.hardware())[1]
+    except ControlError as error:
+        raise RobotEnvError(f"the robot '{robot.model}': {error}") from error
+    return {place: pid.gains for place, pid in loaded[name].pids.items()}
+
+
+def check_tunable(pids: Mapping[str, Mapping[str, Gains]], factors: Mapping[str, float]) -> None:
+    """Sees to it that gains can be changed over ROS, so that they are the same on all backends.
+
+    Args:
+        pids: gains by controller, and place below it.
+        factors: the largest, by controller.
+
+    Raises:
+        ValueError: if one is beyond what dynamic_reconfigure takes, which would cut it without a word.
+    """
+    for controller, factor in factors.items():
+        for place, gains in pids[controller].items():
+            for name, most in MOST_GAINS.items():
+                value = getattr(gains, name) * (factor if name in "pid" else 1.0)
+                if not abs(value) <= most:
+                    raise ValueError(
+                        f"randomisation of gains: {name} of {controller}/{place} would be up to {value:g}, "
+                        f"and dynamic_reconfigure takes {most:g} at most"
+                    )

@@ -1,0 +1,208 @@
+"""That each option does what its line in docs/sim_to_real.md says: a rig that moves by known laws."""
+
+import math
+
+import numpy as np
+import pytest
+from rig import INERTIA, MASS, PERIOD, RIG, Watch, make_both, make_rig
+
+from robot_envs import RobotEnv
+from robot_envs.vector.environment import RobotVectorEnv
+
+G = 9.8  # [m/s²]
+REST = np.zeros(3)
+ENGINES = ["bullet", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
+
+
+def joints_after(env: RobotEnv, action, steps: int = 1) -> dict[str, tuple[float, float]]:
+    """Position and velocity of the rig's joints after some steps of one action, by plain name."""
+    env.reset(seed=0)
+    for _ in range(steps):
+        seen, *_ = env.step(np.array(action, float))
+    env.close()
+    names = [name.removeprefix("rig::") for name in env.scene.joints]
+    return dict(zip(names, zip(seen[::2], seen[1::2], strict=False), strict=False))
+
+
+def vary(backend: str = "bullet", start=None, tick: bool = False, **randomisation):
+    """The rig with options that have one value each: low is high; with `tick`, each step is one."""
+    fixed = {
+        name: (value, value) if np.isscalar(value) else value
+        for name, value in randomisation.items()
+    }
+    period = 0.001 if tick else PERIOD
+    return make_rig(backend, start, randomisation=fixed, control_period=period)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("factor", [1.0, 0.5, 0.0])
+def test_with_half_the_gravity_it_falls_half_as_fast(engine, factor):
+    fallen = joints_after(vary(engine, gravity=factor), REST, 20)["drop"]
+    time = 20 * PERIOD
+    assert fallen[1] == pytest.approx(-factor * G * time, rel=1e-3)
+    assert fallen[0] == pytest.approx(-factor * G * time**2 / 2, rel=0.01)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("factor", [0.5, 1.0, 3.0])
+def test_a_mass_is_pushed_the_less_the_heavier_it_is(engine, factor):
+    pushed = joints_after(vary(engine, mass={"cart": (factor, factor)}), (5.0, 0.0, 0.0), 10)
+    assert pushed["rail"][1] == pytest.approx(5.0 / (factor * MASS) * 10 * PERIOD, rel=1e-3)
+    assert pushed["drop"][1] == pytest.approx(-G * 10 * PERIOD, rel=1e-3)  # as heavy as before
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_damping_takes_speed_as_its_exponential_says(engine):
+    kept = joints_after(vary(engine, {"rail": (0.0, 2.0)}, damping={"rail": (4.0, 4.0)}), REST, 50)
+    assert kept["rail"][1] == pytest.approx(2.0 * math.exp(-4.0 / MASS * 50 * PERIOD), rel=0.01)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_dry_friction_takes_the_same_speed_each_second_and_then_holds(engine):
+    options = {"friction": {"rail": (3.0, 3.0)}}
+    slowed = joints_after(vary(engine, {"rail": (0.0, 2.0)}, **options), REST, 50)
+    assert slowed["rail"][1] == pytest.approx(2.0 - 3.0 / MASS * 50 * PERIOD, rel=0.01)
+    held = joints_after(vary(engine, **options), (2.9, 0.0, 0.0), 50)
+    assert abs(held["rail"][1]) < 1e-3
+    moved = joints_after(vary(engine, **options), (4.0, 0.0, 0.0), 50)
+    assert moved["rail"][1] == pytest.approx((4.0 - 3.0) / MASS * 50 * PERIOD, rel=0.01)
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
+def test_gains_drive_so_many_times_as_hard(factor):
+    """On the first tick towards 0.1 rad p, i and d add up; their clamp stays."""
+    env = vary(gains={"servo_position": (factor, factor)}, tick=True)
+    env.reset(seed=0)
+    env.step(np.array([0.0, 0.0, 0.1]))
+    effort = env._state.joints["servo"].effort
+    env.close()
+    dt, p, i, d = 0.001, 20.0, 0.5, 2.0
+    assert effort == pytest.approx(factor * 0.1 * (p + i * dt + d / dt), rel=1e-9)
+
+
+def test_a_length_moves_the_centre_and_its_moments():
+    """The wheel is as heavy as before; its moments about x and y are those of a longer rod."""
+    env = vary(length={"wheel": (2.0, 2.0)}, com={"cart": (0.1, 0.1)})
+    env.reset(seed=0)
+    robot = next(each for each in env.backend._sim.robots)
+    wheel, cart = (robot.model.description.links[name].inertia for name in ("wheel", "cart"))
+    env.close()
+    assert wheel.com.position == pytest.approx((0.0, 0.0, 0.4))
+    assert (wheel.mass, wheel.ixx, wheel.izz) == pytest.approx((1.0, 4 * INERTIA, INERTIA))
+    assert cart.com.position == pytest.approx((0.1, 0.1, 0.3))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
+def test_surfaces_brake_so_many_times_as_much(engine, factor):
+    env = make_both(engine, randomisation={"surface_friction": {"sledge::body": (factor, factor)}})
+    env.reset(seed=0)
+    for _ in range(20):
+        seen, *_ = env.step(REST)
+    env.close()
+    assert 1.0 - seen[-2] == pytest.approx(factor * 0.2 * G * 20 * PERIOD, rel=0.05)
+
+
+def test_a_lag_is_felt_as_its_exponential_says():
+    """The efforts of a lagging motor add up to what speed the cart has."""
+    lag, steps = 0.05, 12
+    pushed = joints_after(make_rig(actuator_lag={"motors": lag}), (5.0, 0.0, 0.0), steps)
+    efforts = [5.0 * (1.0 - math.exp(-(k + 1) * PERIOD / lag)) for k in range(steps)]
+    assert pushed["rail"][1] == pytest.approx(sum(efforts) * PERIOD / MASS, rel=1e-3)
+
+
+def test_a_delayed_action_comes_as_much_later():
+    early = joints_after(make_rig(), (5.0, 0.0, 0.0), 7)
+    late = joints_after(make_rig(action_delay=3), (5.0, 0.0, 0.0), 10)
+    assert late["rail"][1] == pytest.approx(early["rail"][1], rel=1e-9)
+    assert late["rail"][0] == pytest.approx(early["rail"][0], rel=1e-9)
+
+
+def test_a_limit_cuts_efforts_and_slows_set_points():
+    limited = joints_after(
+        make_rig(actuator_limit={"motors": 2.0, "servo_position": 0.5}), (5.0, -9.0, 1.0), 10
+    )
+    asked = joints_after(make_rig(), (2.0, -2.0, 1.0), 10)
+    assert limited["rail"] == asked["rail"]
+    assert limited["drop"] == asked["drop"]
+    assert 0.0 < limited["servo"][0] < 0.5 * 10 * PERIOD < asked["servo"][0]
+
+
+def test_an_observation_is_as_late_and_as_coarse_as_was_asked_for():
+    exact, late = make_rig(), make_rig(sensor_delay=3, encoder_step={"drop": 0.01})
+    runs = []
+    for env in (exact, late):
+        rows = [env.reset(seed=0)[0], *(env.step(REST)[0] for _ in range(20))]
+        runs.append(np.array(rows))
+        env.close()
+    truth, seen = runs
+    rounded = np.round(truth[:, 0] / 0.01) * 0.01
+    assert seen[3:, 0] == pytest.approx(rounded[:-3])
+    assert seen[4:, 1] == pytest.approx(np.diff(rounded[:-3]) / PERIOD)
+    assert (seen[3:, 2:] == truth[:-3, 2:]).all()
+
+
+def test_a_task_that_adds_to_set_points_sees_those_that_it_has_sent():
+    class Adding(Watch):
+        def apply(self, action, state):
+            return {"servo_position": state.commands["servo_position"] + 0.1}
+
+    sent = []
+    for options in ({}, {"action_delay": 5, "actuator_lag": 0.1, "sensor_delay": 2}):
+        env = RobotEnv(RIG, Adding(), **options)
+        env.reset(seed=0)
+        for _ in range(5):
+            env.step(REST)
+        sent.append(env._state.commands["servo_position"])
+        env.close()
+    assert sent == pytest.approx([0.5, 0.5])
+
+
+def test_what_is_not_asked_for_changes_nothing_and_costs_nothing():
+    env = make_rig(randomisation={})
+    info = env.reset(seed=0)[1]
+    assert (env._sensor, env._actuator) == (None, None)
+    assert info.get("variation", {}) == {}
+    env.close()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_another_environments_robot_is_its_own(engine):
+    varied, plain = vary(engine, gravity=0.5, mass={"cart": (2.0, 2.0)}), make_rig(engine)
+    rows = []
+    for env in (varied, plain, varied, plain):
+        env.reset(seed=0)
+        rows.append(env.step(np.array([5.0, 0.0, 0.0]))[0])
+    varied.close()
+    plain.close()
+    assert (rows[0] == rows[2]).all()
+    assert (rows[1] == rows[3]).all()
+    assert rows[0][1] == pytest.approx(rows[1][1] / 2, rel=1e-3)
+
+
+def test_robots_that_share_a_world_are_named_with_their_model():
+    options = {"mass": {"rig::cart": 0.5}, "gains": {"/rig/servo_position": 0.5}, "gravity": 0.1}
+    env = make_both(randomisation=options)
+    told = env.reset(seed=0)[1]["variation"]
+    env.close()
+    assert list(told) == list(options)
+    assert list(told["mass"]) == ["rig::cart"]
+    assert list(told["gains"]) == ["/rig/servo_position"]
+    assert 0.9 <= told["gravity"] <= 1.1
+
+
+def test_a_vector_of_environments_gives_each_its_own_robot():
+    options = {"randomisation": {"mass": 0.2, "com": {"cart": 0.01}}, "actuator_lag": 0.02}
+    many = RobotVectorEnv(3, "rig:make_rig", workers=0, **options)
+    infos = many.reset(seed=4)[1]["variation"]
+    pushed = [many.step(np.tile([5.0, 0.0, 0.0], (3, 1)))[0] for _ in range(3)][-1]
+    many.close()
+    for index in range(3):
+        env = make_rig(**options)
+        info = env.reset(seed=4 + index)[1]["variation"]
+        for _ in range(3):
+            alone, *_ = env.step(np.array([5.0, 0.0, 0.0]))
+        env.close()
+        assert (pushed[index] == alone).all()
+        assert infos["mass"]["cart"][index] == info["mass"]["cart"]
+        assert (infos["com"]["cart"][index] == info["com"]["cart"]).all()

@@ -1,0 +1,101 @@
+"""What becomes of a link's figures, and what a variation is beside the nominal robot."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bullet_gazebo.physics.description import Inertia
+from bullet_gazebo.physics.mechanics.inertia import tensor_in
+from bullet_gazebo.physics.pose import IDENTITY, Pose
+from robot_envs.variation import LinkScale, Variation
+from robot_envs.variation.inertia import length_axis, scaled
+
+ROD = Inertia(2.0, Pose((0.0, 0.0, 0.5)), ixx=1.0, iyy=1.0, izz=0.1)
+UP = (math.sin(math.pi / 4), 0.0, 0.0, math.cos(math.pi / 4))  # a quarter about x: z to -y
+factors = st.floats(0.1, 10.0)
+
+
+def test_figures_of_a_varied_rod():
+    varied = scaled(ROD, LinkScale(mass=2.0, length=3.0))
+    assert varied == Inertia(4.0, Pose((0.0, 0.0, 1.5)), ixx=18.0, iyy=18.0, izz=0.2)
+    assert scaled(ROD, LinkScale(mass=0.5)).ixx == 0.5
+    assert scaled(ROD, LinkScale(com=(0.1, 0.0, -0.2))).com.position == (0.1, 0.0, 0.3)
+
+
+def test_products_of_a_length_grow_with_it():
+    crooked = replace(ROD, ixy=0.01, ixz=0.02, iyz=0.03)
+    varied = scaled(crooked, LinkScale(length=2.0))
+    assert (varied.ixy, varied.ixz, varied.iyz) == (0.01, 0.04, 0.06)
+
+
+@pytest.mark.parametrize(
+    ("place", "axis"),
+    [
+        ((0.0, 0.0, 0.5), "z"),
+        ((0.3, 0.1, 0.0), "x"),
+        ((0.0, -0.4, 0.1), "y"),
+        ((0.0, 0.0, 0.0), "z"),
+    ],
+)
+def test_a_link_is_long_where_its_centre_lies(place, axis):
+    assert length_axis(Inertia(1.0, Pose(place))) == axis
+
+
+def test_a_rod_along_x_grows_as_one_along_z():
+    lying = Inertia(2.0, Pose((0.5, 0.0, 0.0)), ixx=0.1, iyy=1.0, izz=1.0)
+    varied = scaled(lying, LinkScale(length=3.0, axis="x"))
+    assert varied == Inertia(2.0, Pose((1.5, 0.0, 0.0)), ixx=0.1, iyy=9.0, izz=9.0)
+
+
+def test_where_the_tensor_has_axes_of_its_own_the_length_is_still_the_links():
+    """A rod along the link's x, given in axes of which z lies along it."""
+    turn = (0.0, math.sin(math.pi / 4), 0.0, math.cos(math.pi / 4))  # z to x
+    rod = Inertia(2.0, Pose((0.5, 0.0, 0.0), turn), ixx=1.0, iyy=1.0, izz=0.1)
+    varied = scaled(rod, LinkScale(length=3.0, axis="x"))
+    straight = tensor_in(varied, IDENTITY)
+    assert np.diag(straight) == pytest.approx([0.1, 9.0, 9.0])
+    assert (varied.ixx, varied.iyy, varied.izz) == pytest.approx((9.0, 9.0, 0.1))
+    assert varied.com.orientation == turn
+
+
+@given(factors, factors, st.sampled_from("xyz"), st.sampled_from([IDENTITY, UP]))
+def test_undone_is_as_it_was_to_the_bit(mass, length, axis, orientation):
+    own = replace(ROD, com=Pose((0.1, -0.2, 0.5), orientation), ixy=0.01)
+    variation = Variation({"rod": LinkScale(mass, length, (0.1, 0.2, 0.3), axis)})
+    assert scaled(own, variation.undone.links["rod"]) == own
+
+
+@given(factors, factors)
+def test_a_length_and_its_inverse_give_the_rod_back(mass, length):
+    there = scaled(ROD, LinkScale(mass, length))
+    back = scaled(there, LinkScale(1.0 / mass, 1.0 / length))
+    assert (back.mass, back.com.position[2], back.ixx) == pytest.approx((2.0, 0.5, 1.0))
+
+
+@pytest.mark.parametrize(
+    "variation",
+    [
+        Variation({"rod": LinkScale(1.1)}),
+        Variation({"rod": LinkScale(length=0.9, axis="x")}),
+        Variation({"rod": LinkScale(com=(0.0, 0.0, 0.01))}),
+        Variation(damping={"hinge": 0.1}),
+        Variation(friction={"hinge": 0.1}),
+        Variation(gains={"servo": 1.1}),
+        Variation(gravity=0.9),
+    ],
+)
+def test_a_variation_undone_is_nominal_and_names_the_same(variation):
+    assert Variation().is_nominal
+    assert not variation.is_nominal
+    assert variation.undone.is_nominal
+    for name, value in vars(variation).items():
+        undone = getattr(variation.undone, name)
+        assert (
+            undone.keys() == value.keys()
+            if isinstance(value, dict)
+            else (undone is None) == (value is None)
+        )
