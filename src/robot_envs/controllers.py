@@ -54,6 +54,8 @@ def _load_one(manager: ControllerManager, name: str, parameters: Mapping[str, An
         )
     described = parameters[name]
     kind = described.get("type") if isinstance(described, Mapping) else None
+    if not kind:
+        raise ControlError(f"controller '{name}': its parameters have no type")
     if isinstance(kind, str) and kind not in manager.types:
         own = find_type(kind)  # as the simulator finds a user's
         if own is None:
@@ -109,15 +111,29 @@ def faults(
     commanded: Sequence[str] | None,
     parameters: Mapping[str, Any],
     hardware: RobotHardware,
+    movable: Sequence[str],
 ) -> Iterator[str]:
-    """What is wrong with them, one line each."""
+    """What is wrong with them, one line each.
+
+    Args:
+        run: those that are to run.
+        commanded: those that a task is to command; None: all that take numbers.
+        parameters: of all controllers.
+        hardware: the robot's.
+        movable: its joints that move, those without a transmission, too.
+    """
     manager = ControllerManager(hardware)
     loaded: Loaded = {}
     for name in dict.fromkeys(run):
+        strangers = list(_strangers(name, parameters.get(name), hardware, movable))
+        yield from strangers
         try:
-            loaded[name] = _load_one(manager, name, parameters)
+            if not strangers:
+                loaded[name] = _load_one(manager, name, parameters)
         except ControlError as error:
             yield str(error)
+        if list(run).count(name) > 1:
+            yield f"the controllers to run name '{name}' twice"
     if len(loaded) < len(run):
         return
     try:
@@ -125,3 +141,20 @@ def faults(
         manager.switch(loaded, [], STRICT)
     except ControlError as error:
         yield str(error)
+
+
+def _strangers(
+    name: str, described: Any, hardware: RobotHardware, movable: Sequence[str]
+) -> Iterator[str]:
+    """What a controller calls joints, and is none that it can have."""
+    if not isinstance(described, Mapping):
+        return
+    listed = described.get("joints", described.get("joint", []))
+    for joint in [listed] if isinstance(listed, str) else listed:
+        if joint in hardware.joints:
+            continue
+        if joint in movable:
+            yield f"controller '{name}': joint '{joint}' has no <transmission> in the URDF"
+        else:
+            near = did_you_mean(str(joint), movable) or f"; there are {', '.join(movable)}"
+            yield f"controller '{name}': there is no joint '{joint}'{near}"

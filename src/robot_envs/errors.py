@@ -7,6 +7,10 @@ class RobotEnvError(gymnasium.error.Error):
     """Something the user can mend; the text says what is wrong and what to do."""
 
 
+class TaskError(RobotEnvError, ValueError):
+    """A task has returned what can't be; the text says which method, and what it should be."""
+
+
 class SimulatorError(RobotEnvError):
     """The simulator doesn't answer, or answers something that can't be used."""
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.state.names import did_you_mean
 from file_reading.content import read_file
 from file_reading.errors import FileError
 from file_reading.yaml_text import load_documents
@@ -69,8 +70,13 @@ def locate(source: Source) -> Path:
     """The path of a file.
 
     Raises:
-        RobotEnvError: if its package isn't found; what isn't there is told when it is read.
+        RobotEnvError: if its package isn't found, or it is none that names a file; what isn't there is
+            told when it is read.
     """
+    if not isinstance(source, (str, Path)) or not str(source).strip():
+        raise RobotEnvError(
+            f'a file is a path or "package://PACKAGE/PLACE", or its text; not {source!r}'
+        )
     text = str(source)
     if not text.startswith(PACKAGE):
         return Path(text).expanduser()
@@ -94,11 +100,32 @@ def read_text(source: Source) -> str:
     """
     if is_text(source):
         return str(source)
-    path = locate(source)
+    return _read(locate(source)).decode(errors="surrogateescape")
+
+
+def _read(path: Path) -> bytes:
+    need_file(path)
     try:
-        return read_file(path).decode(errors="surrogateescape")
+        return read_file(path)
     except FileError as error:
         raise RobotEnvError(f"{path}: {error}") from error
+
+
+def need_file(path: Path) -> None:
+    """Makes sure that there is one.
+
+    Raises:
+        RobotEnvError: if there isn't, naming the nearest one of its folder.
+    """
+    if path.is_dir():
+        raise RobotEnvError(f"{path} is a folder, and no file")
+    if path.exists():
+        return
+    folder = path.parent
+    if not folder.is_dir():
+        raise RobotEnvError(f"there is no file {path}: there is no folder {folder}")
+    near = did_you_mean(path.name, (each.name for each in folder.iterdir() if each.is_file()))
+    raise RobotEnvError(f"there is no file {path}{near}")
 
 
 def read_urdf(source: Source, arguments: Mapping[str, str]) -> str:
@@ -113,7 +140,9 @@ def read_urdf(source: Source, arguments: Mapping[str, str]) -> str:
     """
     if is_text(source):
         return str(source)
-    return _expanded(locate(source), tuple(sorted(arguments.items())))
+    path = locate(source)
+    need_file(path)
+    return _expanded(path, tuple(sorted(arguments.items())))
 
 
 @lru_cache(maxsize=32)
@@ -124,20 +153,30 @@ def _expanded(path: Path, arguments: tuple[tuple[str, str], ...]) -> str:
         raise RobotEnvError(f"can't read {error}") from error
 
 
-@lru_cache(maxsize=32)
-def read_parameters(path: Path) -> dict[str, Any]:
-    """A YAML file of parameters.
+def read_parameters(source: Source) -> dict[str, Any]:
+    """What a YAML file of parameters says, or such a text, which has several lines.
 
     Raises:
         RobotEnvError: if it can't be read.
     """
+    if isinstance(source, str) and "\n" in source:
+        return _parameters(source.encode(), "the controllers' text")
+    return _parameters_of(locate(source))
+
+
+@lru_cache(maxsize=32)
+def _parameters_of(path: Path) -> dict[str, Any]:
+    return _parameters(_read(path), str(path))
+
+
+def _parameters(data: bytes, told: str) -> dict[str, Any]:
     try:
-        documents = load_documents(read_file(path))
+        documents = load_documents(data)
     except FileError as error:
-        raise RobotEnvError(f"{path}: {error}") from error
+        raise RobotEnvError(f"{told}: {error}") from error
     content = documents[0] if len(documents) == 1 else None
     if not isinstance(content, dict):
-        raise RobotEnvError(f"{path} isn't a YAML file of parameters")
+        raise RobotEnvError(f"{told}: that is no YAML of parameters, name: value")
     return content
 
 

@@ -1,5 +1,6 @@
 """What a robot is: its files, the controllers that run, and how it comes into the world."""
 
+import logging
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -13,10 +14,13 @@ from bullet_gazebo.control.joint import JointLimits
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.state.names import did_you_mean
 from robot_envs import controllers, files
 from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError
 from robot_envs.files import Source
+
+logger = logging.getLogger(__name__)
 
 CONTROL_PERIOD = 0.01  # [s]
 EMPTY = "empty"
@@ -165,18 +169,48 @@ class Robot:
         return True
 
     def _faults(self) -> Iterator[str]:
-        if not all(map(math.isfinite, (*self.pose.position, *self.pose.orientation))):
-            yield f"its pose isn't finite: {self.pose}"
+        wrong = unfit_pose(self.pose)
+        if wrong:
+            yield f"its pose {wrong}"
+        given: tuple[tuple[str, Any], ...] = (("run", self.run), ("commanded", self.commanded))
+        for what, names in given:
+            if isinstance(names, str):
+                yield f"{what} lists names: ({names!r},) and not {names!r}"
+                return
         if not self.joints:
             yield (
                 "its URDF has no <transmission>: each joint that is to be commanded or seen needs one"
             )
+            return
+        self._warn_of_strangers()
         try:
             hardware = self.hardware()
         except ControlError as error:
             yield str(error)
         else:
-            yield from controllers.faults(self.run, self.commanded, self.parameters, hardware)
+            passive = [each.name for each in self.links.movable_joints]
+            yield from controllers.faults(
+                self.run, self.commanded, self.parameters, hardware, passive
+            )
+
+    def _warn_of_strangers(self) -> None:
+        """A file may be for several robots, so that they are no faults."""
+        gains = self.parameters.get("gazebo_ros_control")
+        pids = gains.get("pid_gains") if isinstance(gains, Mapping) else None
+        for what, named in (
+            ("pid_gains", pids),
+            ("joint_limits", self.parameters.get("joint_limits")),
+        ):
+            for name in named if isinstance(named, Mapping) else ():
+                if name not in self.control.joints:
+                    near = did_you_mean(str(name), self.control.joints)
+                    logger.warning(
+                        "the robot '%s' has no joint '%s', which %s names%s",
+                        self.model,
+                        name,
+                        what,
+                        near,
+                    )
 
     @cached_property
     def ports(self) -> tuple[CommandPort, ...]:
@@ -188,6 +222,16 @@ class Robot:
         self.check()
         loaded = controllers.load(self.run, self.parameters, self.hardware())[1]
         return tuple(controllers.ports(self.commanded, self.parameters, loaded))
+
+
+def unfit_pose(pose: Any) -> str:
+    """Why something is no place for a model; empty: it is one."""
+    if not isinstance(pose, Pose):
+        return f"is a Pose((x, y, z)), not {pose!r}"
+    numbers = (*pose.position, *pose.orientation)
+    if not all(map(math.isfinite, numbers)):
+        return f"isn't finite: {pose}"
+    return "" if any(pose.orientation) else f"has a quaternion of length 0: {pose}"
 
 
 def _source(given: Source | Callable[[], Source]) -> Source:

@@ -7,8 +7,8 @@ from typing import Any
 
 from bullet_gazebo.state.names import did_you_mean
 from robot_envs.controllers import CommandPort
-from robot_envs.errors import RobotEnvError
-from robot_envs.robot import Robot
+from robot_envs.errors import RobotEnvError, TaskError
+from robot_envs.robot import Robot, unfit_pose
 from robot_envs.task import Object
 from robot_envs.world_state import Commands, InitialState, JointState, Motion, Pose
 
@@ -32,7 +32,15 @@ class Scene:
         if not self.robots:
             raise RobotEnvError("an environment needs a robot")
         for robot in self.robots:
+            if not isinstance(robot, Robot):
+                raise RobotEnvError(f"a robot is a Robot(...), not {robot!r}")
             robot.check()
+        for each in self.objects:
+            if not isinstance(each, Object):
+                raise RobotEnvError(f"a task's objects are Object(...), not {each!r}")
+            wrong = unfit_pose(each.pose)
+            if wrong:
+                raise RobotEnvError(f"the object '{each.name}': its pose {wrong}")
         models = [robot.model for robot in self.robots]
         _once("model", [*models, *(each.name for each in self.objects)])
         _once("namespace", [robot.namespace.strip("/") for robot in self.robots])
@@ -127,26 +135,50 @@ class Scene:
         """Position and velocity of all joints that move.
 
         Raises:
-            ValueError: for a joint that isn't there, or something that is neither.
+            TaskError: for a joint that isn't there, or something that is neither.
         """
+        if not isinstance(initial, InitialState):
+            raise TaskError(f"an episode begins with an InitialState(...), not {initial!r}")
         found: Placed = dict.fromkeys(self.moved, (0.0, 0.0))
         for name, given in initial.joints.items():
             if name not in found:
-                raise ValueError(f"there is no joint '{name}' to place{did_you_mean(name, found)}")
-            position, velocity = given if isinstance(given, tuple) else (given, 0.0)
-            found[name] = (float(position), float(velocity))
+                near = did_you_mean(name, found) or f"; there are {', '.join(found)}"
+                raise TaskError(f"there is no joint '{name}' to place{near}")
+            found[name] = _place(name, given)
         return found
 
     def placed_models(self, initial: InitialState) -> dict[str, Motion]:
-        """The models to place."""
-        return {
-            name: at if isinstance(at, Motion) else Motion(at)
-            for name, at in initial.models.items()
-        }
+        """The models to place.
+
+        Raises:
+            TaskError: for something that is no place.
+        """
+        found = {}
+        for name, at in initial.models.items():
+            placed = found[name] = at if isinstance(at, Motion) else Motion(at)
+            wrong = unfit_pose(placed.pose)
+            if wrong:
+                raise TaskError(f"where an episode puts the model '{name}' {wrong}")
+        return found
 
     def stand(self, initial: InitialState, robot: Robot) -> Pose:
         """Where a robot's model is when an episode begins."""
         return self.placed_models(initial).get(robot.model, Motion(robot.pose)).pose
+
+
+def _place(name: str, given: Any) -> tuple[float, float]:
+    """Position and velocity of a joint."""
+    try:
+        position, velocity = given if isinstance(given, (tuple, list)) else (given, 0.0)
+        place = (float(position), float(velocity))
+    except (TypeError, ValueError):
+        place = (math.nan, math.nan)
+    if not all(map(math.isfinite, place)):
+        raise TaskError(
+            f"where an episode puts the joint '{name}' is a finite position, or one and a velocity, "
+            f"not {given!r}"
+        )
+    return place
 
 
 def _once(what: str, names: Sequence[str]) -> None:

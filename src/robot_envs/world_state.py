@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import AT_REST
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import seen_from
 from bullet_gazebo.state.contacts import ContactPair
+from bullet_gazebo.state.names import did_you_mean
 from bullet_gazebo.state.query import LinkQuery, StateQuery
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "WorldState",
 ]
 
+Entry = TypeVar("Entry")
 Command = float | Sequence[float]
 """Of one controller [m, rad, m/s, rad/s, N, N m]: a number, or for a group one for each joint of its list."""
 Commands = Mapping[str, Command]
@@ -52,6 +54,45 @@ class Motion(NamedTuple):
         return Motion(*seen_from(self, frame))
 
 
+class UnknownEntry(KeyError):
+    """A name that a state doesn't have; the text says which are near."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class _Entries(dict[str, Entry]):
+    """A part of a state, by name."""
+
+    __slots__ = ()
+    what: ClassVar[str]
+
+    def __missing__(self, name: str) -> Entry:
+        near = did_you_mean(name, self) or f"; there are: {', '.join(self) or 'none'}"
+        raise UnknownEntry(f"the state has no {self.what} '{name}'{near}")
+
+
+class Joints(_Entries[JointState]):
+    """Joints by name."""
+
+    __slots__ = ()
+    what = "joint"
+
+
+class Links(_Entries[Motion]):
+    """Links by the names that a query has for them."""
+
+    __slots__ = ()
+    what = "link, as the task's query names those to tell,"
+
+
+class Models(_Entries[Motion]):
+    """Models by name."""
+
+    __slots__ = ()
+    what = "model, as the task's query names those to tell,"
+
+
 class WorldState(NamedTuple):
     """The world after a reset or a control period: the same numbers in-process and over ROS in lock-step.
 
@@ -73,8 +114,8 @@ class WorldState(NamedTuple):
     time: float
     joints: Mapping[str, JointState]
     commands: Mapping[str, Any] = {}
-    links: Mapping[str, Motion] = {}
-    models: Mapping[str, Motion] = {}
+    links: Mapping[str, Motion] = Links()
+    models: Mapping[str, Motion] = Models()
     contacts: Sequence[ContactPair] = ()
 
 

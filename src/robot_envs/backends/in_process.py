@@ -34,7 +34,10 @@ from robot_envs.variation.applying import Applier
 from robot_envs.world_state import (
     Commands,
     InitialState,
+    Joints,
     JointState,
+    Links,
+    Models,
     Motion,
     StateQuery,
     WorldState,
@@ -179,7 +182,7 @@ class InProcessWorld:
         return self._state()
 
     def _state(self) -> WorldState:
-        joints: dict[str, JointState] = {}
+        joints = Joints()
         total = 0.0
         for name, joint in self._joints:
             joints[name] = state = _make(JointState, _numbers(joint))
@@ -194,8 +197,8 @@ class InProcessWorld:
             passed / NANOSECONDS,
             joints,
             self._held,
-            dict(zip(self._links, map(_motion, answer.links), strict=True)),
-            {name: _motion(state) for name, state in answer.models.items()},
+            Links(zip(self._links, map(_motion, answer.links), strict=True)),
+            Models((name, _motion(state)) for name, state in answer.models.items()),
             answer.contacts,
         )
 

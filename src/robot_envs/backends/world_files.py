@@ -15,7 +15,7 @@ from bullet_gazebo.physics.files.world_file import (
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.simulator import Simulator
 from robot_envs.errors import RobotEnvError
-from robot_envs.files import Source, is_text, locate, read_text, resources
+from robot_envs.files import Source, is_text, locate, need_file, read_text, resources
 from robot_envs.robot import EMPTY
 from robot_envs.task import Object
 
@@ -52,8 +52,10 @@ def _read(source: Source) -> WorldDescription:
     try:
         if is_text(source):
             return parse_world(str(source), resources())
-        return load_world(locate(source), resources())
-    except DescriptionError as error:
+        path = locate(source)
+        need_file(path)
+        return load_world(path, resources())
+    except (DescriptionError, RobotEnvError) as error:
         raise RobotEnvError(f"world {_told(source)}: {error}") from error
 
 

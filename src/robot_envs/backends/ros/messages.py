@@ -16,7 +16,10 @@ from robot_envs.scene import Scene
 from robot_envs.world_state import (
     Commands,
     ContactPair,
+    Joints,
     JointState,
+    Links,
+    Models,
     Motion,
     StateQuery,
     WorldState,
@@ -44,7 +47,7 @@ class JointReader:
         self._names: list[str] = []  # of the message before
         self._places: list[tuple[str, int]] = []
 
-    def __call__(self, message: JointStateMsg) -> dict[str, JointState]:
+    def __call__(self, message: JointStateMsg) -> Joints:
         """The joints by the names that they have in a state.
 
         Raises:
@@ -54,7 +57,7 @@ class JointReader:
             self._places = self._found(message.name)
             self._names = message.name
         positions, velocities, efforts = message.position, message.velocity, message.effort
-        total, joints = 0.0, {}
+        total, joints = 0.0, Joints()
         try:
             for name, index in self._places:
                 position, velocity = positions[index], velocities[index]
@@ -103,7 +106,7 @@ def told(
     answer: StepWorldResponse,
     begun: StepWorldResponse,
     query: StateQuery,
-    joints: dict[str, JointState],
+    joints: Joints,
     commands: Commands,
 ) -> WorldState:
     """The world as an answer tells it.
@@ -124,8 +127,8 @@ def told(
         passed,
         joints,
         commands,
-        dict(zip(link_keys(query), links, strict=True)),
-        dict(zip(answer.model_names, models, strict=True)),
+        Links(zip(link_keys(query), links, strict=True)),
+        Models(zip(answer.model_names, models, strict=True)),
         [_contact(each) for each in answer.contacts],
     )
 
