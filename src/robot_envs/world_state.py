@@ -100,13 +100,8 @@ class WorldState(NamedTuple):
     |---|---|
     | `time` | simulated time since the reset [s] |
     | `joints` | those with a transmission, by name; as "model::joint" where a world has several robots |
-<<<<<<< HEAD
-    | `commands` | what each commanded controller holds, by its name: a number, or a tuple for a group |
+    | `commands` | what each commanded controller was sent last, by name: a number, or a tuple for a group |
     | `links` | those that the task's query names, by that name; each in the frame asked for |
-=======
-    | `commands` | what each controller that is commanded was sent last, by its name |
-    | `links` | those that the task's query names, by the name that it gives them; each in the frame asked for |
->>>>>>> 2ac7138 (Options of environments may be mappings on the command line; docs/sim_to_real.md)
     | `models` | those that the query names, in the world |
     | `contacts` | of the last physics step, as the query names them; none right after a reset |
     """

@@ -6,7 +6,7 @@ from math import isfinite
 from bullet_gazebo.physics.description import ModelDescription, Shape
 from bullet_gazebo.physics.engine import FASTEST, Body, Twist
 from bullet_gazebo.physics.mechanics.lumping import WORLD
-from bullet_gazebo.physics.mechanics.mass_matrix import effective_inertias
+from bullet_gazebo.physics.mechanics.mass_matrix import effective_inertias, poses_at_zero
 from bullet_gazebo.physics.pose import ZERO, Pose
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit
@@ -147,7 +147,10 @@ class Model:
         self.body.set_friction(link, factor)
 
     def apply_damping(self, time_step: float) -> None:
-        """Hands the joints' damping to the engine, which would blow up if it were stiffer than a step."""
+        """Hands the joints' damping to the engine, which would blow up if it were stiffer than a step.
+
+        Where that begins is taken with all joints at zero: it must not depend on what was before.
+        """
         self.time_step = time_step
         joints = self.description.joints
         dampings = {
@@ -156,7 +159,7 @@ class Model:
         damped = {name for name, damping in dampings.items() if damping > 0.0}
         if not damped | set(self._damped):
             return
-        inertias = effective_inertias(self.description, self.body.link_poses())
+        inertias = effective_inertias(self.description, poses_at_zero(self.description))
         for name in damped | set(self._damped):
             most = GENTLEST * inertias[name] / time_step
             self._damped[name] = min(dampings[name], most)

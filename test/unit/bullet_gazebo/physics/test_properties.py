@@ -398,3 +398,19 @@ def test_surfaces_have_so_many_times_the_friction_of_their_file(world, reloaded)
 def test_friction_that_no_surface_has_is_refused(box, factor):
     with pytest.raises(PropertyError, match="friction of 'body' must be a factor >= 0"):
         set_link_friction(box, "body", factor)
+
+
+def test_where_damping_is_cut_does_not_depend_on_where_the_joints_are(world, new_engine):
+    """The cart, with its pole upright or level, after a damping that is stiffer than a step."""
+    rates = []
+    for angle in (0.0, math.pi / 2):
+        other = World(new_engine())
+        model = other.spawn("cartpole", parse_urdf(cartpole_urdf()), Pose())
+        model.set_joint_positions({"cart_pole": angle})
+        set_joint_properties(model, "stand_cart", JointProperties(damping=1e5), other.time_step)
+        model.set_joint_positions({"cart_pole": 0.0})
+        model.set_joint_velocities({"stand_cart": 1.0})
+        run(other, 1)
+        rates.append(model.joint_state("stand_cart")[1])
+        other.close()
+    assert rates[0] == rates[1]
