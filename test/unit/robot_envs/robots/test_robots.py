@@ -35,7 +35,10 @@ def test_the_page_and_the_registration_name_the_same_environments() -> None:
 
 
 def test_registering_them_loads_neither_their_files_nor_a_physics_engine() -> None:
-    code = "import robot_envs.robots, sys; print([m for m in sys.modules if 'pybullet' in m or 'robots.' in m])"
+    code = (
+        "import robot_envs.robots, sys;"
+        "print([each for each in sys.modules if 'pybullet' in each or 'robots.' in each])"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
 
