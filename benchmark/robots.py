@@ -6,7 +6,8 @@
 The loop is what somebody writes who needs just this robot: PyBullet reads its URDF, and each tick of 1 ms
 reads the joints, computes one line of control for each that is driven, writes and steps. A step is as many
 ticks in all three; the environments' take in observation, reward and resets. The rates of a round are taken
-one after the other; the table shows medians over rounds, also of the ratios. Prints it and writes robots.json.
+one after the other; the table shows medians over rounds, also of the ratios. It is printed, and written to
+robots.json.
 """
 
 import contextlib

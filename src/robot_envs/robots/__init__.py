@@ -3,7 +3,7 @@
 | id | what is to be learned |
 |---|---|
 | `robot_envs/TwoLinkReach-v0` | the tip of a two-link arm goes to a point |
-| `robot_envs/TwoLinkReachGoal-v0` | the same with goals and a sparse reward, for hindsight experience replay |
+| `robot_envs/TwoLinkReachGoal-v0` | the same with goals and a sparse reward, for hindsight replay |
 | `robot_envs/SixJointReach-v0` | the tip of a six-joint arm goes to a point in space |
 | `robot_envs/Furuta-v0` | a Furuta pendulum swings up and stays up |
 | `robot_envs/DoublePendulum-v0` | a cart keeps two rods upright, one on top of the other |
