@@ -13,22 +13,22 @@
 from robot_envs.making import register
 
 register(
-    "robot_envs/TwoLinkReach-v0", f"{__name__}.two_link_arm:ARM", f"{__name__}.two_link_arm:Reach"
+    "robot_envs/TwoLinkReach-v0", f"{__name__}.two_link_arm:ROBOT", f"{__name__}.two_link_arm:Reach"
 )
 register(
     "robot_envs/TwoLinkReachGoal-v0",
-    f"{__name__}.two_link_arm:ARM",
+    f"{__name__}.two_link_arm:ROBOT",
     f"{__name__}.two_link_arm:ReachGoal",
 )
 register(
     "robot_envs/SixJointReach-v0",
-    f"{__name__}.six_joint_arm:ARM",
+    f"{__name__}.six_joint_arm:ROBOT",
     f"{__name__}.six_joint_arm:Reach",
 )
-register("robot_envs/Furuta-v0", f"{__name__}.furuta:FURUTA", f"{__name__}.furuta:SwingUp")
+register("robot_envs/Furuta-v0", f"{__name__}.furuta:ROBOT", f"{__name__}.furuta:SwingUp")
 register(
     "robot_envs/DoublePendulum-v0",
-    f"{__name__}.double_pendulum:DOUBLE_PENDULUM",
+    f"{__name__}.double_pendulum:ROBOT",
     f"{__name__}.double_pendulum:Balance",
 )
-register("robot_envs/Hopper-v0", f"{__name__}.hopper:HOPPER", f"{__name__}.hopper:HopForward")
+register("robot_envs/Hopper-v0", f"{__name__}.hopper:ROBOT", f"{__name__}.hopper:HopForward")

@@ -15,7 +15,7 @@ STRONGEST = 15.0  # [N] that an action asks for
 LEAN = 0.5  # [rad] of a rod from the vertical, at which it counts as fallen
 EDGE = 0.95  # [m] of the cart from the rail's middle
 
-DOUBLE_PENDULUM = Robot(
+ROBOT = Robot(
     urdf=partial(own_file, "cartpole", "urdf/double_pendulum.urdf.xacro"),
     controllers=partial(own_file, "cartpole", "config/robots/double_pendulum.yaml"),
     run=("joint_state_controller", "cart_controller"),

@@ -16,7 +16,7 @@ from robot_envs.world_state import InitialState, WorldState
 STRONGEST = 0.3  # [N m] that an action asks for
 TURNS = 2.0 * math.pi  # [rad] that the arm may be away from where it points at the start
 
-FURUTA = Robot(
+ROBOT = Robot(
     urdf=partial(own_file, "cartpole", "urdf/furuta.urdf.xacro"),
     controllers=partial(own_file, "cartpole", "config/robots/furuta.yaml"),
     run=("joint_state_controller", "arm_controller"),

@@ -19,7 +19,7 @@ SWING = (0.6, 0.7, 0.5)  # [rad] that an action asks for beside it, either way
 LOW = -0.25  # [m] of the hip, below that of a stretched leg: it counts as fallen
 LEAN = 0.6  # [rad] of the torso, the same
 
-HOPPER = Robot(
+ROBOT = Robot(
     urdf=partial(own_file, "cartpole", "urdf/hopper.urdf.xacro"),
     controllers=partial(own_file, "cartpole", "config/robots/hopper.yaml"),
     run=("joint_state_controller", "leg_controller"),

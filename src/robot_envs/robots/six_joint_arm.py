@@ -20,7 +20,7 @@ STEP = 0.08  # [rad] that an action moves a joint by, at most
 CENTRE, HALF = (0.45, 0.0, 0.40), (0.15, 0.30, 0.20)  # [m] of the box that targets are drawn in
 CLOSE = 0.02  # [m]: the tip is there
 
-ARM = Robot(
+ROBOT = Robot(
     urdf=partial(own_file, "cartpole", "urdf/six_joint_arm.urdf.xacro"),
     controllers=partial(own_file, "cartpole", "config/robots/six_joint_arm.yaml"),
     run=("joint_state_controller", "arm_controller"),

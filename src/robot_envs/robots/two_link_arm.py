@@ -13,7 +13,6 @@ from robot_envs.robots import spaces
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
-UPPER_ARM, FOREARM = 0.30, 0.25  # [m]
 NEAREST, FURTHEST = 0.20, 0.50  # [m] of targets from the shoulder
 WIDEST = 0.5 * math.pi  # [rad] of targets from straight ahead, either way
 CLOSE = 0.02  # [m]: the tip is there
@@ -21,7 +20,7 @@ NEAR = 0.05  # [m] of the way to the target, which is seen better from there on
 GOAL_UNIT = 0.1  # [m]: numbers of order 1, which networks tell apart
 FASTEST = 3.0  # [rad/s] that an action asks for
 
-ARM = Robot(
+ROBOT = Robot(
     urdf=partial(own_file, "cartpole", "urdf/two_link_arm.urdf.xacro"),
     controllers=partial(own_file, "cartpole", "config/robots/two_link_arm.yaml"),
     run=("joint_state_controller", "shoulder_controller", "elbow_controller"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_envs.robots  # noqa: F401 - registers the environments
-from robot_envs.robots import six_joint_arm, two_link_arm
+from robot_envs.robots import six_joint_arm
 from robot_envs.world_state import InitialState, WorldState
 
 Policy = Callable[[WorldState], np.ndarray]
@@ -35,9 +35,11 @@ def state_of(state: WorldState, *names: str) -> np.ndarray:
 
 
 class TestTwoLinkArm:
+    LENGTHS = (0.30, 0.25)  # [m]
+
     def angles(self, x: float, y: float) -> np.ndarray:
         """Shoulder and elbow [rad] that put the tip there: the law of cosines."""
-        upper, fore = two_link_arm.UPPER_ARM, two_link_arm.FOREARM
+        upper, fore = self.LENGTHS
         elbow = math.acos((x * x + y * y - upper**2 - fore**2) / (2.0 * upper * fore))
         inner = math.atan2(fore * math.sin(elbow), upper + fore * math.cos(elbow))
         return np.array([math.atan2(y, x) - inner, elbow])
@@ -67,7 +69,9 @@ class TestTwoLinkArm:
         env = gymnasium.make("robot_envs/TwoLinkReachGoal-v0")
         for seed in range(20):
             observation, _ = env.reset(seed=seed)
-            total, _, infos, _ = play(env, self.towards(*(0.1 * observation["desired_goal"]).tolist()))
+            total, _, infos, _ = play(
+                env, self.towards(*(0.1 * observation["desired_goal"]).tolist())
+            )
             assert all(info["is_success"] for info in infos[40:])
             assert total > -40.0
         env.close()
