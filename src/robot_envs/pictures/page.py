@@ -99,12 +99,12 @@ class RobotOnPage:
         Raises:
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
         """
-        base = self._placement.base()
-        poses = self._placement.links(self._positions(), base)
+        positions, base = self._positions(), self._placement.base()
+        poses = self._placement.links(positions, base)
         rows = [
             [*poses[link.name].position, *poses[link.name].orientation] for link in self._seen.links
         ]
-        return Placed(np.array(rows), np.array(self._placement.strayed(base)))
+        return Placed(np.array(rows), np.array(self._placement.strayed(positions, base)))
 
     def show(self, placed: Placed, caption: str = "") -> None:
         """Moves it to where it was in another moment; asks nobody."""

@@ -96,5 +96,5 @@ class _DrawnRobot:
     def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
         base = self._placement.base()
         self.scene.place("robot", self._placement.links(positions, base))
-        target = add(self._camera.target, self._placement.strayed(base))
+        target = add(self._camera.target, self._placement.strayed(positions, base))
         return self.scene.picture(self._camera.at(target), *self._size)

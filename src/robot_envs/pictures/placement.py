@@ -31,6 +31,9 @@ class Placement:
         self.shapes = visible_shapes(self.description)
         self._start = robot.pose.compose(self.description.root_pose)
         self.base = base or (lambda: self._start)
+        slides = [joint for joint in self.description.movable_joints if _goes_far(joint)]
+        self._slides = {joint.name: 0.0 for joint in slides}
+        self._carried = slides[-1].child if slides else None
 
     def links(self, positions: Mapping[str, float], base: Pose) -> dict[str, Pose]:
         """The frame of every link in the world, for joints' positions and where the root link is."""
@@ -56,9 +59,15 @@ class Placement:
         """
         return overview(self.reach(), aspect) if camera is None else camera
 
-    def strayed(self, base: Pose) -> Vector:
-        """How far the root link has come from where it starts [m]."""
-        return subtract(base.position, self._start.position)
+    def strayed(self, positions: Mapping[str, float], base: Pose) -> Vector:
+        """How far it has come from where it starts [m], with its root link and along slides without near ends."""
+        if self._carried is None:
+            return subtract(base.position, self._start.position)
+        here, there = (
+            link_poses(self.description, pose, each)[self._carried].position
+            for pose, each in ((self._start, {**positions, **self._slides}), (base, positions))
+        )
+        return subtract(there, here)
 
     def _boxes(self) -> Iterator[tuple[str, Pose, np.ndarray]]:
         """Link, pose in it, and box around each shape that can be drawn."""
@@ -71,7 +80,15 @@ class Placement:
     def _places(self) -> Iterator[tuple[Joint, float]]:
         """Some of where the joints can be [rad, m]: at their stops, or all the way round."""
         for joint in self.description.movable_joints:
-            if joint.bounded and joint.upper - joint.lower < 2.0 * pi:
+            if _has_near_stops(joint):
                 yield from ((joint, joint.lower), (joint, joint.upper))
-            elif joint.kind != "prismatic":
+            elif not _goes_far(joint):
                 yield from ((joint, place) for place in QUARTERS)
+
+
+def _has_near_stops(joint: Joint) -> bool:
+    return joint.bounded and joint.upper - joint.lower < 2.0 * pi
+
+
+def _goes_far(joint: Joint) -> bool:
+    return joint.kind == "prismatic" and not _has_near_stops(joint)

@@ -1,8 +1,6 @@
 """The double pendulum: a cart keeps two rods upright, one on top of the other."""
 
-import math
 from functools import partial
-from typing import Any
 
 import gymnasium
 import numpy as np
@@ -17,7 +15,7 @@ STRONGEST = 15.0  # [N] that an action asks for
 LEAN = 0.5  # [rad] of a rod from the vertical, at which it counts as fallen
 EDGE = 0.95  # [m] of the cart from the rail's middle
 
-DOUBLE_PENDULUM = Robot(
+ROBOT = Robot(
     urdf=partial(own_file, "cartpole", "urdf/double_pendulum.urdf.xacro"),
     controllers=partial(own_file, "cartpole", "config/robots/double_pendulum.yaml"),
     run=("joint_state_controller", "cart_controller"),
@@ -30,13 +28,31 @@ DOUBLE_PENDULUM = Robot(
 class Balance(Task):
     """Both rods are kept upright, and the cart in the middle of its rail.
 
-    | | |
-    |---|---|
-    | actions | Box(-1, 1, (1,)): force on the cart, in units of 15 N |
-    | observations | Box(6): the cart's position [m] and speed [m/s]; angle of each rod from the vertical [0.2 rad] and its speed [2 rad/s], the lower one first |
-    | reward | 1 for each step, less 0.5 x² for the cart's position [m] and 0.01 (action)² |
-    | start | all within 0.03 [m, m/s, rad, rad/s] of upright and at rest in the middle |
-    | end | terminated when a rod is 0.5 rad from the vertical or the cart 0.95 m from the middle; truncated after 500 steps (10 s) |
+    ## Action space
+    `Box(-1, 1, (1,))`: the force on the cart [15 N].
+
+    ## Observation space
+    `Box((6,))`
+
+    | numbers | what they are | unit |
+    |---|---|---|
+    | 0, 1 | position and speed of the cart | m, m/s |
+    | 2, 3 | angle of the lower rod from the vertical, and its speed | 0.2 rad, 2 rad/s |
+    | 4, 5 | the same of the upper rod, from the vertical, too | 0.2 rad, 2 rad/s |
+
+    ## Rewards
+    1 - 0.5 x² - 0.01 action² for each step, with the cart's position x [m].
+
+    ## Start of an episode
+    Upright and at rest in the middle: each joint's position and speed within `noise` [m, m/s, rad, rad/s] of
+    it.
+
+    ## End of an episode
+    It is terminated when a rod is 0.5 rad from the vertical or the cart 0.95 m from the middle, and truncated
+    after 500 steps of 0.02 s.
+
+    Args:
+        noise: see above.
     """
 
     max_steps = 500

@@ -16,7 +16,7 @@ from robot_envs.world_state import InitialState, WorldState
 STRONGEST = 0.3  # [N m] that an action asks for
 TURNS = 2.0 * math.pi  # [rad] that the arm may be away from where it points at the start
 
-FURUTA = Robot(
+ROBOT = Robot(
     urdf=partial(own_file, "cartpole", "urdf/furuta.urdf.xacro"),
     controllers=partial(own_file, "cartpole", "config/robots/furuta.yaml"),
     run=("joint_state_controller", "arm_controller"),
@@ -27,16 +27,33 @@ FURUTA = Robot(
 
 
 class SwingUp(Task):
-    """The rod hangs, and is to be swung up and held upright, with the arm near where it began.
+    """The rod hangs; it is to be swung up and held upright, with the arm near where it began.
 
-    | | |
-    |---|---|
-    | actions | Box(-1, 1, (1,)): torque of the motor, in units of 0.3 N m |
-    | observations | Box(5): cos and sin of the rod's angle (upright: 1, 0); its speed [10 rad/s]; the arm's angle [pi rad] and speed [10 rad/s] |
-    | reward | between 0 and 1: (1 + cos rod) / 2, times what is left of 1 for the arm's angle and speed, the rod's speed near the top, and the action |
-    | start | the rod hangs within 0.1 rad, the arm points ahead within 0.1 rad, speeds within 0.1 rad/s |
-    | end | terminated when the arm is a whole turn away from its start; truncated after 300 steps (6 s) |
-    | info | `upright`: the rod is within 0.2 rad of it |
+    ## Action space
+    `Box(-1, 1, (1,))`: the motor's torque [0.3 N m].
+
+    ## Observation space
+    `Box((5,))`
+
+    | numbers | what they are | unit |
+    |---|---|---|
+    | 0, 1 | cosine and sine of the rod's angle from upright | 1 |
+    | 2 | the rod's speed | 10 rad/s |
+    | 3 | the arm's angle | pi rad |
+    | 4 | the arm's speed | 10 rad/s |
+
+    ## Rewards
+    (1 + cos rod) / 2 (0.4 + 0.3 calm + 0.3 near), between 0 and 1: calm = 1 / (1 + 0.01 (arm'² + rod'²)) for
+    the speeds [rad/s], near = 1 / (1 + 0.3 arm²) for the arm's angle [rad].
+
+    ## Start of an episode
+    The rod hangs, the arm points ahead, both at rest: each of the four figures within 0.1 rad or rad/s of it.
+
+    ## End of an episode
+    It is terminated when the arm is a whole turn away from ahead, and truncated after 300 steps of 0.02 s.
+
+    ## Info
+    `upright`: whether the rod is within 0.2 rad of it.
     """
 
     max_steps = 300

@@ -11,15 +11,15 @@ from robot_envs.files import own_file
 from robot_envs.robot import Robot
 from robot_envs.robots import spaces
 from robot_envs.task import Task
-from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
+from robot_envs.world_state import InitialState, StateQuery, WorldState
 
 LEG = ("hip", "knee", "ankle")
 STANCE = (-0.45, 0.9, -0.45)  # [rad] of the leg's joints: bent, the foot flat below the hip
 SWING = (0.6, 0.7, 0.5)  # [rad] that an action asks for beside it, either way
-LOW = 0.16  # [m] that the hip may sink below that of a stretched leg
-LEAN = 0.6  # [rad] of the torso
+LOW = -0.25  # [m] of the hip, below that of a stretched leg: it counts as fallen
+LEAN = 0.6  # [rad] of the torso, the same
 
-HOPPER = Robot(
+ROBOT = Robot(
     urdf=partial(own_file, "cartpole", "urdf/hopper.urdf.xacro"),
     controllers=partial(own_file, "cartpole", "config/robots/hopper.yaml"),
     run=("joint_state_controller", "leg_controller"),
@@ -32,14 +32,34 @@ HOPPER = Robot(
 class HopForward(Task):
     """The hopper goes forward as fast as it can, and doesn't fall.
 
-    | | |
-    |---|---|
-    | actions | Box(-1, 1, (3,)): angles asked of hip, knee and ankle, beside a bent stance, in units of 0.6, 0.7 and 0.5 rad |
-    | observations | Box(12): height of the hip below that of a stretched leg [0.1 m], its speeds forward and up [m/s]; the torso's pitch [0.3 rad] and its speed [3 rad/s]; angles of hip, knee, ankle beside the stance [0.5 rad] and their speeds [10 rad/s]; 1 if the foot touches the ground |
-    | reward | 0.5 for each step, and the speed forward [m/s], at most 2; less 0.02 \\|action\\|² |
-    | start | in the stance, all joints within 0.02 rad, the foot just above the ground |
-    | end | terminated when it falls: the hip 0.25 m below that of a stretched leg, or the torso 0.6 rad from the vertical; truncated after 250 steps (5 s) |
-    | info | `x`: how far it has come [m] |
+    ## Action space
+    `Box(-1, 1, (3,))`: where hip, knee and ankle are asked to be, beside a bent stance [0.6, 0.7, 0.5 rad].
+    Position controllers follow with torques.
+
+    ## Observation space
+    `Box((12,))`
+
+    | numbers | what they are | unit |
+    |---|---|---|
+    | 0 | height of the hip over that of the stance | 0.1 m |
+    | 1, 2 | its speed forward and up | m/s |
+    | 3, 4 | the torso's pitch and its speed | 0.3 rad, 3 rad/s |
+    | 5 to 7 | angles of hip, knee, ankle beside the stance | 0.5 rad |
+    | 8 to 10 | their speeds | 10 rad/s |
+    | 11 | 1 if the foot touches something, else 0 | 1 |
+
+    ## Rewards
+    0.5 + v - 0.02 |action|² for each step, with the speed forward v [m/s], of which at most 2 count.
+
+    ## Start of an episode
+    In the stance at rest, leg and torso within 0.02 rad of it, the foot about 1 cm above the ground.
+
+    ## End of an episode
+    It is terminated when it falls: the hip 0.25 m below that of a stretched leg, or the torso 0.6 rad from
+    the vertical. It is truncated after 250 steps of 0.02 s.
+
+    ## Info
+    `x`: how far it has come [m].
     """
 
     max_steps = 250
@@ -98,7 +118,7 @@ class HopForward(Task):
     def is_terminal(self, state: WorldState) -> bool:
         """Whether it has fallen."""
         joints = state.joints
-        return joints["up"].position < -0.25 or abs(joints["pitch"].position) > LEAN
+        return joints["up"].position < LOW or abs(joints["pitch"].position) > LEAN
 
     def info(self, state: WorldState) -> dict[str, Any]:
         """See the class."""

@@ -20,7 +20,7 @@ STEP = 0.08  # [rad] that an action moves a joint by, at most
 CENTRE, HALF = (0.45, 0.0, 0.40), (0.15, 0.30, 0.20)  # [m] of the box that targets are drawn in
 CLOSE = 0.02  # [m]: the tip is there
 
-ARM = Robot(
+ROBOT = Robot(
     urdf=partial(own_file, "cartpole", "urdf/six_joint_arm.urdf.xacro"),
     controllers=partial(own_file, "cartpole", "config/robots/six_joint_arm.yaml"),
     run=("joint_state_controller", "arm_controller"),
@@ -33,14 +33,33 @@ ARM = Robot(
 class Reach(Task):
     """The tip goes to a target in front of the arm and stays there.
 
-    | | |
-    |---|---|
-    | actions | Box(-1, 1, (6,)): by how much each joint's set-point moves, in units of 0.08 rad; waist, shoulder, elbow, forearm_roll, wrist_pitch, hand_roll |
-    | observations | Box(15): set-points of the joints [2 rad]; tip (x, y, z) [0.5 m]; target minus tip (x, y, z) [0.5 m]; the same three, ten times as large and no further than 1 |
-    | reward | -d / 0.5 m + exp(-(d / 0.02 m)²) - 0.02 \\|action\\|² / 6, for the distance d of the tip when the step is over |
-    | start | joints within 0.3 rad of the pose in which the hand hangs in front of the arm; the target anywhere in a box of 0.3 x 0.6 x 0.4 m before it |
-    | end | truncated after 50 steps (2 s); nothing terminates it |
-    | info | `distance` [m]; `is_success`: it is at most 2 cm |
+    ## Action space
+    `Box(-1, 1, (6,))`: by how much the set-points of waist, shoulder, elbow, forearm_roll, wrist_pitch and
+    hand_roll move [0.08 rad].
+
+    ## Observation space
+    `Box((15,))`
+
+    | numbers | what they are | unit |
+    |---|---|---|
+    | 0 to 5 | the joints' set-points | 2 rad |
+    | 6 to 8 | where the tip is, (x, y, z) | 0.5 m |
+    | 9 to 11 | the way from there to the target, (x, y, z) | 0.5 m |
+    | 12 to 14 | the same, cut off at 1 | 0.05 m |
+
+    ## Rewards
+    -2 d + exp(-(d / 0.02)²) - 0.02 |action|² / 6, with the distance d [m] of the tip from the target when the
+    step is over: at most 1, which is for being there at rest.
+
+    ## Start of an episode
+    The hand hangs in front of the arm, each joint within 0.3 rad of it, at rest. The target is anywhere in a
+    box of 0.3 x 0.6 x 0.4 m whose middle is 0.45 m ahead of the waist and 0.4 m above the ground.
+
+    ## End of an episode
+    It is truncated after 50 steps of 0.04 s. Nothing terminates it.
+
+    ## Info
+    `distance`: d [m]. `is_success`: whether it is at most 0.02 m.
     """
 
     max_steps = 50
@@ -67,8 +86,7 @@ class Reach(Task):
         off = rng.uniform(-0.3, 0.3, 6)
         return InitialState(
             joints={
-                name: float(home + each)
-                for name, home, each in zip(JOINTS, HOME, off, strict=True)
+                name: float(home + each) for name, home, each in zip(JOINTS, HOME, off, strict=True)
             }
         )
 

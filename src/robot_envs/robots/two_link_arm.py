@@ -13,13 +13,14 @@ from robot_envs.robots import spaces
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 
-UPPER_ARM, FOREARM = 0.30, 0.25  # [m]
 NEAREST, FURTHEST = 0.20, 0.50  # [m] of targets from the shoulder
 WIDEST = 0.5 * math.pi  # [rad] of targets from straight ahead, either way
 CLOSE = 0.02  # [m]: the tip is there
+NEAR = 0.05  # [m] of the way to the target, which is seen better from there on
+GOAL_UNIT = 0.1  # [m]: numbers of order 1, which networks tell apart
 FASTEST = 3.0  # [rad/s] that an action asks for
 
-ARM = Robot(
+ROBOT = Robot(
     urdf=partial(own_file, "cartpole", "urdf/two_link_arm.urdf.xacro"),
     controllers=partial(own_file, "cartpole", "config/robots/two_link_arm.yaml"),
     run=("joint_state_controller", "shoulder_controller", "elbow_controller"),
@@ -32,14 +33,34 @@ ARM = Robot(
 class Reach(Task):
     """The tip goes to a target as fast as it can and stays there.
 
-    | | |
-    |---|---|
-    | actions | Box(-1, 1, (2,)): speed asked of shoulder and elbow, in units of 3 rad/s; a speed controller follows |
-    | observations | Box(10): cos and sin of shoulder, cos and sin of elbow; their speeds [3 rad/s]; tip (x, y) [0.5 m]; target minus tip (x, y) [0.5 m] |
-    | reward | -d / 0.5 m + exp(-(d / 0.02 m)²) - 0.02 \\|action\\|², for the distance d of the tip when the step is over |
-    | start | joints anywhere within 0.8 of their ranges, at rest; the target anywhere in front: 0.2 to 0.5 m away from the shoulder, up to 2 rad to either side |
-    | end | truncated after 50 steps (2 s); nothing terminates it |
-    | info | `distance` [m]; `is_success`: it is at most 2 cm |
+    ## Action space
+    `Box(-1, 1, (2,))`: the speed asked of shoulder and elbow [3 rad/s]. A speed controller follows it with a
+    torque.
+
+    ## Observation space
+    `Box((12,))`
+
+    | numbers | what they are | unit |
+    |---|---|---|
+    | 0 to 3 | cosine and sine of the shoulder's angle, of the elbow's | 1 |
+    | 4, 5 | speed of shoulder and elbow | 3 rad/s |
+    | 6, 7 | where the tip is, (x, y) from the shoulder | 0.5 m |
+    | 8, 9 | the way from there to the target, (x, y) | 0.5 m |
+    | 10, 11 | the same, cut off at 1 | 0.05 m |
+
+    ## Rewards
+    -2 d + exp(-(d / 0.02)²) - 0.02 |action|², with the distance d [m] of the tip from the target when the
+    step is over: at most 1, which is for being there at rest.
+
+    ## Start of an episode
+    Shoulder within -2.4 and 1.6 rad, elbow within 0.2 and 2.4 rad, at rest. The target is 0.2 to 0.5 m away
+    from the shoulder, up to a right angle to either side; each point of that is as likely as any other.
+
+    ## End of an episode
+    It is truncated after 50 steps of 0.04 s. Nothing terminates it.
+
+    ## Info
+    `distance`: d [m]. `is_success`: whether it is at most 0.02 m.
     """
 
     max_steps = 50
@@ -54,7 +75,7 @@ class Reach(Task):
 
     def observation_space(self) -> gymnasium.spaces.Box:
         """See the class."""
-        return spaces.numbers(10)
+        return spaces.numbers(12)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         """Draws a pose, and the target."""
@@ -67,9 +88,10 @@ class Reach(Task):
 
     def observe(self, state: WorldState) -> np.ndarray:
         """See the class."""
-        x, y = tip(state)
-        aim = self.target
-        seen = [*joints(state), 2.0 * x, 2.0 * y, 2.0 * (aim[0] - x), 2.0 * (aim[1] - y)]
+        here = tip(state)
+        way = [aim - at for aim, at in zip(self.target, here, strict=True)]
+        near = [max(-1.0, min(1.0, each / NEAR)) for each in way]
+        seen = [*joints(state), *(each / 0.5 for each in (*here, *way)), *near]
         return np.array(seen, np.float32)
 
     def reward(self, state: WorldState, action: np.ndarray) -> float:
@@ -90,13 +112,29 @@ class Reach(Task):
 class ReachGoal(GoalTask):
     """The tip goes to a goal; the reward only says whether it is there. For hindsight experience replay.
 
-    | | |
-    |---|---|
-    | actions | as in `Reach` |
-    | observations | Dict: `observation` Box(6): cos and sin of shoulder, cos and sin of elbow, their speeds [3 rad/s]; `achieved_goal`, `desired_goal` Box(2): where the tip is and where it shall be, (x, y) [m] |
-    | reward | 0 if the tip is within 2 cm of the goal when the step is over, else -1 |
-    | start, end | as in `Reach` |
-    | info | `is_success`: the tip is there |
+    ## Action space
+    As in `Reach`.
+
+    ## Observation space
+    `Dict`
+
+    | key | space | what it is | unit |
+    |---|---|---|---|
+    | `observation` | `Box((6,))` | cosine and sine of shoulder and elbow; their speeds | 1; 3 rad/s |
+    | `achieved_goal` | `Box(-10, 10, (2,))` | where the tip is, (x, y) from the shoulder | 0.1 m |
+    | `desired_goal` | `Box(-10, 10, (2,))` | where it shall be | 0.1 m |
+
+    ## Rewards
+    0 if the tip is within 0.02 m of the goal when the step is over, else -1.
+
+    ## Start of an episode
+    The arm's pose and the goal are drawn as in `Reach`.
+
+    ## End of an episode
+    It is truncated after 50 steps of 0.04 s. Nothing terminates it.
+
+    ## Info
+    `is_success`: whether the tip is there.
     """
 
     max_steps = 50
@@ -111,16 +149,16 @@ class ReachGoal(GoalTask):
         return spaces.numbers(6)
 
     def goals(self) -> gymnasium.spaces.Box:
-        """Points of the plane (x, y) [m]."""
-        return gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+        """Points of the plane (x, y) [0.1 m]."""
+        return gymnasium.spaces.Box(-10.0, 10.0, (2,), np.float32)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         """Draws a pose."""
         return draw_pose(rng)
 
     def goal(self, rng: np.random.Generator, state: WorldState) -> np.ndarray:
-        """Draws a point that the tip can reach [m]."""
-        return np.array(draw_target(rng), np.float32)
+        """Draws a point that the tip can reach [0.1 m]."""
+        return np.array(draw_target(rng), np.float32) / np.float32(GOAL_UNIT)
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, float]:
         """The speeds of both joints."""
@@ -131,16 +169,16 @@ class ReachGoal(GoalTask):
         return np.array(joints(state), np.float32)
 
     def achieved(self, state: WorldState) -> np.ndarray:
-        """Where the tip is [m]."""
-        return np.array(tip(state), np.float32)
+        """Where the tip is [0.1 m]."""
+        return np.array(tip(state), np.float32) / np.float32(GOAL_UNIT)
 
     def is_success(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
         """Whether the tip is there; vectorised."""
-        return np.linalg.norm(achieved - desired, axis=-1) <= CLOSE
+        return np.linalg.norm(achieved - desired, axis=-1) <= CLOSE / GOAL_UNIT
 
 
 def draw_pose(rng: np.random.Generator) -> InitialState:
-    """A pose within 0.8 of the joints' ranges, at rest."""
+    """A pose at rest, away from the joints' stops."""
     shoulder, elbow = rng.uniform(-2.4, 1.6), rng.uniform(0.2, 2.4)
     return InitialState(joints={"shoulder": float(shoulder), "elbow": float(elbow)})
 

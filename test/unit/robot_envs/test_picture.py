@@ -11,6 +11,7 @@ from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from robot_envs.errors import RobotEnvError
 from robot_envs.pictures.picture import RobotPicture
+from robot_envs.robots.hopper import ROBOT as HOPPER
 
 
 def where(picture: np.ndarray, channel: int) -> np.ndarray:
@@ -46,6 +47,18 @@ def test_the_camera_follows_what_drives_away():
     assert where(leaning, 1)[0] > where(there, 1)[0] + 2
     assert where(leaning, 0) == pytest.approx(where(here, 0), abs=1.0)
     picture.close()
+
+
+def test_the_camera_follows_what_slides_away():
+    picture = RobotPicture(HOPPER, 160, 120)
+    stance = {"hip": -0.45, "knee": 0.9, "ankle": -0.45, "up": -0.06}
+    here = picture(stance)
+    there = picture({**stance, "forward": 7.23})
+    higher = picture({**stance, "forward": 7.23, "up": 0.24})
+    picture.close()
+    assert where(there, 2) == pytest.approx(where(here, 2), abs=0.5)
+    assert not np.array_equal(here, there)  # the ground goes by
+    assert where(higher, 2)[1] < where(there, 2)[1] - 10  # and stays below
 
 
 def test_a_camera_of_ones_own_looks_where_it_should():
