@@ -52,6 +52,7 @@ class Episode:
     rewards: list[float] = field(default_factory=list)
     final_observation: np.ndarray | None = None  # after the last step
     terminated: bool = False  # by the task; False: it was cut off
+    success: bool | None = None  # None if the environment doesn't say
 
     def add(self, observation: np.ndarray, action: int, reward: float) -> None:
         self.observations.append(observation)

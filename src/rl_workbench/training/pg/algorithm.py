@@ -11,11 +11,11 @@ from rl_workbench.agents.pg.reinforce import ReinforceAgent
 from rl_workbench.agents.pg.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
+from rl_workbench.training.environments.making import discrete_actions
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.pg.episodes import EpisodeGenerators, run_episode
 from rl_workbench.training.run.algorithm import Algorithm, Frame, Say, in_its_environment
 from rl_workbench.training.run.checkpoints import fitting
-from rl_workbench.training.run.environments import discrete_actions
 from rl_workbench.training.run.files import save_tensors
 from rl_workbench.training.run.policy import Policy
 
@@ -114,7 +114,9 @@ class PolicyGradientTraining(Algorithm):
                 by_episode |= {"Value Loss": losses.value, "Policy Loss": losses.policy}
                 by_step = {"losses/value_loss": losses.value, "losses/policy_loss": losses.policy}
             frame.log.add(self._episodes, by_episode)
-            frame.episode_done(episode.total_reward, episode.length, by_step)
+            frame.episode_done(
+                episode.total_reward, episode.length, by_step, success=episode.success
+            )
             self._save_networks_if_due(frame.folder)
             self._episodes += 1
             self._generators.mark()
