@@ -2,9 +2,10 @@
 
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeGuard
 
 import gymnasium
+import numpy as np
 from gymnasium import spaces
 
 from rl_workbench.errors import WorkbenchError
@@ -108,6 +109,11 @@ def _is_numbers(space: gymnasium.Space[Any]) -> bool:
 def shares_robot(env: gymnasium.Env[Any, Any]) -> bool:
     """Whether another environment of this kind would move the same robot."""
     return env.has_wrapper_attr(SHARED) and bool(env.get_wrapper_attr(SHARED))
+
+
+def is_continuous(space: gymnasium.Space[Any]) -> TypeGuard[spaces.Box]:
+    """Whether actions are arrays of real numbers."""
+    return isinstance(space, spaces.Box) and np.issubdtype(space.dtype, np.floating)
 
 
 def discrete_actions(env: gymnasium.Env[Any, Any], env_id: str, algorithm: str) -> int:

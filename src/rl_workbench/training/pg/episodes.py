@@ -17,6 +17,7 @@ def run_episode(
     env: gymnasium.Env[Any, Any],
     act: Callable[[np.ndarray], Any],
     should_stop: Callable[[], bool],
+    limited: Callable[[Any], Any] = lambda action: action,
 ) -> Episode | None:
     """Runs one episode.
 
@@ -24,6 +25,7 @@ def run_episode(
         env: was seeded before.
         act: draws an action for an observation (D,), float32.
         should_stop: is asked before each step.
+        limited: makes of an action that was drawn the one that the environment takes.
 
     Returns:
         The episode, or None if it was broken off because `should_stop()` became true.
@@ -35,7 +37,7 @@ def run_episode(
         if should_stop():
             return None
         action = act(observation)
-        following, reward, terminated, truncated, info = env.step(action)
+        following, reward, terminated, truncated, info = env.step(limited(action))
         episode.add(observation, action, float(reward))
         observation = as_vector(following)
         finished = terminated or truncated
