@@ -25,6 +25,7 @@ COLUMNS = 4  # of small panels
 COLOURS = ("C0", "C1", "C2", "C4", "C5", "C6", "C8", "C9")
 LINE_STYLES = ("-", "-.", ":")
 STEPS = "step of the environment"
+SUCCESS = "success rate, last 100 episodes"
 
 
 class SeedCurve(NamedTuple):
@@ -41,6 +42,7 @@ class Panel(NamedTuple):
     environment: str
     curves: Mapping[str, Sequence[SeedCurve]]  # by the name of the group; one at least of each
     threshold: float | None  # the return from which the environment is solved
+    shows_success: bool = False  # rates between 0 and 1 over the last episodes, and not returns
 
 
 def moving_average(values: Sequence[float] | np.ndarray, window: int = WINDOW) -> np.ndarray:
@@ -75,23 +77,35 @@ def mean_over_seeds(
 # Pictures.
 
 
-def learning_curve(lengths: Sequence[int], returns: Sequence[float], title: str) -> Figure:
-    """One training: length and return of every episode, with their moving averages."""
-    figure = new_figure(9, 6)
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    for axes, values, label, colour in (
-        (upper, lengths, "episode length [steps]", "tab:blue"),
-        (lower, returns, "return", "tab:green"),
-    ):
+def learning_curve(
+    lengths: Sequence[int], returns: Sequence[float], title: str, successes: Sequence[bool] = ()
+) -> Figure:
+    """One training: length and return of every episode, with their moving averages.
+
+    Args:
+        lengths: [steps].
+        returns: of as many episodes.
+        title: above it.
+        successes: of as many, too, for a third curve; or none.
+    """
+    parts: list[tuple[Sequence[float], str, str]] = [
+        (lengths, "episode length [steps]", "tab:blue"),
+        (returns, "return", "tab:green"),
+    ]
+    if len(successes) == len(returns):
+        parts.append((successes, "success", "tab:purple"))
+    figure = new_figure(9, 3 * len(parts))
+    grid = figure.subplots(len(parts), 1, sharex=True)
+    for axes, (values, label, colour) in zip(grid, parts, strict=True):
         episodes = np.arange(len(values))
         axes.plot(episodes, values, ".", ms=3, alpha=0.45, color=colour, label="one episode")
         average = f"mean of {WINDOW} episodes"
         axes.plot(episodes, moving_average(values), color="tab:red", lw=1.8, label=average)
         axes.set_ylabel(label)
         axes.grid(alpha=0.3)
-    upper.set_title(title)
-    upper.legend(loc="upper left")
-    lower.set_xlabel("episode")
+    grid[0].set_title(title)
+    grid[0].legend(loc="upper left")
+    grid[-1].set_xlabel("episode")
     return figure
 
 
@@ -103,13 +117,15 @@ def training_curves(panels: Sequence[Panel], across: str) -> Figure:
         across: what the positions are.
     """
     figure, grid = _environments(panels)
-    pale, styles = sum(len(panel.curves) for panel in panels) <= PALE_AT_MOST, _styles(panels)
+    returns = [panel for panel in panels if not panel.shows_success]
+    pale, styles = sum(len(panel.curves) for panel in returns) <= PALE_AT_MOST, _styles(panels)
     for axes, panel in zip(grid, panels, strict=True):
         for name, (run,) in panel.curves.items():
             style = styles[name]
-            if pale:
+            if pale and not panel.shows_success:
                 axes.plot(run.positions, run.values, gid="episodes", alpha=0.3, lw=0.9, **style)
-            axes.plot(run.positions, moving_average(run.values), lw=2, label=name, **style)
+            values = run.values if panel.shows_success else moving_average(run.values)
+            axes.plot(run.positions, values, lw=2, label=name, **style)
         _finish(axes, panel, across, "return")
     about = f"mean of {WINDOW} episodes" + (", pale: each episode" if pale else "")
     figure.suptitle(f"training: {about}", fontsize="medium")
@@ -126,7 +142,10 @@ def seed_curves(panels: Sequence[Panel]) -> Figure:
     styles = _styles(panels)
     for axes, panel in zip(grid, panels, strict=True):
         for name, seeds in panel.curves.items():
-            averages = [each._replace(values=moving_average(each.values)) for each in seeds]
+            averages = [
+                each if panel.shows_success else each._replace(values=moving_average(each.values))
+                for each in seeds
+            ]
             _draw_seeds(axes, averages, f"{name} ({_seeds(seeds)})", styles[name])
         _finish(axes, panel, STEPS, f"return, mean of {WINDOW} episodes")
     _explain(figure, panels)
@@ -227,7 +246,9 @@ def _finish(axes: Axes, panel: Panel, across: str, up: str) -> None:
     _draw_threshold(axes, panel.threshold)
     axes.set_title(panel.environment)
     axes.set_xlabel(across)
-    axes.set_ylabel(up)
+    axes.set_ylabel(SUCCESS if panel.shows_success else up)
+    if panel.shows_success:
+        axes.set_ylim(-0.05, 1.05)
     axes.grid(alpha=0.3)
     axes.legend(fontsize="small")
 

@@ -16,6 +16,8 @@ EPISODES, LENGTHS, SPEED = "charts/episodic_return", "charts/episodic_length", "
 TITLES = {
     EPISODES: "return",
     "eval/mean_reward": "return of greedy episodes",
+    "rollout/success_rate": "success rate of the last 100 episodes",
+    "eval/success_rate": "success rate of greedy episodes",
     LENGTHS: "episode length [steps]",
     "charts/epsilon": "epsilon",
     SPEED: "steps/s",

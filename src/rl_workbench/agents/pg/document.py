@@ -48,12 +48,13 @@ class Episode:
     """What happened, step by step: observation before the action, action, reward."""
 
     observations: list[np.ndarray] = field(default_factory=list)  # each float32 (D,)
-    actions: list[int] = field(default_factory=list)
+    actions: list[Any] = field(default_factory=list)  # numbers, or arrays (n,), float32
     rewards: list[float] = field(default_factory=list)
     final_observation: np.ndarray | None = None  # after the last step
     terminated: bool = False  # by the task; False: it was cut off
+    success: bool | None = None  # None if the environment doesn't say
 
-    def add(self, observation: np.ndarray, action: int, reward: float) -> None:
+    def add(self, observation: np.ndarray, action: Any, reward: float) -> None:
         self.observations.append(observation)
         self.actions.append(action)
         self.rewards.append(reward)
@@ -85,30 +86,42 @@ class Episode:
         """
         return {
             "observations": torch.from_numpy(np.stack(self.states())),
-            "actions": torch.tensor(self.actions),
+            "actions": as_tensor(self.actions),
             "rewards": torch.tensor(self.rewards, dtype=torch.float64),
             "terminated": self.terminated,
         }
 
     @classmethod
-    def from_state(cls, state: dict[str, Any], size: int, count: int) -> "Episode":
+    def from_state(cls, state: dict[str, Any], size: int, kind: int | tuple[int, ...]) -> "Episode":
         """The episode that `state_dict` told of.
 
         Args:
             state: of the episode.
             size: D, of observations.
-            count: A, of actions.
+            kind: number of single actions, or the shape of continuous ones.
 
         Raises:
             TypeError, ValueError, LookupError: if it is something else.
         """
         *observations, final = array(state["observations"], torch.float32, (None, size))
         length = len(observations)
-        actions = array(state["actions"], torch.int64, (length,)).tolist()
-        if not length or not 0 <= min(actions) <= max(actions) < count:
-            raise ValueError(f"an episode with other actions than 0 to {count - 1}")
+        if not length:
+            raise ValueError("an episode without a step")
+        if isinstance(kind, tuple):
+            actions = list(array(state["actions"], torch.float32, (length, *kind)))
+        else:
+            actions = array(state["actions"], torch.int64, (length,)).tolist()
+            if not 0 <= min(actions) <= max(actions) < kind:
+                raise ValueError(f"an episode with other actions than 0 to {kind - 1}")
         rewards = array(state["rewards"], torch.float64, (length,)).tolist()
         return cls(observations, actions, rewards, final, switch(state["terminated"]))
+
+
+def as_tensor(actions: list[Any]) -> torch.Tensor:
+    """Actions of all steps: numbers (T,), or arrays (T, n)."""
+    if actions and isinstance(actions[0], np.ndarray):
+        return torch.from_numpy(np.stack(actions))
+    return torch.tensor(actions)
 
 
 class Losses(NamedTuple):
@@ -180,6 +193,10 @@ class PolicyGradientAgent(TwoNetworks):
     def act(self, observation: np.ndarray) -> int:
         """Draws an action from the policy."""
         return 0 if self.generator.random() < self.probability_of_zero(observation) else 1
+
+    def limited(self, action: int) -> int:
+        """An action that was drawn, as the environment takes it: the same."""
+        return action
 
     def act_greedily(self, observation: np.ndarray) -> int:
         """The more probable action."""

@@ -15,14 +15,21 @@ import torch
 from torch import nn
 
 from rl_workbench.agents.dqn.normalisation import Normaliser
-from rl_workbench.agents.pg.document import Episode, Losses, check_finite, descend, start_at_zero
+from rl_workbench.agents.pg.document import (
+    Episode,
+    Losses,
+    as_tensor,
+    check_finite,
+    descend,
+    start_at_zero,
+)
+from rl_workbench.agents.pg.gaussian_policy import Bounds, GaussianActor, GaussianNetwork
 from rl_workbench.agents.pg.settings import ReinforceSettings
 from rl_workbench.agents.pg.softmax_policy import Actor, PairActor, SoftmaxActor, SoftmaxNetwork
 from rl_workbench.agents.pg.two_networks import TwoNetworks
 from rl_workbench.states import sequence
 
 SMALLEST_SPREAD = 1e-8  # of advantages, below which they are not blown up
-SMALLEST_CHANCE = float(np.finfo(np.float32).tiny)  # of an action, that counts for the entropy
 
 
 class BaselineNetwork(nn.Module):
@@ -41,14 +48,14 @@ class BaselineNetwork(nn.Module):
 
 
 class ReinforceAgent(TwoNetworks):
-    """Learns from batches of whole episodes; a softmax policy over single actions.
+    """Learns from batches of whole episodes; a softmax policy over single actions, or a Gaussian one.
 
     Args:
         seed: makes initial weights and the choice of actions repeatable, through generators of
             its own.
         scale: what an observation is divided by, of shape (D,).
         settings: the algorithm's options.
-        actions: number of actions A.
+        actions: number of single actions, or the bounds of continuous ones.
     """
 
     def __init__(
@@ -56,12 +63,12 @@ class ReinforceAgent(TwoNetworks):
         seed: int = 0,
         scale: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
         settings: ReinforceSettings | None = None,
-        actions: int = 2,
+        actions: int | Bounds = 2,
     ) -> None:
         self.settings = settings = settings or ReinforceSettings()
         with torch.random.fork_rng():
             torch.manual_seed(seed)
-            self._network = SoftmaxNetwork(len(scale), actions, settings.policy_hidden)
+            self._network = _make_network(len(scale), actions, settings)
             value = BaselineNetwork(len(scale), settings.value_hidden)
         start_at_zero(self._network.fc)
         rates = (settings.policy_learning_rate, settings.value_learning_rate)
@@ -69,17 +76,23 @@ class ReinforceAgent(TwoNetworks):
         self._factors = 1.0 / np.asarray(scale, np.float32)  # (D,)
         self._normaliser = Normaliser(len(scale)) if settings.normalize_observations else None
         self._actions = actions
-        self._is_pair = actions == 2 and not settings.policy_hidden and self._normaliser is None
         self._batch: list[Episode] = []
         self._actor: Actor
         self.sync()
 
     def sync(self) -> None:
         """Copies the policy's weights to where acting reads them."""
-        if self._is_pair:
-            self._actor = PairActor(self._network, self._factors)
-        else:
-            self._actor = SoftmaxActor(self._network, self._prepared)
+        self._actor = self._make_actor()
+
+    def _make_actor(self) -> Actor:
+        network = self._network
+        if isinstance(self._actions, Bounds):
+            assert isinstance(network, GaussianNetwork)
+            return GaussianActor(network, self._actions, self._prepared)
+        assert isinstance(network, SoftmaxNetwork)
+        if self._actions == 2 and not network.has_hidden and self._normaliser is None:
+            return PairActor(network, self._factors)
+        return SoftmaxActor(network, self._prepared)
 
     def _prepared(self, observations: np.ndarray) -> np.ndarray:
         """Observations (..., D) as the networks see them, float32."""
@@ -87,14 +100,19 @@ class ReinforceAgent(TwoNetworks):
         return scaled if self._normaliser is None else self._normaliser(scaled)
 
     def probabilities(self, observation: np.ndarray) -> np.ndarray:
-        """The policy's probabilities of the actions, (A,), for an observation (D,)."""
+        """The policy's probabilities of single actions, (A,), for an observation (D,)."""
+        assert isinstance(self._actor, PairActor | SoftmaxActor)
         return self._actor.probabilities(observation)
 
-    def act(self, observation: np.ndarray) -> int:
-        """Draws an action from the policy."""
-        return self._actor.draw(observation, self.generator.random())
+    def act(self, observation: np.ndarray) -> Any:
+        """Draws an action from the policy, to be learned from; `limited` is for the environment."""
+        return self._actor.draw(observation, self.generator)
 
-    def act_greedily(self, observation: np.ndarray) -> int:
+    def limited(self, action: Any) -> Any:
+        """An action that was drawn, as the environment takes it."""
+        return self._actions.limited(action) if isinstance(self._actions, Bounds) else action
+
+    def act_greedily(self, observation: np.ndarray) -> Any:
         """The most probable action."""
         return self._actor.greedy(observation)
 
@@ -126,7 +144,7 @@ class ReinforceAgent(TwoNetworks):
 
     def _update(self, batch: list[Episode]) -> Losses:
         observations = torch.cat([self._seen(episode.observations) for episode in batch])
-        actions = torch.tensor([action for episode in batch for action in episode.actions])
+        actions = as_tensor([action for episode in batch for action in episode.actions])
         advantages, targets = self._advantages(batch)
         spread = float(advantages.std(correction=0))
         advantages = (advantages - advantages.mean()) / (spread + SMALLEST_SPREAD)
@@ -142,14 +160,11 @@ class ReinforceAgent(TwoNetworks):
     def _policy_loss(
         self, observations: torch.Tensor, actions: torch.Tensor, advantages: torch.Tensor
     ) -> torch.Tensor:
-        probabilities = self.policy(observations)
-        chosen = torch.log(probabilities.gather(1, actions.unsqueeze(1)).squeeze(1))
-        loss = -(chosen * advantages).mean()
+        output = self._network(observations)
+        loss = -(self._network.log_chances(output, actions) * advantages).mean()
         if not self.settings.entropy_coefficient:
             return loss
-        # At a probability of 0 its slope is infinite.
-        entropy = torch.special.entr(probabilities.clamp_min(SMALLEST_CHANCE)).sum(1).mean()
-        return loss - self.settings.entropy_coefficient * entropy
+        return loss - self.settings.entropy_coefficient * self._network.entropy(output)
 
     def _advantages(self, batch: list[Episode]) -> tuple[torch.Tensor, torch.Tensor]:
         """Advantages and the baseline's targets, each (T,) over all episodes' steps."""
@@ -192,10 +207,20 @@ class ReinforceAgent(TwoNetworks):
         """Takes over what `state_dict` gave."""
         size = len(self._factors)
         batch = sequence(state["batch"])
-        self._batch = [Episode.from_state(each, size, self._actions) for each in batch]
+        bounds = self._actions
+        kind = bounds if isinstance(bounds, int) else (bounds.low.size,)
+        self._batch = [Episode.from_state(each, size, kind) for each in batch]
         if self._normaliser is not None:
             self._normaliser.load_state_dict(state["normaliser"])
         super().load_state_dict(state)
+
+
+def _make_network(
+    observations: int, actions: int | Bounds, settings: ReinforceSettings
+) -> SoftmaxNetwork | GaussianNetwork:
+    if isinstance(actions, int):
+        return SoftmaxNetwork(observations, actions, settings.policy_hidden)
+    return GaussianNetwork(observations, actions, settings.policy_hidden, settings.log_std_init)
 
 
 def generalised_advantages(

@@ -26,6 +26,12 @@ class ReinforceSettings:
     policy_hidden: int = option(
         0, "units in the policy's hidden layer; 0: none, it is linear", 0, 2**16
     )
+    log_std_init: float = option(
+        -0.5,
+        "continuous actions: logarithm of the first deviation, in halves of their range",
+        -4,
+        4,
+    )
     value_hidden: int = option(32, "units in each of the baseline's two layers", 1, 2**16)
     normalize_observations: bool = option(
         False, "by mean and deviation as seen so far; for where no scale is known"

@@ -5,11 +5,13 @@ For one observation NumPy is several times as fast as torch.
 
 import math
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import torch
 from torch import nn
+
+SMALLEST_CHANCE = float(np.finfo(np.float32).tiny)  # of an action, that counts for the entropy
 
 
 class SoftmaxNetwork(nn.Module):
@@ -38,20 +40,25 @@ class SoftmaxNetwork(nn.Module):
         """Whether there is a layer between observation and action."""
         return self._has_hidden
 
+    def log_chances(self, probabilities: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
+        """Logarithms of the probabilities (N,) of actions (N,)."""
+        return torch.log(probabilities.gather(1, actions.unsqueeze(1)).squeeze(1))
+
+    def entropy(self, probabilities: torch.Tensor) -> torch.Tensor:
+        """The mean one of the policy."""
+        # At a probability of 0 its slope is infinite.
+        return torch.special.entr(probabilities.clamp_min(SMALLEST_CHANCE)).sum(1).mean()
+
 
 class Actor(Protocol):
     """Acts by a copy of a network's weights; observations (D,) as the environment gives them."""
 
-    def probabilities(self, observation: np.ndarray) -> np.ndarray:
-        """Of the actions: (A,), float64."""
+    def draw(self, observation: np.ndarray, generator: np.random.Generator) -> Any:
+        """An action as it is learned from."""
         ...
 
-    def draw(self, observation: np.ndarray, uniform: float) -> int:
-        """The action that a number drawn from [0, 1) leads to."""
-        ...
-
-    def greedy(self, observation: np.ndarray) -> int:
-        """The most probable action."""
+    def greedy(self, observation: np.ndarray) -> Any:
+        """The most probable action, as the environment takes it."""
         ...
 
 
@@ -74,13 +81,13 @@ class PairActor:
         return 1.0 / (1.0 + math.exp(min(preference, 700.0)))
 
     def probabilities(self, observation: np.ndarray) -> np.ndarray:
-        """See `Actor`."""
+        """Of the actions: (A,), float64."""
         first = self._first(observation)
         return np.array([first, 1.0 - first])
 
-    def draw(self, observation: np.ndarray, uniform: float) -> int:
+    def draw(self, observation: np.ndarray, generator: np.random.Generator) -> int:
         """See `Actor`."""
-        return 0 if uniform < self._first(observation) else 1
+        return 0 if generator.random() < self._first(observation) else 1
 
     def greedy(self, observation: np.ndarray) -> int:
         """See `Actor`."""
@@ -113,15 +120,15 @@ class SoftmaxActor:
         return np.asarray(weight @ seen + bias, np.float64)
 
     def probabilities(self, observation: np.ndarray) -> np.ndarray:
-        """See `Actor`."""
+        """Of the actions: (A,), float64."""
         preferences = self._preferences(observation)
         weights = np.exp(preferences - preferences.max())
         return weights / weights.sum()
 
-    def draw(self, observation: np.ndarray, uniform: float) -> int:
+    def draw(self, observation: np.ndarray, generator: np.random.Generator) -> int:
         """See `Actor`."""
         ends = np.cumsum(self.probabilities(observation))
-        return min(int(np.searchsorted(ends, uniform, side="right")), len(ends) - 1)
+        return min(int(np.searchsorted(ends, generator.random(), side="right")), len(ends) - 1)
 
     def greedy(self, observation: np.ndarray) -> int:
         """See `Actor`."""

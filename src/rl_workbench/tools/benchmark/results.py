@@ -12,17 +12,16 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.episodes import play
 from rl_workbench.tools.runs.policies import load_learned
 from rl_workbench.tools.runs.runs import (
-    CONFIRMED,
-    EVALUATION,
     Run,
     cost_of,
     evaluation_curve,
     summary_of,
-    threshold,
     training_curve,
 )
-
-LAST = 100  # [episodes] of a training that count for its own mean
+from rl_workbench.training.environments.names import threshold
+from rl_workbench.training.run.evaluator import Evaluation
+from rl_workbench.training.run.history import LAST
+from rl_workbench.training.run.scalar_log import CONFIRMED, EVALUATION
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,8 @@ class RunResult:
     seed: int
     run: str  # the folder's name
     score: float | None = None  # by which groups are compared: mean return of greedy episodes
-    final: float | None = None  # the same of the last checkpoint
+    success: float | None = None  # their success rate, 0 to 1, if the environment says
+    final: float | None = None  # mean return of the last checkpoint's greedy episodes
     training_mean: float | None = None  # return of the last training episodes
     evaluations: float | None = None  # mean of all evaluations during the training
     avg20: float | None = None  # largest mean return of 20 training episodes in a row
@@ -79,13 +79,23 @@ def examine(
     if "returns" not in summary and (curve := attempt(lambda: training_curve(run))):
         returns, steps = curve.values, int(curve.steps[-1])
     trained = float(returns[-LAST:].mean()) if len(returns) else None
+    success = summary.get(f"success_rate_last_{LAST}")
+    score, final = trained, None
+    if episodes:
+        played = attempt(lambda: _greedy(run, episodes, which, warn))
+        score = success = None
+        if played is not None:
+            score, success = played.mean_return, played.success_rate
+    if also_last and (last := attempt(lambda: _greedy(run, episodes, "last", warn))):
+        final = last.mean_return
     step, seconds = attempt(lambda: _solved(run)) or (None, None)
     return RunResult(
         group,
         run.seed,
         run.name,
-        attempt(lambda: _greedy(run, episodes, which, warn)) if episodes else trained,
-        attempt(lambda: _greedy(run, episodes, "last", warn)) if also_last else None,
+        score,
+        success,
+        final,
         trained,
         attempt(lambda: _mean_evaluation(run)),
         _largest_mean(returns),
@@ -99,11 +109,11 @@ def examine(
     )
 
 
-def _greedy(run: Run, episodes: int, which: str, warn: Callable[[str], None]) -> float:
-    """Mean return of a checkpoint's greedy episodes."""
+def _greedy(run: Run, episodes: int, which: str, warn: Callable[[str], None]) -> Evaluation:
+    """A checkpoint's greedy episodes."""
     policy = load_learned(run, which, say=warn)
     try:
-        return play(policy, episodes, run.seed).mean_return
+        return play(policy, episodes, run.seed)
     finally:
         policy.env.close()
 

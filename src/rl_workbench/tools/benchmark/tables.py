@@ -10,12 +10,15 @@ from rl_workbench.statistics import Statistics, describe
 from rl_workbench.tools.benchmark.results import RunResult
 
 # The columns of each command: name, and the field of RunResult.
-COMPARE = {name: name for name in ("group", "run", "seed", "score", "training_mean", "episodes",
-                                   "steps", "seconds", "solved_step", "fault")}  # fmt: skip
-BENCHMARK = {"variant": "group", "seed": "seed", "best": "score"}
+COMPARE = {name: name for name in ("group", "run", "seed", "score", "success", "training_mean",
+                                   "episodes", "steps", "seconds", "solved_step", "fault")}  # fmt: skip
+BENCHMARK = {"variant": "group", "seed": "seed", "best": "score", "success": "success"}
 BENCHMARK |= {name: name for name in ("final", "evaluations", "avg20", "solved_step",
                                       "solved_seconds", "steps", "episodes", "seconds",
                                       "cpu_seconds", "fault")}  # fmt: skip
+
+
+SUCCESS = "success"  # a column, between 0 and 1; left out where no environment says it
 
 
 def grouped(results: Sequence[RunResult]) -> dict[str, list[RunResult]]:
@@ -37,8 +40,20 @@ def rows(results: Sequence[RunResult], columns: Mapping[str, str]) -> list[dict[
 
 def table(results: Sequence[RunResult], columns: Mapping[str, str]) -> str:
     """Every run, as Markdown."""
-    cells = [[_cell(value) for value in row.values()] for row in rows(results, columns)]
-    return _markdown([[name.replace("_", " ") for name in columns], *cells])
+    shown = {name: field for name, field in columns.items() if _is_told(results, name)}
+    cells = [
+        [_percent(value) if name == SUCCESS else _cell(value) for name, value in row.items()]
+        for row in rows(results, shown)
+    ]
+    return _markdown([[name.replace("_", " ") for name in shown], *cells])
+
+
+def _is_told(results: Sequence[RunResult], column: str) -> bool:
+    return column != SUCCESS or any(each.success is not None for each in results)
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0%}"
 
 
 def _cell(value: Any) -> str:
@@ -66,11 +81,13 @@ def summary_table(
     Args:
         thresholds: the groups' returns from which they count as solved, where that is counted.
     """
+    every = [each for results in groups.values() for each in results]
+    shown = [(name, cell) for name, cell in columns if _is_told(every, name)]
     lines = [
-        [cell(results, (thresholds or {}).get(name)) for _, cell in columns]
+        [cell(results, (thresholds or {}).get(name)) for _, cell in shown]
         for name, results in groups.items()
     ]
-    return _markdown([[name for name, _ in columns], *lines])
+    return _markdown([[name for name, _ in shown], *lines])
 
 
 def _name(results: Sequence[RunResult], line: float | None) -> str:
@@ -141,6 +158,7 @@ COMPARE_SUMMARY = (
     ("group", _name),
     ("runs", _scored),
     ("mean ± std", _of("score", _spread)),
+    (SUCCESS, _of("success", lambda found: _percent(found.mean))),
     ("median", _of("score", _median)),
     ("IQM", _of("score", lambda found: f"{found.iqm:.1f}")),
     ("95% of the mean", _of("score", lambda found: _range(found.mean_interval))),
@@ -150,6 +168,7 @@ BENCHMARK_SUMMARY = (
     ("variant", _name),
     ("seeds solved", _solved_count),
     ("best: mean ± std", _of("score", _spread)),
+    (SUCCESS, _of("success", lambda found: _percent(found.mean))),
     ("IQM [95 %]", _of("score", _iqm)),
     ("final: IQM [95 %]", _of("final", _iqm)),
     ("evaluations: IQM [95 %]", _of("evaluations", _iqm)),

@@ -24,8 +24,9 @@ from rl_workbench.tools.benchmark.suites import (
 from rl_workbench.tools.benchmark.trainings import Job, Trainings
 from rl_workbench.tools.commands.shared import number, write_figure
 from rl_workbench.tools.pictures.panels import seed_panels, variant_panels
-from rl_workbench.tools.runs.runs import Run, open_run, threshold
+from rl_workbench.tools.runs.runs import Run, open_run
 from rl_workbench.training.algorithms import ALGORITHMS
+from rl_workbench.training.environments.names import as_file_name, threshold
 from rl_workbench.training.options.options import key_values
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.files import as_json, as_text, write_file
@@ -108,7 +109,7 @@ def _suite(arguments: argparse.Namespace) -> Suite:
         **key_values(arguments.params, "--params"),
     }
     options = {"algo": algorithm, **given}
-    name = f"{algorithm}__{given['env_id'].replace('/', '-').replace(':', '-')}"
+    name = f"{algorithm}__{as_file_name(given['env_id'])}"
     return Suite(name, "", SEEDS, (make_variant("--params", name, options),))
 
 

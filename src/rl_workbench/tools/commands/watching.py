@@ -25,10 +25,10 @@ from rl_workbench.tools.pictures.filming import (
 )
 from rl_workbench.tools.pictures.scenes import is_scene, record_scene
 from rl_workbench.tools.runs import episodes
-from rl_workbench.tools.runs.policies import WHICH, LearnedPolicy, load_learned
-from rl_workbench.tools.runs.runs import Run, open_run, threshold
+from rl_workbench.tools.runs.policies import WHICH, LearnedPolicy, environment_of, load_learned
+from rl_workbench.tools.runs.runs import Run, open_run
 from rl_workbench.tools.viewing.page import Place, Wanted
-from rl_workbench.training.run.environments import make_environment
+from rl_workbench.training.environments.names import threshold
 from rl_workbench.training.run.files import as_json, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell
@@ -162,7 +162,8 @@ def _record(arguments: argparse.Namespace, run: Run) -> None:
         ends, frames, seconds = write(arguments, players, fastest)
     for player, end in zip(players, ends, strict=True):
         told = f"{player.title}: " if player.title else ""
-        tell(f"{told}return {end.total_reward:.2f} in {end.length} steps")
+        words = {None: "", True: ", success", False: ", no success"}[end.success]
+        tell(f"{told}return {end.total_reward:.2f} in {end.length} steps{words}")
     tell(f"{out}: {frames} frames, {seconds:.1f} s")
 
 
@@ -172,7 +173,7 @@ def _player(arguments: argparse.Namespace, run: Run, which: str) -> Player:
     if which != RANDOM:
         policy = _policy(arguments, run, which, **options)
         return Player(title, policy.env, policy.act)
-    env = make_environment(run.env_id, {**run.env_kwargs, **env_options(arguments), **options})
+    env = environment_of(run, {**env_options(arguments), **options})
     env.action_space.seed(arguments.seed)
     return Player(title, env, lambda _: env.action_space.sample())
 

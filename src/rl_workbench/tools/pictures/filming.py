@@ -13,8 +13,9 @@ from PIL import Image, ImageDraw, ImageFont
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.episodes import episode_steps
+from rl_workbench.training.environments.names import spec_of
 
-Act = Callable[[np.ndarray], Any]
+Act = Callable[[Any], Any]
 Size = tuple[int, int]
 """Width and height [pixels]."""
 
@@ -39,6 +40,7 @@ class Shot(NamedTuple):
     caption: str
     length: int  # [steps]
     total_reward: float
+    success: bool | None = None  # at the end, if the environment says
 
 
 class Film(NamedTuple):
@@ -68,7 +70,8 @@ def size_options(env_id: str, size: Size | None) -> dict[str, int]:
     """Options that make an environment draw pictures of that size; none if it has no such options."""
     if size is None:
         return {}
-    entry_point = gymnasium.spec(env_id).entry_point
+    spec = spec_of(env_id)
+    entry_point = None if spec is None else spec.entry_point
     maker = load_env_creator(entry_point) if isinstance(entry_point, str) else entry_point
     if maker is None:
         return {}
@@ -123,7 +126,8 @@ def shots(player: Player, seed: int, stride: float, longest: int = 0) -> Iterato
         total += step.reward
         if length < due and not step.finished:
             continue
-        yield Shot(_caption(player.title, length, total, step.action), length, total)
+        caption = _caption(player.title, length, total, step.action)
+        yield Shot(caption, length, total, step.success)
         while due <= length:
             due += stride
 

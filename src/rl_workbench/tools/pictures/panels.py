@@ -11,10 +11,11 @@ from rl_workbench.tools.runs.runs import (
     Curve,
     Run,
     evaluation_curve,
+    success_curve,
     summary_of,
-    threshold,
     training_curve,
 )
+from rl_workbench.training.environments.names import threshold
 
 
 def run_panels(runs: Sequence[Run], over: str) -> list[Panel]:
@@ -38,7 +39,13 @@ def run_panels(runs: Sequence[Run], over: str) -> list[Panel]:
         episodes = np.arange(1.0, len(found.values) + 1.0)
         return SeedCurve(found.steps if over == "steps" else episodes, found.values)
 
-    return _panels(runs, name, curve)
+    def success(run: Run) -> SeedCurve | None:
+        found = success_curve(run)
+        episodes = np.searchsorted(training_curve(run).steps, found.steps, side="right")
+        steps = found.steps if over == "steps" else episodes.astype(float)
+        return SeedCurve(steps, found.values) if len(found.values) else None
+
+    return [*_panels(runs, name, curve), *_success_panels(runs, name, success)]
 
 
 def seed_panels(runs: Sequence[Run]) -> list[Panel]:
@@ -54,10 +61,17 @@ def seed_panels(runs: Sequence[Run]) -> list[Panel]:
         except WorkbenchError:
             return None  # the table names it
 
+    def success(run: Run) -> SeedCurve | None:
+        try:
+            found = success_curve(run)
+            return _seed_curve(run, found) if len(found.values) else None
+        except WorkbenchError:
+            return None
+
     panels = _panels(runs, lambda run: run.experiment, curve)
     if not panels:
         raise WorkbenchError("no episode has ended yet in any of these runs")
-    return panels
+    return [*panels, *_success_panels(runs, lambda run: run.experiment, success)]
 
 
 def variant_panels(runs: Sequence[Run]) -> list[Panel]:
@@ -79,6 +93,18 @@ def variant_panels(runs: Sequence[Run]) -> list[Panel]:
 
 def _seed_curve(run: Run, curve: Curve) -> SeedCurve:
     return SeedCurve(curve.steps, curve.values, bool(summary_of(run).get("complete")))
+
+
+def _success_panels(
+    runs: Sequence[Run],
+    name_of: Callable[[Run], str],
+    curve_of: Callable[[Run], SeedCurve | None],
+) -> list[Panel]:
+    """Those of the environments that say whether an episode is a success."""
+    return [
+        panel._replace(threshold=None, shows_success=True)
+        for panel in _panels(runs, name_of, curve_of)
+    ]
 
 
 def _panels(

@@ -12,7 +12,7 @@ import gymnasium
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.pictures.filming import Player, Recorded, Shot, frame_rate, shots
-from rl_workbench.training.run.environments import shares_robot
+from rl_workbench.training.environments.making import shares_robot
 from rl_workbench.training.run.files import write_file
 from web_page.hidden import hidden_page
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.policies import LearnedPolicy
+from rl_workbench.training.environments.answers import as_float32, succeeded
 from rl_workbench.training.run.evaluator import Evaluation, run_greedily
 
 TEST_SEED = 5_000_000  # other episodes than those of any training or of its evaluations
@@ -32,14 +33,15 @@ def play(policy: LearnedPolicy, episodes: int, seed: int) -> Evaluation:
 class Step(NamedTuple):
     """What a step has brought; the first one is the reset, which has no action."""
 
-    observation: np.ndarray
+    observation: Any
     action: Any
     reward: float
     finished: bool
+    success: bool | None  # None before the end, or if the environment doesn't say
 
 
 def episode_steps(
-    env: gymnasium.Env[Any, Any], act: Callable[[np.ndarray], Any], seed: int, longest: int = 0
+    env: gymnasium.Env[Any, Any], act: Callable[[Any], Any], seed: int, longest: int = 0
 ) -> Iterator[Step]:
     """One episode, from the reset on.
 
@@ -48,12 +50,13 @@ def episode_steps(
         longest: number of steps after which it is cut off; 0: never.
     """
     observation, _ = env.reset(seed=seed)
-    yield Step(observation, None, 0.0, False)
+    yield Step(observation, None, 0.0, False, None)
     for length in count(1):
-        action = act(np.asarray(observation, np.float32))
-        observation, reward, terminated, truncated, _ = env.step(action)
+        action = act(as_float32(observation))
+        observation, reward, terminated, truncated, info = env.step(action)
         finished = terminated or truncated or length == longest
-        yield Step(observation, action, float(reward), finished)
+        success = succeeded(info) if finished else None
+        yield Step(observation, action, float(reward), finished, success)
         if finished:
             return
 
@@ -68,25 +71,33 @@ def statistics(result: Evaluation, checkpoint: Path, threshold: float | None) ->
         "std": float(returns.std()),
         "min": float(returns.min()),
         "max": float(returns.max()),
+        "success_rate": result.success_rate,
         "solved": None if threshold is None else bool(returns.mean() >= threshold),
         "returns": result.returns,
         "lengths": result.lengths,
+        "successes": result.successes,
     }
 
 
 def lines(result: Evaluation) -> str:
     """A line for each episode."""
     rows = zip(result.returns, result.lengths, strict=True)
-    return "\n".join(
+    told = [
         f"episode {index:4d} | return {total:9.2f} | length {length:5d}"
         for index, (total, length) in enumerate(rows)
-    )
+    ]
+    if len(result.successes) == len(told):
+        words = ["success" if each else "no success" for each in result.successes]
+        told = [f"{line} | {word}" for line, word in zip(told, words, strict=True)]
+    return "\n".join(told)
 
 
 def summary(found: dict[str, Any], threshold: float | None) -> str:
     """The line that sums it up."""
     line = f"mean {found['mean']:.2f} ± {found['std']:.2f} over {found['episodes']} greedy episodes"
     line += f" (min {found['min']:.2f}, max {found['max']:.2f})"
+    if found["success_rate"] is not None:
+        line += f"; success {found['success_rate']:.0%}"
     if threshold is not None:
         line += f"; {'solved' if found['solved'] else 'not solved'}: the line is {threshold:g}"
     return line

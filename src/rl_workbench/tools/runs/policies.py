@@ -11,10 +11,10 @@ import numpy as np
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
 from rl_workbench.tools.runs.runs import Run
-from rl_workbench.training.algorithms import recorded_options
+from rl_workbench.training.algorithms import algorithm, recorded_options
+from rl_workbench.training.environments.making import make_environment
 from rl_workbench.training.options.record import CONFIG_RECORD
 from rl_workbench.training.run import checkpoints
-from rl_workbench.training.run.environments import make_environment
 from rl_workbench.training.run.policy import load_policy
 from rl_workbench.training.run.progress import warn
 
@@ -24,12 +24,25 @@ WHICH = ("best", "last")
 class LearnedPolicy(NamedTuple):
     """A learned policy, and an environment of the kind it learned in; the caller closes that."""
 
-    act: Callable[[np.ndarray], Any]  # greedily, for one observation (D,)
+    act: Callable[[Any], Any]  # greedily, for one observation: (D,), or a dict as it learned from
     preference: Callable[[np.ndarray], np.ndarray]  # of (N, D): (N,), see meaning
     meaning: str  # of the preference: positive is the last action, or a push to the right
     env: gymnasium.Env[Any, Any]
     checkpoint: Path
     steps: int  # of the training that it is from
+
+
+def environment_of(run: Run, given: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
+    """An environment as a run's policies observe it.
+
+    Args:
+        given: its options on top of the training's own.
+
+    Raises:
+        WorkbenchError: if it can't be made.
+    """
+    keeps_dict = algorithm(run.algorithm).keeps_dict
+    return make_environment(run.env_id, {**run.env_kwargs, **given}, keep_dict=keeps_dict)
 
 
 def load_learned(
@@ -60,7 +73,7 @@ def load_learned(
         if env is not None:
             return _learned(run, path, content, env)
         with ExitStack() as made:
-            env = make_environment(run.env_id, {**run.env_kwargs, **(env_options or {})})
+            env = environment_of(run, env_options or {})
             made.callback(env.close)
             policy = _learned(run, path, content, env)
             made.pop_all()

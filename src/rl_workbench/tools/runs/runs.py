@@ -11,17 +11,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import gymnasium
 import numpy as np
 
 from file_reading.content import open_text
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.record import CONFIG_RECORD
+from rl_workbench.training.run.scalar_log import EVALUATION, RETURN, SUCCESS
 from rl_workbench.training.run.scalar_log import NAME as SCALARS
 
 SUMMARY = "summary.json"
-RETURN, EVALUATION = "charts/episodic_return", "eval/mean_reward"  # tags
-CONFIRMED = "eval/confirmed_reward"  # of a policy that became the best one
 RECORDED = {"env_id": str, "env_kwargs": dict, "exp_name": str, "seed": int}
 _NOT_THERE = (FileNotFoundError, NotADirectoryError)
 
@@ -196,6 +194,11 @@ def training_curve(run: Run) -> Curve:
     return curve
 
 
+def success_curve(run: Run) -> Curve:
+    """The success rate of the last 100 training episodes, at each one's end; empty if they don't say."""
+    return evaluation_curve(run, SUCCESS)
+
+
 def evaluation_curve(run: Run, tag: str = EVALUATION) -> Curve:
     """The mean returns of the evaluations during the training; may be empty.
 
@@ -222,9 +225,3 @@ def _scalars(run: Run, tag: str) -> Curve:
     except (KeyError, ValueError, TypeError, csv.Error) as error:
         raise WorkbenchError(f"{path} isn't the table of a training: {error}") from error
     return Curve(*np.array(points, dtype=float).reshape(-1, 3).T)
-
-
-def threshold(env_id: str) -> float | None:
-    """The return from which Gymnasium calls an environment solved, if it says so."""
-    spec = gymnasium.registry.get(env_id)
-    return None if spec is None else spec.reward_threshold

@@ -11,16 +11,15 @@ import viser
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.pictures.filming import DEFAULT_RATE, Act, action_text
 from rl_workbench.tools.runs.episodes import TEST_SEED, episode_steps
-from rl_workbench.tools.runs.policies import load_learned
+from rl_workbench.tools.runs.policies import environment_of, load_learned
 from rl_workbench.tools.runs.runs import Run, open_run
 from rl_workbench.tools.viewing.views import View, make_view
 from rl_workbench.training.run import checkpoints
-from rl_workbench.training.run.environments import make_environment
 from rl_workbench.training.run.folder import is_held
 
 BEST, LAST, RANDOM = POLICIES = ("best", "last", "random")
 BACKEND = "backend"  # the option by which an environment may move a robot outside of its process
-IN_PROCESS = "bullet"
+IN_PROCESS = ("bullet", "mujoco")
 MOST_STEPS = 20_000  # of an episode; some have no end
 MOST_BYTES = 2**28  # of its pictures
 
@@ -134,9 +133,8 @@ class Recorder:
 
     def _play(self, episode: Episode) -> None:
         run = open_run(self._folder)
-        options = {**run.env_kwargs, **self._env_options}
-        check_robot_is_free(run, options)
-        env, view = self._made(run.env_id, options)
+        check_robot_is_free(run, {**run.env_kwargs, **self._env_options})
+        env, view = self._made(run)
         act = self._policy(run, episode, env)
         episode.rate = float(env.metadata.get("render_fps") or DEFAULT_RATE)
         try:
@@ -163,10 +161,10 @@ class Recorder:
         if not step.finished or episode.length >= MOST_STEPS:
             episode.note = f"cut off after {episode.length} steps"
 
-    def _made(self, env_id: str, options: dict[str, Any]) -> tuple[gymnasium.Env[Any, Any], View]:
+    def _made(self, run: Run) -> tuple[gymnasium.Env[Any, Any], View]:
         """The environment, and what shows it on the page: one for all episodes."""
         if self._env is None or self.view is None:
-            self._env = _environment(env_id, options)
+            self._env = _environment(run, self._env_options)
             self._server.scene.reset()  # of one that has failed
             self.view = make_view(self._server, self._env)
         return self._env, self.view
@@ -197,24 +195,24 @@ def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
     """
     given = run.config["run"]
     training = {**given["env_kwargs"], **given.get("train_env_kwargs", {})}
-    own = (None, IN_PROCESS)
+    own = (None, *IN_PROCESS)
     if options.get(BACKEND) in own or training.get(BACKEND) in own or not is_held(run.folder):
         return
     raise WorkbenchError(
         f"no episodes while it trains: {BACKEND}={options[BACKEND]} is the training's own robot. "
-        f"`view --env-kwargs {BACKEND}={IN_PROCESS}` plays another one, and so does --gui of a training "
+        f"`view --env-kwargs {BACKEND}={IN_PROCESS[0]}` plays another one, and so does --gui of a training "
         f"with --train-env-kwargs {BACKEND}={training[BACKEND]} in place of --env-kwargs"
     )
 
 
-def _environment(env_id: str, options: dict[str, Any]) -> gymnasium.Env[Any, Any]:
+def _environment(run: Run, options: dict[str, Any]) -> gymnasium.Env[Any, Any]:
     """One that draws pictures.
 
     Raises:
         WorkbenchError: if there is none.
     """
     try:
-        return make_environment(env_id, {**options, "render_mode": "rgb_array"})
+        return environment_of(run, {**options, "render_mode": "rgb_array"})
     except WorkbenchError as error:
-        make_environment(env_id, options).close()  # raises what else is wrong
+        environment_of(run, options).close()  # raises what else is wrong
         raise WorkbenchError(f"the environment draws no pictures: {error}") from error

@@ -8,11 +8,12 @@ import numpy as np
 from rl_workbench.agents.dqn.agent import DQNAgent, Learned
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import number, sequence
-from rl_workbench.training.dqn.repeatable import RepeatableEnvironment
+from rl_workbench.training.environments.answers import as_vector, succeeded
+from rl_workbench.training.environments.making import discrete_actions
+from rl_workbench.training.environments.repeatable import RepeatableEnvironment
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.algorithm import Algorithm, Frame, Say, in_its_environment
 from rl_workbench.training.run.checkpoints import fitting
-from rl_workbench.training.run.environments import discrete_actions
 from rl_workbench.training.run.policy import Policy
 
 
@@ -67,7 +68,7 @@ class DQNTraining(Algorithm):
     ) -> None:
         self.env, self._agent = env, agent
         self._seed, self._log_frequency = options.run.seed, options.run.log_frequency
-        self._place: RepeatableEnvironment
+        self._place = RepeatableEnvironment(env)
         self._observation: np.ndarray | None = None  # None: an episode has to be begun
         self._reward = 0.0  # of the episode so far
         self._last: Learned | None = None
@@ -94,20 +95,22 @@ class DQNTraining(Algorithm):
 
     def _step(self, frame: Frame) -> None:
         agent, place = self._agent, self._place
-        observation = place.reset() if self._observation is None else self._observation
+        observation = self._observation
+        if observation is None:
+            observation = as_vector(place.reset()[0])
         action = agent.act(observation)
-        following, reward, terminated, truncated = place.step(action)
+        seen, reward, terminated, truncated, info = place.step(action)
+        following, reward = as_vector(seen), float(reward)
         self._reward += reward
-        agent.observe((observation, action, reward), following, terminated, truncated)
+        agent.observe((observation, action, reward), following, bool(terminated), bool(truncated))
         if agent.is_due:
             self._last = agent.learn()
         self._observation = following
         if terminated or truncated:
             agent.episode_done()
             total, self._reward, self._observation = self._reward, 0.0, None
-            frame.episode_done(
-                total, place.length, {"charts/epsilon": agent.epsilon}, f"ε: {agent.epsilon:.3f}"
-            )
+            scalars, note = {"charts/epsilon": agent.epsilon}, f"ε: {agent.epsilon:.3f}"
+            frame.episode_done(total, place.length, scalars, note, succeeded(info))
 
     def state_dict(self) -> dict[str, Any]:
         """See `Algorithm.state_dict`."""
@@ -130,7 +133,7 @@ class DQNTraining(Algorithm):
 
     def start_environment(self, state: dict[str, Any] | None, say: Say) -> None:
         """See `Algorithm.start_environment`."""
-        self._place = RepeatableEnvironment(self.env, self._seed)
+        self._place.reset(seed=self._seed)  # the episodes' own resets go on from here
         if state is not None:
             self.restore_environment(state, say)
 

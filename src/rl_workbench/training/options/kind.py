@@ -22,6 +22,8 @@ class AlgorithmKind:
         defaults: of common options, where they are this algorithm's own.
         presets: whether the file has sections that no environment is called after.
         resuming: for --help: what --resume comes to.
+        keeps_dict: whether it learns from a Dict of arrays as it is; others get all of its numbers in one
+            vector.
         package: the extra that it needs, as (module, name); None if none.
     """
 
@@ -36,6 +38,7 @@ class AlgorithmKind:
     resuming: str = (
         "--resume goes on from there,\nto the same bits as a training that was never interrupted"
     )
+    keeps_dict: bool = False
     package: tuple[str, str] | None = None
 
     def check_installed(self) -> None:

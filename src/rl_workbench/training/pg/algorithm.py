@@ -7,15 +7,16 @@ import gymnasium
 import numpy as np
 
 from rl_workbench.agents.pg.document import PolicyGradientAgent
+from rl_workbench.agents.pg.gaussian_policy import Bounds
 from rl_workbench.agents.pg.reinforce import ReinforceAgent
 from rl_workbench.agents.pg.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
+from rl_workbench.training.environments.making import discrete_actions, is_continuous
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.pg.episodes import EpisodeGenerators, run_episode
 from rl_workbench.training.run.algorithm import Algorithm, Frame, Say, in_its_environment
 from rl_workbench.training.run.checkpoints import fitting
-from rl_workbench.training.run.environments import discrete_actions
 from rl_workbench.training.run.files import save_tensors
 from rl_workbench.training.run.policy import Policy
 
@@ -36,8 +37,12 @@ def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
         WorkbenchError: if the environment doesn't suit it; says what does.
     """
     run, settings = options.run, options.hyperparameters
-    actions = discrete_actions(env, run.env_id, "REINFORCE")
     (size,) = env.observation_space.shape or (0,)
+    space = env.action_space
+    if is_continuous(space) and not isinstance(settings, DocumentSettings):
+        actions: int | Bounds = Bounds(space.low, space.high)
+    else:
+        actions = discrete_actions(env, run.env_id, "REINFORCE")
     if isinstance(settings, DocumentSettings):
         if (size, actions) != (4, 2):
             raise WorkbenchError(
@@ -59,6 +64,12 @@ def load_policy(
     """The policy of a checkpoint; see `policy.load_policy`."""
     agent = make_agent(options, env)
     agent.load_state_dict(content["agent"])
+    if is_continuous(env.action_space):
+        return Policy(
+            agent.act_greedily,
+            lambda seen: np.array([np.ravel(agent.act_greedily(each))[0] for each in seen]),
+            "action",
+        )
 
     def preference(observations: np.ndarray) -> np.ndarray:
         found = [agent.probabilities(each) for each in observations]
@@ -94,7 +105,7 @@ class PolicyGradientTraining(Algorithm):
         """The length of the last episode."""
         return self._stride
 
-    def act_greedily(self, observation: np.ndarray) -> int:
+    def act_greedily(self, observation: np.ndarray) -> Any:
         """See `Algorithm.act_greedily`."""
         return self._agent.act_greedily(observation)
 
@@ -102,7 +113,9 @@ class PolicyGradientTraining(Algorithm):
         """See `Algorithm.learn`."""
         self._generators.mark()
         while not frame.is_over():
-            episode = run_episode(self.env, self._agent.act, frame.is_interrupted)
+            episode = run_episode(
+                self.env, self._agent.act, frame.is_interrupted, self._agent.limited
+            )
             if episode is None:
                 break
             losses = self._agent.learn(episode)
@@ -114,7 +127,9 @@ class PolicyGradientTraining(Algorithm):
                 by_episode |= {"Value Loss": losses.value, "Policy Loss": losses.policy}
                 by_step = {"losses/value_loss": losses.value, "losses/policy_loss": losses.policy}
             frame.log.add(self._episodes, by_episode)
-            frame.episode_done(episode.total_reward, episode.length, by_step)
+            frame.episode_done(
+                episode.total_reward, episode.length, by_step, success=episode.success
+            )
             self._save_networks_if_due(frame.folder)
             self._episodes += 1
             self._generators.mark()

@@ -10,12 +10,14 @@ import numpy as np
 import torch
 
 from rl_workbench.agents.pg.document import Episode
+from rl_workbench.training.environments.answers import as_vector, succeeded
 
 
 def run_episode(
     env: gymnasium.Env[Any, Any],
-    act: Callable[[np.ndarray], int],
+    act: Callable[[np.ndarray], Any],
     should_stop: Callable[[], bool],
+    limited: Callable[[Any], Any] = lambda action: action,
 ) -> Episode | None:
     """Runs one episode.
 
@@ -23,28 +25,25 @@ def run_episode(
         env: was seeded before.
         act: draws an action for an observation (D,), float32.
         should_stop: is asked before each step.
+        limited: makes of an action that was drawn the one that the environment takes.
 
     Returns:
         The episode, or None if it was broken off because `should_stop()` became true.
     """
     episode = Episode()
-    observation = _vector(env.reset()[0])
+    observation = as_vector(env.reset()[0])
     finished = False
     while not finished:
         if should_stop():
             return None
         action = act(observation)
-        following, reward, terminated, truncated, _ = env.step(action)
+        following, reward, terminated, truncated, info = env.step(limited(action))
         episode.add(observation, action, float(reward))
-        observation = _vector(following)
+        observation = as_vector(following)
         finished = terminated or truncated
     episode.final_observation, episode.terminated = observation, bool(terminated)
+    episode.success = succeeded(info)
     return episode
-
-
-def _vector(observation: Any) -> np.ndarray:
-    """A copy: an environment may well write into the array that it returned."""
-    return np.array(observation, dtype=np.float32)
 
 
 class EpisodeGenerators:

@@ -30,7 +30,7 @@ _EPISODIC = {"episodes": 600, "eval_frequency": 0, "eval_episodes": 20}
 REINFORCE = AlgorithmKind(
     name="reinforce",
     about="a policy by REINFORCE with a fitted baseline and generalised advantages\n"
-    "in any Gymnasium environment with single actions",
+    "in any Gymnasium environment with single or continuous actions",
     config="pg.yaml",
     implementation="rl_workbench.training.pg.algorithm",
     hyperparameters=lambda: ReinforceOptions,

@@ -14,8 +14,8 @@ import gymnasium
 import numpy as np
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.environments.making import environment_for
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.run.environments import make_environment
 from rl_workbench.training.run.scalar_log import ScalarLog
 
 Say = Callable[[str], None]
@@ -43,7 +43,12 @@ class Frame(Protocol):
         ...
 
     def episode_done(
-        self, total_reward: float, length: int, scalars: Mapping[str, float], note: str = ""
+        self,
+        total_reward: float,
+        length: int,
+        scalars: Mapping[str, float],
+        note: str = "",
+        success: bool | None = None,
     ) -> None:
         """Takes an episode down.
 
@@ -52,6 +57,7 @@ class Frame(Protocol):
             length: [steps].
             scalars: of the algorithm's own, logged at the step of the episode's end.
             note: for the line of every 20th episode; else the speed stands there.
+            success: whether it reached its goal; None if the environment doesn't say.
         """
         ...
 
@@ -63,8 +69,9 @@ class Frame(Protocol):
 class Algorithm(ABC):
     """One algorithm at work in one environment."""
 
-    env: gymnasium.Env[Any, Any]  # the one that is learned in
-    can_yield_robot = True  # whether an evaluation may move the training's own robot meanwhile
+    env: gymnasium.Env[
+        Any, Any
+    ]  # the one that is learned in, and evaluated where there is no other
 
     @property
     @abstractmethod
@@ -121,11 +128,15 @@ class Algorithm(ABC):
     def environment_state(self) -> Any:
         """Where the environment is, as far as it can be brought back: plain values and tensors."""
 
+    def leave_environment(self) -> Any:
+        """What `restore_environment` needs after an evaluation that moves this environment's robot."""
+        return self.environment_state()
+
     def restore_environment(self, state: Any, say: Say) -> None:
         """Brings the environment back after an evaluation that moved its robot.
 
         Args:
-            state: what `environment_state` gave before.
+            state: what `leave_environment` gave before.
             say: is told if it can't be brought back.
         """
         raise NotImplementedError
@@ -162,8 +173,7 @@ def in_its_environment(
     Raises:
         WorkbenchError: if the environment can't be made, or doesn't suit.
     """
-    run = options.run
-    env = make_environment(run.env_id, run.training_environment)
+    env = environment_for(options, options.run.training_environment)
     try:
         return make(env)
     except WorkbenchError:

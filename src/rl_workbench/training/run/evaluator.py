@@ -2,15 +2,17 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
 
-from rl_workbench.training.options.run_options import RunOptions
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.environments.answers import as_float32, succeeded
+from rl_workbench.training.environments.making import environment_for, shares_robot
+from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.algorithm import Algorithm, Say
-from rl_workbench.training.run.environments import make_environment, shares_robot
 from rl_workbench.training.run.random_states import random_states, restore_random_states
 
 EVALUATION_SEED = 1_000_000  # added to the training's: other episodes than those learned from
@@ -18,10 +20,11 @@ EVALUATION_SEED = 1_000_000  # added to the training's: other episodes than thos
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Lengths [steps] and undiscounted returns, one for each episode."""
+    """Lengths [steps], undiscounted returns and successes, one for each episode."""
 
     lengths: list[int]
     returns: list[float]
+    successes: list[bool] = field(default_factory=list)  # of those that say whether they are one
 
     @property
     def mean_length(self) -> float:
@@ -31,30 +34,38 @@ class Evaluation:
     def mean_return(self) -> float:
         return float(np.mean(self.returns))
 
+    @property
+    def success_rate(self) -> float | None:
+        """Between 0 and 1; None if no episode says."""
+        return float(np.mean(self.successes)) if self.successes else None
+
 
 def run_greedily(
     env: gymnasium.Env[Any, Any],
-    act: Callable[[np.ndarray], Any],
+    act: Callable[[Any], Any],
     seed: int,
     episodes: int,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Evaluation | None:
     """Runs episodes in any environment, seeded once; None if told to stop."""
-    lengths, returns = [], []
+    found = Evaluation([], [])
     for index in range(episodes):
         observation, _ = env.reset(seed=seed if index == 0 else None)
         length, total, finished = 0, 0.0, False
         while not finished:
             if should_stop():
                 return None
-            observation, reward, terminated, truncated, _ = env.step(
-                act(np.asarray(observation, np.float32))
+            observation, reward, terminated, truncated, info = env.step(
+                act(as_float32(observation))
             )
             length, total = length + 1, total + float(reward)
             finished = terminated or truncated
-        lengths.append(length)
-        returns.append(total)
-    return Evaluation(lengths, returns)
+        found.lengths.append(length)
+        found.returns.append(total)
+        success = succeeded(info)
+        if success is not None:
+            found.successes.append(success)
+    return found
 
 
 class Score(NamedTuple):
@@ -71,31 +82,36 @@ class Evaluator:
     is brought back to where it was afterwards.
 
     Args:
-        run: how many episodes, in which environment, from which seed.
+        options: how many episodes, in which environment, from which seed.
         algorithm: acts greedily.
         should_stop: is asked before each step.
+        say: is told if there can be no second environment.
 
     Raises:
-        WorkbenchError: if the second environment can't be made.
+        WorkbenchError: if the second environment can't be made, and has to be another one.
     """
 
     def __init__(
-        self, run: RunOptions, algorithm: Algorithm, should_stop: Callable[[], bool]
+        self,
+        options: TrainingOptions,
+        algorithm: Algorithm,
+        should_stop: Callable[[], bool],
+        say: Say,
     ) -> None:
-        self._run, self._algorithm, self._should_stop = run, algorithm, should_stop
+        self._run, self._algorithm, self._should_stop = options.run, algorithm, should_stop
         self._is_guest = shares_robot(algorithm.env)
-        same = run.evaluation_environment == run.training_environment
-        self._has_own = not (self._is_guest and same)
-        self._env = (
-            make_environment(run.env_id, run.evaluation_environment)
-            if self._has_own
-            else algorithm.env
-        )
-
-    @property
-    def waits_for_the_end(self) -> bool:
-        """Whether the robot can't be had before the training is over."""
-        return self._is_guest and not self._algorithm.can_yield_robot
+        self._env = algorithm.env
+        is_same = self._run.evaluation_environment == self._run.training_environment
+        if not (self._is_guest and is_same):
+            try:
+                self._env = environment_for(options, self._run.evaluation_environment)
+            except WorkbenchError as error:
+                if not is_same:
+                    raise
+                self._is_guest = True
+                say(
+                    f"evaluated in the training's own environment, since a second one fails: {error}"
+                )
 
     def evaluate(self, best: float, say: Say, is_last: bool = False) -> Score | None:
         """Runs greedy episodes; None if interrupted.
@@ -125,7 +141,7 @@ class Evaluator:
     def _undisturbed(self, say: Say, is_last: bool) -> Iterator[None]:
         """What is done inside is forgotten afterwards, also by generators that all share."""
         must_return = self._is_guest and not is_last
-        place = self._algorithm.environment_state() if must_return else None
+        place = self._algorithm.leave_environment() if must_return else None
         states = random_states()
         yield
         if must_return:
@@ -139,5 +155,5 @@ class Evaluator:
 
     def close(self) -> None:
         """Closes the environment, if it is this one's own."""
-        if self._has_own:
+        if self._env is not self._algorithm.env:
             self._env.close()

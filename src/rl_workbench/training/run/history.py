@@ -10,6 +10,7 @@ from rl_workbench.states import array, number, sequence, whole
 from rl_workbench.training.options.run_options import RunOptions
 
 WINDOW = 20  # [episodes] over which a mean length counts
+LAST = 100  # [episodes] over which successes and the summary's mean return count
 
 
 @dataclass
@@ -18,6 +19,9 @@ class History:
 
     returns: list[float] = field(default_factory=list)
     lengths: list[int] = field(default_factory=list)
+    successes: list[bool] = field(
+        default_factory=list
+    )  # of the episodes that say whether they are one
     evaluations: list[tuple[int, float]] = field(default_factory=list)  # step, mean return
     best: tuple[int, float] | None = None  # of the evaluations
     seconds: float = 0.0  # of wall time until it was last resumed
@@ -31,6 +35,12 @@ class History:
     def best_return(self) -> float:
         """The mean return of the best evaluation; minus infinity before the first."""
         return self.best[1] if self.best else -math.inf
+
+    @property
+    def success_rate(self) -> float:
+        """Of the last 100 episodes that say it; there is one at least."""
+        recent = self.successes[-LAST:]
+        return sum(recent) / len(recent)
 
     def was_evaluated(self, steps: int) -> bool:
         """Whether the last evaluation was at this step."""
@@ -60,6 +70,7 @@ class History:
         return {
             "returns": torch.tensor(self.returns, dtype=torch.float64),
             "lengths": torch.tensor(self.lengths, dtype=torch.int64),
+            "successes": torch.tensor(self.successes, dtype=torch.bool),
             "evaluations": [list(each) for each in self.evaluations],
             "best": None if self.best is None else list(self.best),
             "seconds": self.seconds,
@@ -74,6 +85,8 @@ class History:
         self.returns = array(state["returns"], torch.float64, (None,)).tolist()
         lengths = array(state["lengths"], torch.int64, (len(self.returns),))
         self.lengths = [whole(each) for each in lengths.tolist()]
+        if "successes" in state:  # earlier versions didn't count them
+            self.successes = array(state["successes"], torch.bool, (None,)).tolist()
         self.evaluations = [evaluation_of(each) for each in sequence(state["evaluations"])]
         self.best = None if state["best"] is None else evaluation_of(state["best"])
         self.seconds = number(state["seconds"])

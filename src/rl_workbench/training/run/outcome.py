@@ -11,17 +11,16 @@ from rl_workbench.curves import learning_curve
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.extras import replaying, watching
 from rl_workbench.figure import as_png
+from rl_workbench.training.environments.checked import EnvironmentFailure
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.checkpoints import candidates
-from rl_workbench.training.run.environments import EnvironmentFailure
 from rl_workbench.training.run.evaluator import Evaluation
 from rl_workbench.training.run.files import as_json, write_atomically
 from rl_workbench.training.run.folder import versions
-from rl_workbench.training.run.history import WINDOW, History
+from rl_workbench.training.run.history import LAST, WINDOW, History
 from rl_workbench.training.run.progress import tell
 
 TRACEBACK = "failure.txt"  # of an environment that failed
-LAST = 100  # [episodes] over which the summary reports a mean return
 
 
 class TrainingOutcome(NamedTuple):
@@ -45,7 +44,7 @@ class TrainingOutcome(NamedTuple):
         history, run = self.history, self.options.run
         if history.returns:
             title = f"{self.options.kind.name}, {run.env_id}, seed {run.seed}"
-            figure = learning_curve(history.lengths, history.returns, title)
+            figure = learning_curve(history.lengths, history.returns, title, history.successes)
             write_atomically(self.folder / "learning_curve.png", as_png(figure))
         summary = {
             **self.options.record(),
@@ -58,11 +57,13 @@ class TrainingOutcome(NamedTuple):
             "seconds": round(history.seconds, 3),
             f"mean_return_last_{LAST}": _mean(history.returns[-LAST:]),
             f"mean_length_last_{WINDOW}": _mean(history.lengths[-WINDOW:]),
+            f"success_rate_last_{LAST}": history.success_rate if history.successes else None,
             "best": history.best,
             "evaluations": history.evaluations,
             "evaluation": asdict(self.evaluation) if self.evaluation else None,
             "lengths": history.lengths,
             "returns": history.returns,
+            "successes": history.successes,
         }
         write_atomically(self.folder / "summary.json", as_json(summary))
 
@@ -76,6 +77,8 @@ class TrainingOutcome(NamedTuple):
         if evaluation:
             line += f"; the last one over {len(evaluation.lengths)} greedy episodes: length "
             line += f"{evaluation.mean_length:.1f}, return {evaluation.mean_return:.1f}"
+            if evaluation.success_rate is not None:
+                line += f", success {evaluation.success_rate:.0%}"
         tell(line)
         if not self.is_in_place:
             return

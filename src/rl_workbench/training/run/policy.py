@@ -14,7 +14,7 @@ from rl_workbench.training.options.training_options import TrainingOptions
 class Policy(NamedTuple):
     """A learned policy."""
 
-    act: Callable[[np.ndarray], Any]  # greedily, for one observation (D,)
+    act: Callable[[Any], Any]  # greedily, for one observation: (D,), or a dict as it learned from
     preference: Callable[[np.ndarray], np.ndarray]  # of (N, D): (N,), see meaning
     meaning: str  # of the preference: positive is the last action, or a push to the right
 

@@ -19,12 +19,16 @@ from torch.utils.tensorboard.summary import hparams, scalar, text
 from file_reading.content import open_file
 
 NAME = "scalars.csv"
+# Tags, as CleanRL and Stable-Baselines3 name them.
+RETURN, EVALUATION = "charts/episodic_return", "eval/mean_reward"
+CONFIRMED = "eval/confirmed_reward"  # of a policy that became the best one
+SUCCESS, EVAL_SUCCESS = "rollout/success_rate", "eval/success_rate"  # from 0 to 1
 HEADER = "step,tag,value,wall_time\n"
 EVENTS = "events.out.tfevents."
 VERSION = "brain.Event:2"  # of the file, as TensorBoard asks for in its first record
 SHOWN_AFTER = 10.0  # [s] at most until TensorBoard can see a point
 READ_AFTER = 1.0  # [s] at most until who follows the CSV can see a row, if others come
-METRICS = ("eval/mean_reward", "charts/episodic_return")  # beside the settings, under HPARAMS
+METRICS = (EVALUATION, RETURN)  # beside the settings, under HPARAMS
 
 Point = tuple[str, float, int, float]  # tag, value, step, wall time [s]
 

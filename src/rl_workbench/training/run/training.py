@@ -21,7 +21,14 @@ from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.outcome import TrainingOutcome, write_traceback
 from rl_workbench.training.run.progress import Progress, tell
 from rl_workbench.training.run.random_states import random_states, restore_random_states, seed_all
-from rl_workbench.training.run.scalar_log import ScalarLog
+from rl_workbench.training.run.scalar_log import (
+    CONFIRMED,
+    EVAL_SUCCESS,
+    EVALUATION,
+    RETURN,
+    SUCCESS,
+    ScalarLog,
+)
 
 AT_THE_END = "best_at_the_end"  # of a checkpoint: the score of its evaluation after it, if the best
 
@@ -52,7 +59,7 @@ class Training:
         with contextlib.ExitStack() as making:
             self._algorithm = make_algorithm(options)
             making.callback(self._algorithm.close)
-            self._evaluator = Evaluator(self._run, self._algorithm, interrupt.requested)
+            self._evaluator = Evaluator(options, self._algorithm, interrupt.requested, tell)
             making.callback(self._evaluator.close)
             if self._resumed:
                 self._take_over(self._resumed)
@@ -183,19 +190,30 @@ class Training:
         return self._history.is_complete(self._run, self._algorithm.steps)
 
     def episode_done(
-        self, total_reward: float, length: int, scalars: Mapping[str, float], note: str = ""
+        self,
+        total_reward: float,
+        length: int,
+        scalars: Mapping[str, float],
+        note: str = "",
+        success: bool | None = None,
     ) -> None:
         """Takes an episode down, logs it, shows it; see `Frame.episode_done`."""
         history, steps = self._history, self._algorithm.steps
         history.returns.append(total_reward)
         history.lengths.append(length)
+        if success is not None:
+            history.successes.append(success)
         speed = (steps - self._first_step) / self._update_clock()
         charts = {
-            "charts/episodic_return": total_reward,
+            RETURN: total_reward,
             "charts/episodic_length": float(length),
             "charts/SPS": speed,
         }
+        if success is not None:
+            charts[SUCCESS] = history.success_rate
         self.log.add(steps, {**charts, **scalars})
+        told = [f"success: {history.success_rate:.0%}"] if history.successes else []
+        note = ", ".join([*told, *([note] if note else [])])
         self._shown.episode_done(history.returns, length, f"{speed:.0f} steps/s", note)
 
     def step_done(self) -> None:
@@ -224,7 +242,7 @@ class Training:
         if self._history.was_evaluated(self._algorithm.steps):
             return
         is_due = self._is_due(self._run.eval_frequency)
-        if is_due and not self._evaluator.waits_for_the_end and self._evaluate(is_last=False):
+        if is_due and self._evaluate(is_last=False):
             self._save(best=True)
 
     def _evaluate_at_the_end(self) -> None:
@@ -249,12 +267,13 @@ class Training:
         steps, history = self._algorithm.steps, self._history
         self._evaluation = score.evaluation
         mean = score.evaluation.mean_return
-        self.log.add(steps, {"eval/mean_reward": mean})
+        rate = score.evaluation.success_rate
+        self.log.add(steps, {EVALUATION: mean} | ({} if rate is None else {EVAL_SUCCESS: rate}))
         history.evaluations.append((steps, mean))
         if score.confirmed <= history.best_return:
             return False
         if self._run.confirm_episodes:
-            self.log.add(steps, {"eval/confirmed_reward": score.confirmed})
+            self.log.add(steps, {CONFIRMED: score.confirmed})
         history.best = (steps, score.confirmed)
         return True
 

@@ -1,6 +1,5 @@
 """Stable-Baselines3 at work: its own loop, with a callback that tells the frame."""
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,30 +8,22 @@ import gymnasium
 import numpy as np
 import torch
 from gymnasium import spaces
-from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import KVWriter, Logger
+from stable_baselines3.common.logger import Logger
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.environments.making import shares_robot
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
-from rl_workbench.training.run.environments import shares_robot
 from rl_workbench.training.run.files import write_atomically
 from rl_workbench.training.run.policy import Policy
-from rl_workbench.training.sb3.model import make_model
+from rl_workbench.training.sb3.callback import FrameCallback, LossWriter
+from rl_workbench.training.sb3.model import checked_of, make_model, repeatable_of
 from rl_workbench.training.sb3.options import ON_POLICY
 from rl_workbench.training.sb3.state import check_weights, restore, state_of
 
 # What the library raises in the midst of learning: weights or options that are no good.
 _LEARNING = (ArithmeticError, AssertionError, LookupError, RuntimeError, TypeError, ValueError)
 MODEL = "model.zip"  # Stable-Baselines3's own form, for its own load()
-TAGS = {  # Stable-Baselines3's: ours
-    "train/loss": "losses/loss",
-    "train/value_loss": "losses/value_loss",
-    "train/policy_loss": "losses/policy_loss",
-    "train/policy_gradient_loss": "losses/policy_loss",
-    "train/actor_loss": "losses/actor_loss",
-    "train/critic_loss": "losses/critic_loss",
-}
 
 
 def make(options: TrainingOptions) -> "SB3Training":
@@ -60,11 +51,11 @@ class SB3Training(Algorithm):
         model: with its environments.
     """
 
-    can_yield_robot = False  # the episode under way couldn't be brought back
-
     def __init__(self, options: TrainingOptions, model: Any) -> None:
         self._run, self._name, self._model = options.run, options.kind.name, model
-        self.env = model.get_env().envs[0]
+        self.env = checked_of(model.get_env())
+        self._place = repeatable_of(model.get_env())
+        self._is_given_up = False  # the episode under way, whose robot was moved
 
     @property
     def steps(self) -> int:
@@ -83,11 +74,11 @@ class SB3Training(Algorithm):
     def learn(self, frame: Frame) -> None:
         """See `Algorithm.learn`."""
         remaining = max(self._run.total_timesteps - self.steps, 0)
-        self._model.set_logger(Logger(None, [_LossWriter(frame)]))
+        self._model.set_logger(Logger(None, [LossWriter(frame)]))
         try:
             self._model.learn(
                 remaining,
-                callback=_FrameCallback(frame, self._run.total_timesteps),
+                callback=FrameCallback(frame, self._run.total_timesteps, self._take_loss),
                 reset_num_timesteps=False,
             )
         except WorkbenchError:
@@ -117,8 +108,26 @@ class SB3Training(Algorithm):
         """Nothing to do: the model seeds it, and begins a new episode."""
         if self.steps:
             say("it goes on with a new episode and other random numbers")
-        if shares_robot(self.env) and self._run.eval_frequency:
-            say("over ROS there is one robot: no evaluation before the end")
+
+    def leave_environment(self) -> dict[str, Any] | None:
+        """See `Algorithm.leave_environment`."""
+        if not self._place.was_begun:
+            return None
+        return {"episode": self._place.state_dict(), "generator": self._place.generator}
+
+    def restore_environment(self, state: dict[str, Any] | None, say: Say) -> None:
+        """Repeats the episode under way; says so if it goes another way."""
+        if state is None:
+            return
+        self._place.generator = state["generator"]
+        self._is_given_up = self._place.load_state_dict(state["episode"]) is None
+        if self._is_given_up and len(state["episode"]["actions"]):
+            say("the environment doesn't repeat itself: the episode under way is cut off")
+
+    def _take_loss(self) -> bool:
+        """Whether the episode under way was given up since this was asked last."""
+        was, self._is_given_up = self._is_given_up, False
+        return was
 
     def export(self, folder: Path) -> None:
         """Writes model.zip, for Stable-Baselines3's own load()."""
@@ -127,57 +136,6 @@ class SB3Training(Algorithm):
     def close(self) -> None:
         """Closes all environments."""
         self._model.get_env().close()
-
-
-class _LossWriter(KVWriter):
-    """Writes the losses that a model reports."""
-
-    def __init__(self, frame: Frame) -> None:
-        self._frame = frame
-
-    def write(
-        self, key_values: dict[str, Any], key_excluded: dict[str, Any], step: int = 0
-    ) -> None:
-        found = {TAGS[key]: float(key_values[key]) for key in TAGS if key in key_values}
-        for tag, value in found.items():
-            _check_finite(tag, value)
-        self._frame.log.add(step, found)
-
-    def close(self) -> None:
-        """The log is closed by who made it."""
-
-
-class _FrameCallback(BaseCallback):
-    """Tells the frame of episodes and steps, and stops when it says so."""
-
-    def __init__(self, frame: Frame, total_timesteps: int) -> None:
-        super().__init__()
-        self._frame, self._total = frame, total_timesteps
-        self._episodes = 0
-
-    def _on_training_start(self) -> None:
-        self.num_timesteps = self.model.num_timesteps
-
-    def _on_step(self) -> bool:
-        for info in self.locals["infos"]:
-            if "episode" in info:
-                total, length = float(info["episode"]["r"]), int(info["episode"]["l"])
-                self._episodes += 1
-                _check_finite(f"the return of episode {self._episodes}", total)
-                self._frame.episode_done(total, length, {})
-        self._frame.step_done()
-        # At its full length it ends by itself, and learns from the last rollout.
-        return self.num_timesteps >= self._total or not self._frame.is_over()
-
-
-def _check_finite(name: str, value: float) -> None:
-    """Ends a training whose figures are none, and which would only learn nonsense.
-
-    Raises:
-        WorkbenchError: if the value isn't a number, or infinite.
-    """
-    if not math.isfinite(value):
-        raise WorkbenchError(f"{name} is {value}: a smaller learning_rate may help")
 
 
 def load_policy(

@@ -19,6 +19,7 @@ def _kind(name: str) -> AlgorithmKind:
         section=f"{name} {{env_id}}",
         implementation="rl_workbench.training.sb3.algorithm",
         hyperparameters=partial(options_class, name),
+        keeps_dict=True,
         defaults={"env_id": env_id, "total_timesteps": 100_000},
         package=("stable_baselines3", "Stable-Baselines3"),
     )

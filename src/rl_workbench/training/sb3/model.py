@@ -9,8 +9,10 @@ import torch
 from gymnasium import spaces
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.environments.checked import COMPUTE_REWARD, CheckedEnvironment
+from rl_workbench.training.environments.making import environment_for, has_goal
+from rl_workbench.training.environments.repeatable import RepeatableEnvironment
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.run.environments import make_environment
 from rl_workbench.training.sb3.options import (
     CLASSES,
     NETWORK,
@@ -69,13 +71,16 @@ def make_model(options: TrainingOptions, acts_in: gymnasium.Env[Any, Any] | None
             own["buffer_size"] = 1  # nothing is learned, so nothing is kept
     try:
         check_fit(name, run.env_id, vector.action_space)
+        replay = _hindsight(options, vector) if acts_in is None else {}
         torch.empty(0, device=run.device)  # where there is none, the model would take the CPU
+        sees_dict = isinstance(vector.observation_space, spaces.Dict)
         return algorithm_class(name)(
-            "MlpPolicy",
+            "MultiInputPolicy" if sees_dict else "MlpPolicy",
             vector,
             seed=run.seed,
             device=run.device,
             policy_kwargs=_network(own),
+            **replay,
             **_translated(settings, own, vector.action_space),
         )
     except WorkbenchError:
@@ -92,8 +97,50 @@ def make_model(options: TrainingOptions, acts_in: gymnasium.Env[Any, Any] | None
 def _maker(options: TrainingOptions) -> Callable[[], gymnasium.Env[Any, Any]]:
     from stable_baselines3.common.monitor import Monitor
 
-    run = options.run
-    return lambda: Monitor(make_environment(run.env_id, run.training_environment))
+    given = options.run.training_environment
+    return lambda: Monitor(RepeatableEnvironment(environment_for(options, given)))
+
+
+def repeatable_of(vector: Any) -> RepeatableEnvironment:
+    """The first environment of a model, below what counts its episodes."""
+    place: RepeatableEnvironment = vector.envs[0].env
+    return place
+
+
+def checked_of(vector: Any) -> CheckedEnvironment:
+    """The same, below what remembers its episodes."""
+    env = repeatable_of(vector).env
+    assert isinstance(env, CheckedEnvironment)
+    return env
+
+
+def _hindsight(options: TrainingOptions, vector: Any) -> dict[str, Any]:
+    """The replay buffer, if it is to be that of hindsight experience replay.
+
+    Raises:
+        WorkbenchError: if the environment has no goals.
+    """
+    settings, env_id = options.hyperparameters, options.run.env_id
+    if not getattr(settings, "her", False):
+        return {}
+    from stable_baselines3 import HerReplayBuffer
+
+    if not has_goal(vector.observation_space):
+        raise WorkbenchError(
+            f"her needs goals: a Dict of observation, achieved_goal and desired_goal; {env_id} observes "
+            f"{' '.join(str(vector.observation_space).split())}"
+        )
+    if not checked_of(vector).can_compute_reward:
+        raise WorkbenchError(
+            f"her needs {env_id}'s method {COMPUTE_REWARD}(achieved_goal, desired_goal, info)"
+        )
+    return {
+        "replay_buffer_class": HerReplayBuffer,
+        "replay_buffer_kwargs": {
+            "n_sampled_goal": settings.n_sampled_goal,
+            "goal_selection_strategy": settings.goal_selection_strategy,
+        },
+    }
 
 
 def _network(own: dict[str, Any]) -> dict[str, Any] | None:

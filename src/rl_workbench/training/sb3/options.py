@@ -11,6 +11,7 @@ from rl_workbench.training.options.record import is_plain
 
 CLASSES = {"ppo": "PPO", "a2c": "A2C", "sac": "SAC", "td3": "TD3", "ddpg": "DDPG", "dqn-sb3": "DQN"}
 ON_POLICY = ("ppo", "a2c")
+STRATEGIES = ("future", "final", "episode")
 FRAMES_OWN = ("self", "policy", "env", "seed", "device", "verbose", "tensorboard_log",
               "_init_setup_model", "stats_window_size", "policy_kwargs", "replay_buffer_class",
               "replay_buffer_kwargs", "rollout_buffer_class", "rollout_buffer_kwargs")  # fmt: skip
@@ -61,8 +62,22 @@ class SB3Options:
     @property
     def own(self) -> dict[str, Any]:
         """The options of the algorithm's class, and of its network."""
-        ours = {each.name for each in dataclasses.fields(SB3Options)}
+        ours = {each.name for each in dataclasses.fields(OffPolicyOptions)}
         return {key: value for key, value in vars(self).items() if key not in ours}
+
+
+@dataclasses.dataclass(frozen=True)
+class OffPolicyOptions(SB3Options):
+    """What we add to those of an algorithm with a replay buffer: those of HerReplayBuffer."""
+
+    her: bool = option(
+        False, "hindsight experience replay, for environments with achieved_goal and desired_goal"
+    )
+    n_sampled_goal: int = option(4, "her: goals in hindsight for each real one", 1, 10**6)
+    goal_selection_strategy: str = option(
+        "future", "her: the hindsight goal is what the episode achieves later, in the end, or ever",
+        choices=STRATEGIES,
+    )  # fmt: skip
 
 
 def _lies_within(value: Any, lowest: float, highest: float) -> bool:
@@ -93,7 +108,7 @@ def options_class(name: str) -> type:
             (key, bool if isinstance(default, bool) else Any, _field(default, about))
             for key, default in (own | dict.fromkeys(NETWORK)).items()
         ],
-        bases=(SB3Options,),
+        bases=(SB3Options if name in ON_POLICY else OffPolicyOptions,),
         frozen=True,
     )
 

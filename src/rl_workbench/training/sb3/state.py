@@ -4,6 +4,7 @@ Not in it: the state of the environment and of the random generators, and a roll
 whole yet. So a resumed training begins a new episode, and isn't the same to the bit.
 """
 
+import warnings
 from operator import attrgetter
 from typing import Any
 
@@ -16,7 +17,9 @@ from rl_workbench.training.run.checkpoints import fitting
 
 COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_n_calls")
 ENTROPY = "log_ent_coef"  # SAC's, no part of a network
-ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts",
+          "ep_start", "ep_length")  # fmt: skip
+EPISODES = "_current_ep_start"  # of a buffer for hindsight
 
 
 def state_of(model: Any) -> dict[str, Any]:
@@ -82,16 +85,26 @@ def _buffer_state(buffer: Any) -> dict[str, Any] | None:
     if buffer is None:
         return None
     count = buffer.size()
-    arrays = {name: getattr(buffer, name, None) for name in ARRAYS}
-    return {
+    state = {
         "position": buffer.pos,
         "full": buffer.full,
-        "arrays": {
-            name: torch.from_numpy(array[:count])
-            for name, array in arrays.items()
-            if isinstance(array, np.ndarray)
-        },
+        "arrays": {name: torch.from_numpy(own[:count]) for name, own in _arrays(buffer).items()},
     }
+    if hasattr(buffer, EPISODES):
+        state["episodes"] = torch.from_numpy(getattr(buffer, EPISODES))
+    return state
+
+
+def _arrays(buffer: Any) -> dict[str, np.ndarray]:
+    """All that it holds of each step; of a Dict of observations each part."""
+    found: dict[str, np.ndarray] = {}
+    for name in ARRAYS:
+        own = getattr(buffer, name, None)
+        if isinstance(own, dict):
+            found |= {f"{name}/{key}": part for key, part in own.items()}
+        elif isinstance(own, np.ndarray):
+            found[name] = own
+    return found
 
 
 def _restore_buffer(buffer: Any, state: dict[str, Any]) -> None:
@@ -99,9 +112,26 @@ def _restore_buffer(buffer: Any, state: dict[str, Any]) -> None:
     count = buffer.buffer_size if is_full else position
     if position >= buffer.buffer_size:
         raise ValueError(f"place {position} in a buffer of {buffer.buffer_size}")
-    for name in ARRAYS:
-        own = getattr(buffer, name, None)
-        if isinstance(own, np.ndarray):
-            dtype = torch.from_numpy(own[:0]).dtype
-            own[:count] = array(state["arrays"][name], dtype, (count, *own.shape[1:]))
+    for name, own in _arrays(buffer).items():
+        own[:count] = _like(own, state["arrays"][name], (count, *own.shape[1:]))
     buffer.pos, buffer.full = position, is_full
+    if hasattr(buffer, EPISODES):
+        own = getattr(buffer, EPISODES)
+        own[:] = _like(own, state["episodes"], own.shape)
+        _check_episodes(buffer)
+        with warnings.catch_warnings():  # that it does so
+            warnings.simplefilter("ignore")
+            buffer.truncate_last_trajectory()
+
+
+def _like(own: np.ndarray, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    return array(value, torch.from_numpy(own[:0]).dtype, shape)
+
+
+def _check_episodes(buffer: Any) -> None:
+    """Episodes that lie elsewhere would be looked up there."""
+    size = buffer.buffer_size
+    for name in ("ep_start", "ep_length", EPISODES):
+        own = getattr(buffer, name)
+        if own.min() < 0 or own.max() > size:
+            raise ValueError(f"{name} beyond a buffer of {size}")

@@ -64,7 +64,7 @@ def brightness(films: list[filming.Film]) -> list[int]:
 def test_frames_come_at_the_rate_that_was_asked_for(fastest, rate, steps):
     made = film(8, fastest, captions=False)
     assert brightness([made]) == steps
-    assert (made.rate, *made.end[1:]) == (rate, 8, 4.0)
+    assert (made.rate, made.end.length, made.end.total_reward) == (rate, 8, 4.0)
 
 
 def test_an_episode_is_cut_off_where_one_wants():

@@ -5,16 +5,20 @@ from typing import ClassVar
 
 import gymnasium
 import pytest
-from learning_fakes import Dicing, OnlyOne, Pole, register_with
+from goal_environments import REACH, SHARED_REACH
+from learning_fakes import POLE, Dicing, OnlyOne, Pole, register_with
 from training_runs import (
     ALL,
     EXACT,
     OTHERS,
     InterruptAfter,
+    assert_same,
     assert_same_run,
     checkpoint,
+    options_of,
     resume,
     rows,
+    run,
     summary,
     train,
 )
@@ -189,26 +193,80 @@ def test_one_robot_learns_as_if_nobody_had_moved_it(
     assert_same_run(whole, resume(run))
 
 
+@pytest.mark.parametrize("name", ["dqn", *OTHERS[:1]])
 @pytest.mark.parametrize(("kind", "says_so"), [(OnlyOne, True), (Dicing, False)])
 def test_where_a_robot_cannot_be_brought_back_the_episode_is_given_up(
-    tmp_path: Path, monkeypatch, capsys, kind: type, says_so: bool
+    tmp_path: Path, monkeypatch, capsys, kind: type, says_so: bool, name: str
 ) -> None:
     env_id = register_with(monkeypatch, kind)
     monkeypatch.setattr(kind, "shares_robot", True, raising=False)
     monkeypatch.setattr(gymnasium.registry[env_id], "nondeterministic", says_so)
-    run = train(tmp_path, "dqn", env_id=env_id, total_timesteps=60, eval_frequency=25)
-    assert "the episode under way is given up" in capsys.readouterr().err
-    assert summary(run)["complete"]
+    options = {"total_timesteps": 128, "eval_frequency": 25}
+    result = summary(train(tmp_path, name, env_id=env_id, **options))
+    assert "the environment doesn't repeat itself: the episode" in capsys.readouterr().err
+    assert result["complete"]
+    assert [step for step, _ in result["evaluations"]] == [25, 50, 75, 100, 125, 128]
+    assert sum(result["lengths"]) < 128, "those that were given up don't count"
 
 
 @pytest.mark.extras("stable_baselines3")
-def test_stable_baselines_evaluates_one_robot_at_the_end(
-    robot: type[Pole], tmp_path: Path, monkeypatch, capsys
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("ppo", {}),
+        ("sac", {"learning_starts": 30, "batch_size": 8}),
+        ("td3", {"her": True, "learning_starts": 10, "batch_size": 8, "action_noise": 0.2}),
+    ],
+)
+def test_stable_baselines_moves_the_one_robot_and_learns_the_same(
+    tmp_path: Path, name: str, options: dict
 ) -> None:
-    monkeypatch.setattr(robot, "shares_robot", True)
-    run = train(tmp_path, "ppo", env_id="Robot-v0")
-    assert "over ROS there is one robot: no evaluation before the end" in capsys.readouterr().err
-    assert [step for step, _ in summary(run)["evaluations"]] == [256]
-    assert len(robot.made) == 1
+    """Evaluated in the midst of episodes, of 20 steps each."""
+    given = {"total_timesteps": 128, "n_steps": 64, "net_arch": "8", "eval_frequency": 25,
+             "eval_episodes": 2, "checkpoint_frequency": 0, "seed": 3, **options}  # fmt: skip
+    if name != "ppo":
+        del given["n_steps"]
+    alone, shared = (
+        run(options_of(name, {"env_id": env_id, **given}), tmp_path / env_id[6:])
+        for env_id in (REACH, SHARED_REACH)
+    )
+    assert [step for step, _ in summary(shared)["evaluations"]] == [25, 50, 75, 100, 125, 128]
+    assert rows(alone) == rows(shared)
+    for part in ("policy", "buffer"):
+        assert_same(checkpoint(alone).get(part), checkpoint(shared).get(part), part)
+
+
+@pytest.mark.extras("stable_baselines3")
+def test_several_environments_would_move_the_one_robot(tmp_path: Path) -> None:
+    options = options_of("ppo", {"env_id": SHARED_REACH, "n_envs": 2})
     with pytest.raises(WorkbenchError, match="there is one robot: n_envs is 1, not 2"):
-        train(tmp_path / "two", "ppo", env_id="Robot-v0", n_envs=2)
+        run(options, tmp_path)
+
+
+@pytest.mark.parametrize("name", ["dqn", "reinforce"])
+def test_an_environment_of_which_there_can_be_only_one(
+    tmp_path: Path, monkeypatch, capsys, name: str
+) -> None:
+    """It says nothing of a robot that it shares: as somebody writes it around a connection."""
+
+    class Alone(Pole):
+        count = 0
+
+        def __init__(self) -> None:
+            Alone.count += 1
+            if Alone.count > 1:
+                raise ConnectionError("the port is taken")
+            super().__init__(0.05)
+
+        def close(self) -> None:
+            Alone.count -= 1
+
+    env_id = register_with(monkeypatch, Alone)
+    plain = train(tmp_path / "plain", name, env_id=POLE, env_kwargs={"noise": 0.05})
+    alone = train(tmp_path / "alone", name, env_id=env_id, env_kwargs=None)
+    told = capsys.readouterr().out
+    assert "evaluated in the training's own environment, since a second one fails: " in told
+    assert "the port is taken" in told
+    assert rows(plain) == rows(alone)
+    with pytest.raises(WorkbenchError, match="the port is taken"):
+        train(tmp_path / "other", name, env_id=env_id, eval_env_kwargs={"noise": 0.1})

@@ -10,8 +10,8 @@ from training_runs import ALL, EXACT
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import recorded_options
+from rl_workbench.training.environments.making import make_environment
 from rl_workbench.training.run.checkpoints import read
-from rl_workbench.training.run.environments import make_environment
 from rl_workbench.training.run.policy import load_policy
 
 MEANINGS = {"dqn": "Q(right) - Q(left)", "sac": "action"}

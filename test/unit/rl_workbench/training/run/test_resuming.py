@@ -22,9 +22,9 @@ from training_runs import (
     train,
 )
 
+from rl_workbench.training.environments.checked import CheckedEnvironment
 from rl_workbench.training.run import checkpoints as run_checkpoints
 from rl_workbench.training.run.checkpoints import Checkpoints
-from rl_workbench.training.run.environments import CheckedEnvironment
 
 pytestmark = pytest.mark.slow
 

@@ -9,8 +9,8 @@ from training_runs import options_of, record
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import recorded_options
+from rl_workbench.training.environments.making import make_environment
 from rl_workbench.training.run.checkpoints import read
-from rl_workbench.training.run.environments import make_environment
 from rl_workbench.training.run.policy import load_policy
 
 pytestmark = pytest.mark.extras("stable_baselines3")

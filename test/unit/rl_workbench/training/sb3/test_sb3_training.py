@@ -24,7 +24,7 @@ from training_runs import (
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import recorded_options
-from rl_workbench.training.run.environments import make_environment
+from rl_workbench.training.environments.making import make_environment
 from rl_workbench.training.run.policy import load_policy
 
 pytestmark = pytest.mark.extras("stable_baselines3")
@@ -171,11 +171,11 @@ def test_a_rate_that_torch_refuses(tmp_path: Path) -> None:
 
 
 def test_a_loss_that_is_none() -> None:
-    from rl_workbench.training.sb3.algorithm import _check_finite
+    from rl_workbench.training.sb3.callback import check_finite
 
     for value in (float("nan"), float("inf")):
         with pytest.raises(WorkbenchError, match=r"losses/value_loss is .*learning_rate"):
-            _check_finite("losses/value_loss", value)
+            check_finite("losses/value_loss", value)
 
 
 def test_many_environments_of_training_are_one_when_playing(tmp_path: Path, recwarn) -> None:

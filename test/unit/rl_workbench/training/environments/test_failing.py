@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.run.environments import CheckedEnvironment, make_environment
+from rl_workbench.training.environments.checked import CheckedEnvironment
+from rl_workbench.training.environments.making import make_environment
 
 
 class Device(gymnasium.Env[np.ndarray, int]):
@@ -55,9 +56,7 @@ def test_a_constructor_with_a_mistake(monkeypatch) -> None:
     monkeypatch.setitem(
         gymnasium.registry, "Broken-v0", gymnasium.envs.registration.EnvSpec("Broken-v0", Broken)
     )
-    words = (
-        r"^can't make Broken-v0: ZeroDivisionError: of mine \(.*test_failing_environments.py:\d+\)$"
-    )
+    words = r"^can't make Broken-v0: ZeroDivisionError: of mine \(.*test_failing.py:\d+\)$"
     with pytest.raises(WorkbenchError, match=words):
         make_environment("Broken-v0")
 

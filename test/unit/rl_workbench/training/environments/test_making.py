@@ -8,7 +8,7 @@ import pytest
 from learning_fakes import POLE, SPOILT, Died
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.run.environments import (
+from rl_workbench.training.environments.making import (
     discrete_actions,
     make_environment,
     shares_robot,
@@ -60,7 +60,7 @@ def test_options_that_an_environment_refuses(env_id: str, options: dict, words: 
     [
         ("CartPol-v1", "unknown environment 'CartPol-v1'; did you mean CartPole-v1?"),
         ("CartPole-v7", "did you mean CartPole-v1?"),
-        ("zzz", "^unknown environment 'zzz'$"),
+        ("zzz", "^unknown environment 'zzz'; one of your own is named with its module"),
         (
             "my_module:Env-v0",
             "can't make my_module:Env-v0: there is no module 'my_module'; .*--with FO",
@@ -100,9 +100,9 @@ def test_what_cannot_be_flattened_is_refused(monkeypatch) -> None:
 
 @pytest.mark.parametrize(
     ("space", "words"),
-    [(gymnasium.spaces.Box(-1, 1, (1,)), r"has Box\(.*PPO, A2C, SAC, TD3 or DDPG fit it"),
-     (gymnasium.spaces.MultiDiscrete([2, 2]), "has MultiDiscrete.*PPO or A2C fit it"),
-     (gymnasium.spaces.Discrete(2, start=1), "PPO or A2C fit it")],
+    [(gymnasium.spaces.Box(-1, 1, (1,)), r"has Box\(.*ppo, a2c, sac, td3 or ddpg: these fit it"),
+     (gymnasium.spaces.MultiDiscrete([2, 2]), "has MultiDiscrete.*ppo or a2c: these fit it"),
+     (gymnasium.spaces.Discrete(2, start=1), "ppo or a2c: these fit it")],
 )  # fmt: skip
 def test_actions_that_are_no_choice_of_single_ones(monkeypatch, space, words: str) -> None:
     env = make_environment(POLE)

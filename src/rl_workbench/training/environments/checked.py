@@ -1,0 +1,184 @@
+"""What an environment gives, checked before it spoils what is learned from it."""
+
+import sysconfig
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from rl_workbench.errors import WorkbenchError
+
+LARGEST = float(np.finfo(np.float32).max)  # networks and replay know no larger number
+COMPUTE_REWARD = "compute_reward"  # method of an environment with a goal
+# Where code isn't the user's.
+_LIBRARIES = (
+    *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
+    str(Path(__file__).resolve().parents[3]),  # all of this project
+    str(Path(gymnasium.__file__).parent),
+    "<frozen",
+)
+
+
+class EnvironmentFailure(WorkbenchError):
+    """An environment's own code has failed; the text names the place, the cause has the traceback."""
+
+
+class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Ends with one line what would spoil replay, statistics and weights, before it gets there.
+
+    Args:
+        env: its observations are vectors, or a Dict of arrays.
+        env_id: for the error.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], env_id: str) -> None:
+        super().__init__(env)
+        self._id = env_id
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """As the environment's.
+
+        Raises:
+            WorkbenchError: if the observation isn't finite in single precision, or the environment
+                fails.
+        """
+        with self._running("reset"):
+            observation, info = self.env.reset(seed=seed, options=options)
+        self._check(observation)
+        return observation, info
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """As the environment's.
+
+        Raises:
+            WorkbenchError: if the observation or the reward isn't finite in single precision, or the
+                environment fails.
+        """
+        with self._running("step"):
+            observation, reward, terminated, truncated, info = self.env.step(action)
+        self._check(observation)
+        try:
+            size = abs(float(reward))
+        except (TypeError, ValueError) as error:
+            raise WorkbenchError(f"the reward of {self._id} isn't a number: {reward!r}") from error
+        if not size <= LARGEST:  # so that NaN is refused too
+            raise self._error("reward", reward)
+        return observation, reward, terminated, truncated, info
+
+    @property
+    def can_compute_reward(self) -> bool:
+        """Whether it has rewards for goals that it is given."""
+        return self.env.has_wrapper_attr(COMPUTE_REWARD)
+
+    def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> np.ndarray:
+        """The rewards for goals that were achieved while others were desired, as hindsight asks for them.
+
+        Args:
+            achieved: goals (N, n).
+            desired: goals (N, n).
+            info: of each of the steps; a list of N.
+
+        Returns:
+            float32, (N,).
+
+        Raises:
+            WorkbenchError: if the environment fails, or gives something else.
+        """
+        with self._running(COMPUTE_REWARD):
+            found = self.env.get_wrapper_attr(COMPUTE_REWARD)(achieved, desired, info)
+        name = f"{COMPUTE_REWARD}() of {self._id}"
+        try:
+            rewards = np.asarray(found, np.float32)
+        except (TypeError, ValueError) as error:
+            raise WorkbenchError(f"{name} gives no numbers: {found!r}") from error
+        if rewards.shape != (len(achieved),):
+            raise WorkbenchError(
+                f"{name} isn't vectorised: for {len(achieved)} goals at once, {achieved.shape}, it gives "
+                f"the shape {rewards.shape}, not {(len(achieved),)}; norms take axis=-1"
+            )
+        if not np.isfinite(rewards).all():
+            raise WorkbenchError(f"{name} gives a reward that isn't finite")
+        return rewards
+
+    def render(self) -> Any:
+        """As the environment's.
+
+        Raises:
+            gymnasium.error.Error: as the environment's.
+            WorkbenchError: if the environment fails otherwise.
+        """
+        try:
+            return self.env.render()
+        except gymnasium.error.Error:  # who draws says what for
+            raise
+        except (Exception, SystemExit) as error:
+            text = f"{self._id} failed in render(): {told(error)}"
+            raise EnvironmentFailure(text) from error
+
+    def close(self) -> None:
+        """As the environment's.
+
+        Raises:
+            WorkbenchError: if the environment fails.
+        """
+        with self._running("close"):
+            self.env.close()
+
+    @contextmanager
+    def _running(self, method: str) -> Iterator[None]:
+        """Whatever it raises ends the training with one line, once what was learned is saved."""
+        try:
+            yield
+        except gymnasium.error.Error as error:  # its text is made for the user
+            raise WorkbenchError(str(error) or type(error).__name__) from error
+        except (Exception, SystemExit) as error:
+            text = f"{self._id} failed in {method}(): {told(error)}"
+            raise EnvironmentFailure(text) from error
+
+    def _check(self, observation: Any) -> None:
+        space = self.observation_space
+        if not isinstance(space, spaces.Dict):
+            self._check_array("observation", observation, space)
+            return
+        if not isinstance(observation, dict) or observation.keys() != space.keys():
+            keys = list(observation) if isinstance(observation, dict) else observation
+            raise WorkbenchError(
+                f"the observation of {self._id} has {' '.join(str(keys).split())}, its "
+                f"observation_space {list(space)}"
+            )
+        for name, part in space.items():
+            self._check_array(name, observation[name], part)
+
+    def _check_array(self, name: str, array: Any, space: gymnasium.Space[Any]) -> None:
+        try:
+            is_finite = np.abs(array).max(initial=0) <= LARGEST
+        except (TypeError, ValueError) as error:
+            what = f"the {name} of {self._id} isn't a vector of numbers"
+            raise WorkbenchError(f"{what}: {' '.join(repr(array).split())}") from error
+        if np.shape(array) != space.shape:
+            raise WorkbenchError(
+                f"the {name} of {self._id} has the shape {np.shape(array)}, its "
+                f"observation_space {space.shape}"
+            )
+        if not is_finite:
+            raise self._error(name, array)
+
+    def _error(self, what: str, value: Any) -> WorkbenchError:
+        text = " ".join(str(value).split())
+        return WorkbenchError(f"the {what} of {self._id} isn't finite in float32: {text}")
+
+
+def told(error: BaseException) -> str:
+    """An error in one line, with the place in the user's own code, if it went through that."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
+    place = (own or frames)[-1]
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}{': ' if text else ''}{text} ({place.filename}:{place.lineno})"

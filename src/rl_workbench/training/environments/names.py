@@ -1,0 +1,92 @@
+"""Ids of environments: Gymnasium's form `module:namespace/Name-v0`, whose module registers the rest."""
+
+import contextlib
+import re
+from difflib import get_close_matches
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any
+
+import gymnasium
+from gymnasium.envs.registration import EnvSpec
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.extras import finding_modules
+from rl_workbench.training.environments.checked import EnvironmentFailure, told
+
+FORM = "one of your own is named with its module, as in my_module:my_robot/Reach-v0"
+
+
+def without_module(env_id: str) -> str:
+    """The id under which it is registered."""
+    return env_id.partition(":")[2] or env_id
+
+
+def module_of(env_id: str) -> str:
+    """The module that registers it; empty if the id names none."""
+    module, colon, _ = env_id.partition(":")
+    return module if colon else ""
+
+
+def as_file_name(env_id: str) -> str:
+    """For the names of files and folders."""
+    return re.sub("[/:]", "-", env_id)
+
+
+def import_module_of(env_id: str) -> None:
+    """Imports the module that an id names, if it names one.
+
+    Raises:
+        WorkbenchError: if there is no such module, naming the nearest, or it fails.
+    """
+    module = module_of(env_id)
+    if not module:
+        return
+    try:
+        import_module(module)
+    except (Exception, SystemExit) as error:
+        missing = error.name if isinstance(error, ModuleNotFoundError) else None
+        if missing and f"{module}.".startswith(f"{missing}."):  # not one that it imports itself
+            text = f"can't make {env_id}: there is no module '{missing}'{_nearest(missing)}"
+            raise WorkbenchError(f"{text}; {finding_modules()}") from error
+        raise EnvironmentFailure(f"can't make {env_id}: {told(error)}") from error
+
+
+def _nearest(missing: str) -> str:
+    """The words for the module whose name is most alike; none if there is none."""
+    package, _, name = missing.rpartition(".")
+    folders: Any = import_module(package).__path__ if package else None
+    near = get_close_matches(name, [each.name for each in iter_modules(folders)], 1)
+    return f", did you mean {package}{'.' if package else ''}{near[0]}?" if near else ""
+
+
+def unknown_environment(env_id: str) -> str:
+    """The words for an id that isn't registered: the nearest one, or how one's own are named."""
+    known = {without_module(each): each for each in gymnasium.registry}
+    near = get_close_matches(without_module(env_id), list(known), 1)
+    module = module_of(env_id)
+    text = f"unknown environment {env_id!r}"
+    if not near:
+        registered = f"; {module} registers none of that name" if module else f"; {FORM}"
+        return text + registered
+    is_its = module and near[0].rpartition("/")[0] == without_module(env_id).rpartition("/")[0]
+    return f"{text}; did you mean {f'{module}:' if is_its else ''}{near[0]}?"
+
+
+def spec_of(env_id: str) -> EnvSpec | None:
+    """What is registered under an id, once its module is imported; None if nothing is.
+
+    Raises:
+        WorkbenchError: if its module can't be imported.
+    """
+    if without_module(env_id) not in gymnasium.registry:
+        import_module_of(env_id)
+    return gymnasium.registry.get(without_module(env_id))
+
+
+def threshold(env_id: str) -> float | None:
+    """The return from which Gymnasium calls an environment solved, if it says so."""
+    spec = None
+    with contextlib.suppress(WorkbenchError):  # who makes the environment says so
+        spec = spec_of(env_id)
+    return None if spec is None else spec.reward_threshold

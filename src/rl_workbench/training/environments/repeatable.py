@@ -1,0 +1,116 @@
+"""The environment of a training, with what brings back the episode under way.
+
+No environment has a way to be saved in the middle of an episode. But the same start and the
+same actions bring it back there: that is what is kept.
+"""
+
+import json
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium import spaces
+
+from rl_workbench.states import array, whole
+from rl_workbench.training.environments.answers import as_vector
+
+
+class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """An environment that can be brought back into the middle of an episode.
+
+    What is done with the environment inside, past this wrapper, is no part of the episode.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
+        super().__init__(env)
+        self._actions: list[Any] = []
+        self._start = ""  # the generator before the reset
+        self._seed: int | None = None  # of the reset, if it had one
+        self._last = np.empty(0, np.float32)  # observation
+        self._was_begun = False
+
+    @property
+    def length(self) -> int:
+        """Steps of the episode so far."""
+        return len(self._actions)
+
+    @property
+    def was_begun(self) -> bool:
+        """Whether there was a first episode."""
+        return self._was_begun
+
+    @property
+    def generator(self) -> str:
+        """The state of the environment's generator, as JSON."""
+        return json.dumps(self.env.unwrapped.np_random.bit_generator.state, default=_plain)
+
+    @generator.setter
+    def generator(self, text: str) -> None:
+        self.env.unwrapped.np_random.bit_generator.state = json.loads(text)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begins an episode."""
+        self._actions, self._seed, self._start = [], seed, self.generator
+        self._was_begun = True
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._last = as_vector(observation)
+        return observation, info
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """One step, which is remembered."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self._actions.append(np.array(action))
+        self._last = as_vector(observation)
+        return observation, reward, terminated, truncated, info
+
+    def state_dict(self) -> dict[str, Any]:
+        """How the episode began, its actions, and where they led."""
+        shape = (self.length, *(self.action_space.shape or ()))
+        actions = np.array(self._actions, dtype=self.action_space.dtype).reshape(shape)
+        return {
+            "start": self._start,
+            **({} if self._seed is None else {"seed": self._seed}),
+            "actions": torch.from_numpy(actions),
+            "observation": torch.from_numpy(self._last.copy()),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> np.ndarray | None:
+        """Repeats the episode.
+
+        Returns:
+            Its last observation as a vector, or None if it went another way: then there is no episode, and
+            the generator is as it was.
+        """
+        after = self.generator
+        if self.env.spec is not None and self.env.spec.nondeterministic:
+            return None
+        self.generator = state["start"]
+        seed = state.get("seed")
+        self.reset(seed=None if seed is None else whole(seed))
+        wanted = array(state["observation"], torch.float32, self._last.shape)
+        actions = self._read_actions(state["actions"])
+        for action in actions:
+            _, _, terminated, truncated, _ = self.step(action)
+            if terminated or truncated:
+                break
+        if self.length == len(actions) and np.array_equal(self._last, wanted):
+            return self._last
+        self.generator = after
+        return None
+
+    def _read_actions(self, value: Any) -> list[Any]:
+        space = self.action_space
+        dtype = torch.from_numpy(np.empty(0, space.dtype)).dtype
+        found = array(value, dtype, (None, *(space.shape or ())))
+        actions = found.tolist() if isinstance(space, spaces.Discrete) else list(found)
+        if not all(map(space.contains, actions)):
+            raise ValueError(f"an episode with other actions than {space}")
+        return actions
+
+
+def _plain(value: Any) -> Any:
+    """For generators whose state holds arrays."""
+    return value.tolist()
