@@ -46,11 +46,6 @@ class Scene:
         _once("namespace", [robot.namespace.strip("/") for robot in self.robots])
         self.several = len(self.robots) > 1
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Scene) and vars(self)["robots"] == other.robots
-
-    __hash__ = None  # type: ignore[assignment]
-
     def joint(self, robot: Robot, name: str) -> str:
         """What a joint is called in a state."""
         return f"{robot.model}::{name}" if self.several else name

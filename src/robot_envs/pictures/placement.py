@@ -60,7 +60,7 @@ class Placement:
         return overview(self.reach(), aspect) if camera is None else camera
 
     def strayed(self, positions: Mapping[str, float], base: Pose) -> Vector:
-        """How far it has come from where it starts [m], with its root link and along slides without near ends."""
+        """How far it has come from where it starts [m]: its root link, and along slides without near ends."""
         if self._carried is None:
             return subtract(base.position, self._start.position)
         here, there = (

@@ -1,4 +1,4 @@
-"""REINFORCE over continuous actions: the Gaussian policy held against torch's own, its range, its learning."""
+"""REINFORCE over continuous actions: the policy held against torch's own, its range, its learning."""
 
 import gymnasium
 import numpy as np

@@ -144,7 +144,7 @@ def test_every_section_is_valid_and_counts(algorithm: str, name: str) -> None:
     if kind.config == "sb3.yaml":
         from rl_workbench.training.sb3.model import make_model
 
-        assert options.run.total_timesteps >= 10_000
+        assert options.run.total_timesteps >= 5_000
         is_continuous = "SwingUp" in name or "Continuous" in name
         like_it = {"LunarLanderContinuous-v3": "Pendulum-v1", "LunarLander-v3": "CartPole-v1"}
         if env_id.startswith("cartpole/"):
