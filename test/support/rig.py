@@ -49,7 +49,7 @@ RIG = Robot(
         "servo_position": {
             "type": "effort_controllers/JointPositionController",
             "joint": "servo",
-            "pid": {"p": 20, "i": 0.5, "d": 2.0, "i_clamp": 1.0},
+            "pid": {"p": 20.1, "i": 0.5, "d": 2.3, "i_clamp": 1.0},
         },
         "joint_state_controller": {
             "type": "joint_state_controller/JointStateController", "publish_rate": 100,

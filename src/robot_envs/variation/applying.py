@@ -91,18 +91,20 @@ class Applier:
         if self._parts is None and variation.is_nominal:
             return
         parts = self._parts = self._parts or Parts(self._scene)
-        self._last = variation
+        links = {name: parts.link(name) for name in (*variation.links, *variation.surfaces)}
+        joints = {name: parts.joint(name) for name in (*variation.damping, *variation.friction)}
+        tuned = {name: parts.controller(name) for name in variation.gains}
+        self._last = variation  # all names are known: from here on there is something to undo
         for name, difference in variation.links.items():
-            link = parts.link(name)
             if name not in self._links:
-                self._links[name] = self._world.link(link)
-            self._world.set_link(link, scaled(self._links[name], difference))
-        for name in {**variation.damping, **variation.friction}:
-            self._rub(name, parts.joint(name), variation)
+                self._links[name] = self._world.link(links[name])
+            self._world.set_link(links[name], scaled(self._links[name], difference))
+        for name, joint in joints.items():
+            self._rub(name, joint, variation)
         for name, factor in variation.surfaces.items():
-            self._world.set_surface(parts.link(name), factor)
-        for name, factor in variation.gains.items():
-            self._tune(name, parts.controller(name), factor)
+            self._world.set_surface(links[name], factor)
+        for name, controller in tuned.items():
+            self._tune(name, controller, variation.gains[name])
         if variation.gravity is not None:
             if self._gravity is None:
                 self._gravity = self._world.gravity()
@@ -131,6 +133,9 @@ class Applier:
         Raises:
             SimulatorError: if the world refuses.
         """
-        last, self._last = self._last, Variation()
+        last = self._last
         if last != Variation():
-            self(last.undone)
+            try:
+                self(last.undone)
+            finally:
+                self._last = Variation()

@@ -39,6 +39,7 @@ class Parts:
     | `links` | all |
     | `axes` | of the length of links that move and have a mass |
     | `solids` | links with a collision |
+    | `lumped` | links that a fixed joint has made part of another one: that one |
     | `joints` | those that move |
     | `controllers` | those that run |
 
@@ -53,6 +54,7 @@ class Parts:
         self.links: dict[str, Part] = {}
         self.axes: dict[str, str] = {}
         self.solids: list[str] = []
+        self.lumped: dict[str, str] = {}
         self.joints = {name: Part(*at) for name, at in scene.moved.items()}
         self.controllers: dict[str, Part] = {}
         for robot in scene.robots:
@@ -64,6 +66,8 @@ class Parts:
                     self.axes[name] = length_axis(link.inertia)
                 if link.collisions:
                     self.solids.append(name)
+            for plain, (whole, _) in robot.links.lumped.items():
+                self.lumped[scene.joint(robot, plain)] = scene.joint(robot, whole)
             for plain in robot.run:
                 self.controllers[scene.controller(robot, plain)] = Part(robot, plain)
 

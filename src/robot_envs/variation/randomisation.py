@@ -73,6 +73,7 @@ class UniformRandomisation:
             }
             self._count += option.numbers * len(names)
             if option.name in options:
+                _check_whole(option, options[option.name], parts.lumped)
                 able = list(pids) if option.of == CONTROLLERS else names
                 self._ranges[option.name] = ranges(option, options[option.name], able)
         tuned = self._ranges.get("gains", {})
@@ -112,6 +113,17 @@ class UniformRandomisation:
             key: drawn[key][link] for key in ("mass", "length", "com") if link in drawn.get(key, ())
         }
         return LinkScale(**given, axis=self._axes[link])
+
+
+def _check_whole(option: Option, given: Any, lumped: Mapping[str, str]) -> None:
+    """Says where a link has gone that isn't one in the physics."""
+    if isinstance(given, Mapping) and option.of in (LINKS, SOLIDS):
+        for name in given:
+            if name in lumped:
+                raise ValueError(
+                    f"randomisation of {option.name}: a fixed joint makes link '{name}' part of "
+                    f"'{lumped[name]}'; name that one"
+                )
 
 
 def _told(drawn: Any) -> Any:

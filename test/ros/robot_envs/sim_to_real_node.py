@@ -61,7 +61,7 @@ def figures():
     return link.mass, link.com.position.x, link.ixx, link.gravity_mode, world.gravity.z, gains
 
 
-OWN = (MASS, 0.0, 0.1, True, -9.8, {"p": 20.0, "i": 0.5, "d": 2.0, "i_clamp_max": 1.0})
+OWN = (MASS, 0.0, 0.1, True, -9.8, {"p": 20.1, "i": 0.5, "d": 2.3, "i_clamp_max": 1.0})
 
 
 class Session(unittest.TestCase):
@@ -106,7 +106,7 @@ class Lockstep(Session):
         self.assertEqual(gravity, -9.8 * info["gravity"])
         factor = info["gains"]["/rig/servo_position"]
         self.assertEqual(
-            gains, {"p": 20.0 * factor, "i": 0.5 * factor, "d": 2.0 * factor, "i_clamp_max": 1.0}
+            gains, {"p": 20.1 * factor, "i": 0.5 * factor, "d": 2.3 * factor, "i_clamp_max": 1.0}
         )
         varied.close()
         self.assertEqual(figures(), OWN)

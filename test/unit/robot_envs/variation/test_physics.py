@@ -1,12 +1,14 @@
 """That each option does what its line in docs/sim_to_real.md says: a rig that moves by known laws."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from rig import INERTIA, MASS, PERIOD, RIG, Watch, make_both, make_rig
 
-from robot_envs import RobotEnv
+from robot_envs import RobotEnv, SimulatorError
+from robot_envs.variation import LinkScale, Variation
 from robot_envs.vector.environment import RobotVectorEnv
 
 G = 9.8  # [m/s²]
@@ -76,7 +78,7 @@ def test_gains_drive_so_many_times_as_hard(factor):
     env.step(np.array([0.0, 0.0, 0.1]))
     effort = env._state.joints["servo"].effort
     env.close()
-    dt, p, i, d = 0.001, 20.0, 0.5, 2.0
+    dt, p, i, d = 0.001, 20.1, 0.5, 2.3
     assert effort == pytest.approx(factor * 0.1 * (p + i * dt + d / dt), rel=1e-9)
 
 
@@ -206,3 +208,43 @@ def test_a_vector_of_environments_gives_each_its_own_robot():
         assert (pushed[index] == alone).all()
         assert infos["mass"]["cart"][index] == info["mass"]["cart"]
         assert (infos["com"]["cart"][index] == info["com"]["cart"]).all()
+
+
+@pytest.mark.parametrize(
+    ("variation", "text"),
+    [
+        (Variation({"kart": LinkScale(2.0)}), "no link 'kart' to vary; did you mean 'cart'?"),
+        (Variation(surfaces={"kart": 2.0}), "no link 'kart' to vary"),
+        (Variation(damping={"rial": 2.0}), "no joint 'rial' to vary; did you mean 'rail'?"),
+        (Variation(gains={"motor": 2.0}), "no controller 'motor' to vary; did you mean 'motors'?"),
+        (Variation({"cart": LinkScale(-1.0)}), "link cart can't be changed: mass -2.0"),
+        (Variation(friction={"rail": -1.0}), "joint rail can't be changed: fmax is -1.0"),
+        (Variation(damping={"rail": -1.0}), "joint rail can't be changed: a damping of -1.0"),
+        (Variation(surfaces={"cart": -1.0}), "surfaces of link cart can't be changed"),
+    ],
+)
+def test_a_variation_of_ones_own_that_can_not_be_is_refused(variation, text):
+    env = make_rig()
+    with pytest.raises(SimulatorError) as refused:
+        env.backend.vary(variation)
+    env.close()
+    assert text in str(refused.value)
+
+
+def test_dry_friction_does_nothing_to_a_joint_that_is_set_in_position():
+    """As docs/sim_to_real.md says: such a joint goes where it is told, as in Gazebo."""
+    urdf = RIG.urdf.replace("EffortJointInterface", "PositionJointInterface")
+    servo = {"type": "position_controllers/JointPositionController", "joint": "servo"}
+    motors = {
+        "type": "position_controllers/JointGroupPositionController",
+        "joints": ["rail", "drop"],
+    }
+    robot = replace(RIG, urdf=urdf, controllers={"servo_position": servo, "motors": motors})
+    rows = []
+    for friction in (0.0, 50.0):
+        env = RobotEnv(robot, Watch(), randomisation={"friction": (friction, friction)})
+        env.reset(seed=0)
+        rows.append([env.step(np.array([0.01 * n, 0.0, 0.02 * n]))[0] for n in range(10)])
+        env.close()
+    assert np.array_equal(*rows)
+    assert rows[0][-1][2] > 0.05

@@ -1,6 +1,7 @@
 """What is drawn, from which options, and what options are refused."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,11 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig import RIG, SLEDGE, make_rig
 
-from robot_envs import RobotEnv
+from robot_envs import Robot, RobotEnv
 from robot_envs.scene import Scene
 from robot_envs.variation.options import OPTIONS
 from robot_envs.variation.randomisation import UniformRandomisation
 
+FILES = Path(__file__).resolve().parents[3] / "data/robots"
 SCENE = Scene([RIG])
 BOTH = Scene([RIG, SLEDGE])
 NAMES = {
@@ -155,6 +157,13 @@ def test_what_can_not_be_is_refused(options, text):
 def test_an_environment_refuses_it_before_there_is_a_world():
     with pytest.raises(ValueError, match="randomisation has no option 'mas'"):
         make_rig(randomisation={"mas": 0.1})
+
+
+def test_a_link_that_is_part_of_another_one_is_told_so():
+    scene = Scene([Robot(urdf=FILES / "two_link_arm.urdf")])
+    text = "randomisation of mass: a fixed joint makes link 'tip' part of 'fore'; name that one"
+    with pytest.raises(ValueError, match=text):
+        draw({"mass": {"tip": 0.1}}, scene=scene)
 
 
 def test_surfaces_are_those_of_links_with_a_collision():
