@@ -70,9 +70,11 @@ class CartPoleEnv(RobotEnv):
     | `max_steps`      | the task's | length at which an episode is cut off                    |
     | `sensor_noise`   | 0          | standard deviation; one or four numbers, in the state's units |
     | `sensor_delay`   | 0          | age of an observation [control steps]                    |
+    | `encoder_step`, `action_delay`, `actuator_limit`, `actuator_lag` | none | see docs/sim_to_real.md |
     | `randomisation`  | none       | a dict of `mass`, `length`, `cart_friction`, `pole_friction`, see |
     |                  |            | `cartpole.variation.Randomisation`; each episode gets its own |
-    |                  |            | robot, which stands in the reset's `info["variation"]`   |
+    |                  |            | robot, which stands in the reset's `info["variation"]`;  |
+    |                  |            | or of the options in docs/sim_to_real.md                 |
     | `render_mode`    | none       | `"rgb_array"`: pictures, (height, width, 3); `"human"`: a window |
     | `width`, `height` | 640, 320  | of the pictures [pixels]                                  |
 
@@ -92,7 +94,7 @@ class CartPoleEnv(RobotEnv):
         task: CartPoleTask,
         backend: str | RobotBackend | None = None,
         *,
-        sensor_noise: float | Sequence[float] | np.ndarray = 0.0,
+        sensor_noise: float | Sequence[float] | np.ndarray | Mapping[str, Any] = 0.0,
         **options: Any,
     ) -> None:
         super().__init__(
