@@ -174,6 +174,16 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         return self.backend.shared
 
     @property
+    def state(self) -> WorldState | None:
+        """The world as it is, whatever sensors make of it; None before the first reset."""
+        return self._state
+
+    @property
+    def measures_exactly(self) -> bool:
+        """Whether observations are made of the state as it is: no noise, no delay, no encoders."""
+        return self._sensor is None
+
+    @property
     def spec(self) -> EnvSpec | None:
         """How Gymnasium made this; says so where the robot never repeats itself."""
         return self._spec
