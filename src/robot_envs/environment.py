@@ -11,13 +11,16 @@ from gymnasium.envs.registration import EnvSpec
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.state.names import did_you_mean
+from robot_envs import task_checks
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.choice import make_backend
+from robot_envs.errors import TaskError
 from robot_envs.pictures.picture import HEIGHT, WIDTH, RobotPicture
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.spaces import action_reader, observation_reader
 from robot_envs.task import GoalTask, Task
+from robot_envs.task_checks import check_steps, check_task, goal_space
 from robot_envs.variation import Randomisation
 from robot_envs.variation.actuation import Actuator
 from robot_envs.variation.randomisation import UniformRandomisation
@@ -111,21 +114,23 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         render_mode: str | None = None,
     ) -> None:
         self._closed = True  # until there is something to close
-        self.scene = Scene([robot] if isinstance(robot, Robot) else robot, task.objects)
+        check_task(task)
+        self.scene = Scene(robot if isinstance(robot, Sequence) else [robot], task.objects)
         self.task = task
         self.max_steps = task.max_steps if max_steps is None else max_steps
-        if self.max_steps is not None and self.max_steps < 1:
-            raise ValueError(f"max_steps must be at least 1, not {self.max_steps}")
-        self.action_space = task.action_space()
+        check_steps(self.max_steps)
+        self.action_space = task_checks.space(task, "action_space")
         self._read_action = action_reader(self.action_space)
-        space = task.observation_space()
+        space = task_checks.space(task, "observation_space")
         self._read = observation_reader(space, type(task).__name__)
         self.observation_space = space
         self._aimed = isinstance(task, GoalTask)
         if isinstance(task, GoalTask):
-            self.observation_space = _goal_space(task, space)
+            self.observation_space = goal_space(task, space)
             self.compute_reward = task.compute_reward  # environments without goals have none
         period = self.scene.robots[0].control_period if control_period is None else control_period
+        if not isinstance(period, (int, float)):
+            raise ValueError(f"control_period is a number [s], not {period!r}")
         shown = period if period > 0.0 else self.scene.robots[0].control_period  # [s] a picture
         sensor = Sensor(self.scene.joints, shown, sensor_noise, sensor_delay, encoder_step)
         self._sensor = None if sensor.is_exact else sensor
@@ -167,6 +172,16 @@ class RobotEnv(gymnasium.Env[Any, Any]):
     def shares_robot(self) -> bool:
         """Whether other environments of this process move the same robot."""
         return self.backend.shared
+
+    @property
+    def state(self) -> WorldState | None:
+        """The world as it is, whatever sensors make of it; None before the first reset."""
+        return self._state
+
+    @property
+    def measures_exactly(self) -> bool:
+        """Whether observations are made of the state as it is: no noise, no delay, no encoders."""
+        return self._sensor is None
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -216,7 +231,7 @@ class RobotEnv(gymnasium.Env[Any, Any]):
             self._window.show(self._positions())
         if self._aimed:
             seen = self._with_goals(seen, measured)
-        return seen, {**self.task.info(state), **info}
+        return seen, {**task_checks.told(self.task, self.task.info(state)), **info}
 
     def _known_options(self, options: dict[str, Any]) -> dict[str, Any]:
         for name in options:
@@ -233,9 +248,13 @@ class RobotEnv(gymnasium.Env[Any, Any]):
     def _aim(self, task: GoalTask, state: WorldState, wanted: Any) -> None:
         drawn = task.goal(self.np_random, state)
         space = task.goals()
-        goal = np.asarray(drawn if wanted is None else wanted, space.dtype)
+        given = drawn if wanted is None else wanted
+        try:
+            goal = np.asarray(given, space.dtype)
+        except (TypeError, ValueError):  # no numbers
+            goal = np.array(math.nan)
         if not space.contains(goal):
-            raise ValueError(f"the goal {goal} isn't one of {type(task).__name__}'s goals: {space}")
+            raise TaskError(f"the goal {given} isn't one of {type(task).__name__}'s goals: {space}")
         task.desired = goal
 
     def _vary(self) -> dict[str, Any]:
@@ -265,20 +284,25 @@ class RobotEnv(gymnasium.Env[Any, Any]):
             self._first = {}
         self._state = state = self._act(commands)
         self._steps += 1
-        terminated = bool(task.is_terminal(state))
+        terminated: Any = task.is_terminal(state)
+        if type(terminated) is not bool:
+            terminated = task_checks.flag(task, "is_terminal", terminated)
         truncated = not terminated and self._steps == self.max_steps
         if terminated or truncated:
             self._steps = None
         measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)
         if self._window is not None:
             self._window.show(self._positions())
-        reward = float(task.reward(state, action))
-        if not math.isfinite(reward):
-            raise ValueError(f"{type(task).__name__}.reward() returned {reward}")
+        reward: Any = task.reward(state, action)
+        if type(reward) is not float or not math.isfinite(reward):
+            reward = task_checks.number(task, "reward", reward)
         seen = self._read(task.observe(measured))
         if self._aimed:
             seen = self._with_goals(seen, measured)
-        return seen, reward, terminated, truncated, task.info(state)
+        info: Any = task.info(state)
+        if type(info) is not dict:
+            info = task_checks.told(task, info)
+        return seen, reward, terminated, truncated, info
 
     def _act(self, commands: Commands) -> WorldState:
         """The state after a control period; it tells commands as they were sent, whatever arrived of them."""
@@ -289,13 +313,10 @@ class RobotEnv(gymnasium.Env[Any, Any]):
 
     def _with_goals(self, seen: Any, state: WorldState) -> dict[str, Any]:
         """An observation beside the goal that the state achieves, and that of the episode."""
-        desired = self.task.desired  # type: ignore[attr-defined]  # of a GoalTask
-        achieved = self.task.achieved(state)  # type: ignore[attr-defined]
-        return {
-            "observation": seen,
-            "achieved_goal": np.asarray(achieved, desired.dtype),
-            "desired_goal": desired.copy(),
-        }
+        task: Any = self.task  # a GoalTask
+        desired = task.desired
+        achieved = task_checks.goal(task, "achieved", task.achieved(state), desired)
+        return {"observation": seen, "achieved_goal": achieved, "desired_goal": desired.copy()}
 
     def _positions(self) -> dict[str, float]:
         """Of the joints [rad, m], of the first robot, by plain name."""
@@ -364,9 +385,3 @@ def _known_mode(mode: str | None, has_window: bool) -> str | None:
         names = " or ".join(f'"{name}"' for name in known)
         raise ValueError(f"render_mode is {names}, not {mode!r}")
     return mode
-
-
-def _goal_space(task: GoalTask, space: gymnasium.Space[Any]) -> gymnasium.Space[Any]:
-    return gymnasium.spaces.Dict(
-        {"observation": space, "achieved_goal": task.goals(), "desired_goal": task.goals()}
-    )

@@ -12,6 +12,7 @@ from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.task import Task
+from robot_envs.task_checks import short
 
 ENTRY_POINT = "robot_envs.making:make_environment"
 OWN = ("robot", "task")  # of RobotEnv's options, that have another form here
@@ -62,25 +63,39 @@ def make_environment(robot: str, task: str, backend: str | None = None, **option
         ValueError: if an option makes no sense.
     """
     make_task = named(task)
+    if not callable(make_task):
+        raise RobotEnvError(f"{task} is {short(make_task)}, which is no class of robot_envs.Task")
     known = option_names(RobotEnv)
     own = {name: value for name, value in options.items() if name in known}
     others = {name: value for name, value in options.items() if name not in known}
     check_options(others, option_names(make_task))
     made = make_task(**others)
     if not isinstance(made, Task):
-        raise RobotEnvError(f"{task} makes {made!r}, which is no robot_envs.Task")
+        raise RobotEnvError(f"{task} makes {short(made)}, which is no robot_envs.Task")
     return RobotEnv(_robots(robot), made, backend, **own)
 
 
 def _robots(name: str) -> Any:
     found = named(name)
-    robots = found() if callable(found) else found
+    robots = found() if _takes_nothing(found) else found
     listed = [robots] if isinstance(robots, Robot) else robots
     if not isinstance(listed, (list, tuple)) or not all(isinstance(each, Robot) for each in listed):
         raise RobotEnvError(
-            f"{name} is {robots!r}, which is no robot_envs.Robot, nor a list of them"
+            f"{name} is {short(robots)}, which is no robot_envs.Robot, nor a list of them, nor a "
+            "function without arguments that makes them"
         )
     return robots
+
+
+def _takes_nothing(found: Any) -> bool:
+    """Whether it is a function to be called without arguments."""
+    if not callable(found):
+        return False
+    try:
+        inspect.signature(found).bind()
+    except TypeError:
+        return False
+    return True
 
 
 def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
@@ -96,10 +111,8 @@ def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
     names = [*option_names(RobotEnv), *known]
     for name in given:
         if name not in names:
-            raise RobotEnvError(
-                f"this environment has no option '{name}'{did_you_mean(name, names)}; there are "
-                f"{', '.join(names)}"
-            )
+            near = did_you_mean(name, names) or f"; there are {', '.join(names)}"
+            raise RobotEnvError(f"this environment has no option '{name}'{near}")
 
 
 def option_names(make: Callable[..., Any]) -> list[str]:

@@ -90,26 +90,21 @@ class Scene:
         """Commands as plain numbers.
 
         Raises:
-            ValueError: for a controller that isn't commanded, another number of numbers, or one that
+            TaskError: for a controller that isn't commanded, another number of numbers, or one that
                 isn't finite.
         """
         found: dict[str, float | tuple[float, ...]] = {}
-        for name, value in given.items():
+        try:
+            items = given.items()
+        except AttributeError:
+            raise TaskError(
+                f"commands are told by controller, {{{next(iter(self.ports), '')!r}: ...}}, not {given!r}"
+            ) from None
+        for name, value in items:
             if type(value) is float and name in self._singles and math.isfinite(value):
                 found[name] = value  # nearly always
-                continue
-            port = self._port(name)
-            if port.single:
-                number = found[name] = float(value)  # type: ignore[arg-type]
-                fits = math.isfinite(number)
             else:
-                numbers = found[name] = tuple(map(float, value))  # type: ignore[arg-type]
-                fits = len(numbers) == len(port.joints) and all(map(math.isfinite, numbers))
-            if not fits:
-                wanted = (
-                    "one finite number" if port.single else f"{len(port.joints)} finite numbers"
-                )
-                raise ValueError(f"the command of '{name}' must be {wanted}, not {value}")
+                found[name] = _command(self._port(name), name, value)
         return found
 
     @cached_property
@@ -123,7 +118,7 @@ class Scene:
             near = (
                 did_you_mean(name, self.ports) or f"; there are {', '.join(self.ports) or 'none'}"
             )
-            raise ValueError(f"no controller '{name}' takes commands{near}")
+            raise TaskError(f"no controller '{name}' takes commands{near}")
         return found[1]
 
     def placed_joints(self, initial: InitialState) -> Placed:
@@ -159,6 +154,22 @@ class Scene:
     def stand(self, initial: InitialState, robot: Robot) -> Pose:
         """Where a robot's model is when an episode begins."""
         return self.placed_models(initial).get(robot.model, Motion(robot.pose)).pose
+
+
+def _command(port: CommandPort, name: str, value: Any) -> float | tuple[float, ...]:
+    """A command in plain numbers."""
+    try:
+        numbers = (float(value),) if port.single else tuple(map(float, value))
+    except (TypeError, ValueError):
+        numbers = ()
+    if len(numbers) != len(port.joints) or not all(map(math.isfinite, numbers)):
+        wanted = (
+            "one finite number"
+            if port.single
+            else f"{len(port.joints)} finite numbers, for {', '.join(port.joints)}"
+        )
+        raise TaskError(f"the command of '{name}' must be {wanted}, not {value!r}")
+    return numbers[0] if port.single else numbers
 
 
 def _place(name: str, given: Any) -> tuple[float, float]:

@@ -8,6 +8,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from robot_envs.errors import TaskError
+
 FEW = 64  # numbers that are checked faster one by one
 
 
@@ -59,7 +61,7 @@ def _box_reader(space: gymnasium.spaces.Box) -> Callable[[Any], np.ndarray]:
 
 
 def observation_reader(space: gymnasium.Space[Any], task: str) -> Callable[[Any], Any]:
-    """Returns what makes an observation of what a task returns; it raises ValueError where that can't be.
+    """Returns what makes an observation of what a task returns; it raises TaskError where that can't be.
 
     Numbers beyond the space's bounds are let through, as Gymnasium does.
 
@@ -72,7 +74,7 @@ def observation_reader(space: gymnasium.Space[Any], task: str) -> Callable[[Any]
 
     def read(observed: Any) -> Any:
         if not space.contains(observed):
-            raise ValueError(f"{task}.observe() returned what isn't of {space}: {observed!r}")
+            raise TaskError(f"{task}.observe() returned what isn't of {space}: {observed!r}")
         return observed
 
     return read
@@ -82,15 +84,20 @@ def _numbers_reader(space: gymnasium.spaces.Box, task: str) -> Callable[[Any], n
     shape, dtype, few = space.shape, space.dtype, len(space.shape) == 1 and space.shape[0] <= FEW
 
     def read(observed: Any) -> np.ndarray:
-        array = np.asarray(observed, dtype)
+        try:
+            array = np.asarray(observed, dtype)
+        except (TypeError, ValueError) as error:  # no numbers
+            raise TaskError(
+                f"{task}.observe() returned {observed!r}, which isn't of {space}"
+            ) from error
         if array.shape != shape:
-            raise ValueError(
+            raise TaskError(
                 f"{task}.observe() returned the shape {array.shape}; its observation_space has {shape}"
             )
         if few and math.isfinite(sum(array.tolist())):  # which is quicker, for few numbers
             return array
         if not np.isfinite(array).all():
-            raise ValueError(f"{task}.observe() returned numbers that aren't finite: {array}")
+            raise TaskError(f"{task}.observe() returned numbers that aren't finite: {array}")
         return array
 
     return read

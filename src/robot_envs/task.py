@@ -127,8 +127,12 @@ class GoalTask(Task):
 
     def reward(self, state: WorldState, action: Any) -> float:
         """`compute_reward` of what the state achieves."""
-        return float(self.compute_reward(self.achieved(state), self.desired, {}))
+        return float(self.compute_reward(self._reached(state), self.desired, {}))
 
     def info(self, state: WorldState) -> dict[str, Any]:
         """Tells `is_success`."""
-        return {"is_success": bool(self.is_success(self.achieved(state), self.desired))}
+        return {"is_success": bool(self.is_success(self._reached(state), self.desired))}
+
+    def _reached(self, state: WorldState) -> np.ndarray:
+        """As the observation tells it, so that a reward that is computed of it is the same."""
+        return np.asarray(self.achieved(state), self.desired.dtype)

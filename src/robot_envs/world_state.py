@@ -66,10 +66,11 @@ class _Entries(dict[str, Entry]):
 
     __slots__ = ()
     what: ClassVar[str]
+    hint: ClassVar[str] = ""
 
     def __missing__(self, name: str) -> Entry:
         near = did_you_mean(name, self) or f"; there are: {', '.join(self) or 'none'}"
-        raise UnknownEntry(f"the state has no {self.what} '{name}'{near}")
+        raise UnknownEntry(f"the state has no {self.what} '{name}'{near}{self.hint}")
 
 
 class Joints(_Entries[JointState]):
@@ -83,14 +84,14 @@ class Links(_Entries[Motion]):
     """Links by the names that a query has for them."""
 
     __slots__ = ()
-    what = "link, as the task's query names those to tell,"
+    what, hint = "link", "; the task's query names those that it tells"
 
 
 class Models(_Entries[Motion]):
     """Models by name."""
 
     __slots__ = ()
-    what = "model, as the task's query names those to tell,"
+    what, hint = "model", "; the task's query names those that it tells"
 
 
 class WorldState(NamedTuple):

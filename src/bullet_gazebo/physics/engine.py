@@ -158,6 +158,13 @@ class Engine(ABC):
     def step(self) -> None:
         """Integrates the world by one time step."""
 
+    def forget_contacts(self) -> None:
+        """Takes bodies for never having touched: the next step goes by where they are, not by where they were.
+
+        To be called when an episode begins, before bodies are placed. An engine that remembers nothing of
+        contacts from one step to the next has nothing to do.
+        """
+
     @abstractmethod
     def contacts(self) -> list[Contact]:
         """Returns where bodies touched in the last step."""

@@ -161,6 +161,7 @@ class World:
 
     def reset(self, joints: bool) -> None:
         """Returns every model to where it was spawned, at rest; with `joints`, every joint to zero."""
+        self.engine.forget_contacts()
         for model in self.models.values():
             model.reset(joints)
 

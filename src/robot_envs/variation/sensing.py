@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from robot_envs.variation.numbers import at_least_zero, by_name, is_number, steps
-from robot_envs.world_state import JointState, WorldState
+from robot_envs.world_state import Joints, JointState, WorldState
 
 Noise = float | tuple[float, float] | Mapping[str, Any]
 MOST_DELAY: Final = 1000  # [control steps]
@@ -94,7 +94,7 @@ class Sensor:
     def _distorted(self, state: WorldState, rng: np.random.Generator) -> WorldState:
         count = 2 * len(self._encoders) if self._is_noisy else 0
         errors = iter(rng.standard_normal(count).tolist())
-        joints = dict(state.joints)
+        joints = Joints(state.joints)
         for name, encoder in self._encoders.items():
             error, rate_error = (next(errors), next(errors)) if count else (0.0, 0.0)
             position, velocity, effort = joints[name]

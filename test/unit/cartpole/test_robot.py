@@ -15,7 +15,7 @@ from cartpole.tasks import CartPoleState
 from cartpole.variation import CartPoleVariation, Randomisation
 from robot_envs import files
 from robot_envs.backends.in_process import InProcessWorld
-from robot_envs.errors import RobotEnvError, SimulatorError
+from robot_envs.errors import RobotEnvError, TaskError
 from robot_envs.files import own_file
 from robot_envs.scene import Scene
 
@@ -149,7 +149,7 @@ def test_draws_fill_their_ranges():
 
 
 def test_a_state_that_is_not_a_number_is_an_error_and_can_be_reset(backend):
-    with pytest.raises(SimulatorError, match="isn't finite"):
+    with pytest.raises(TaskError, match="'cart_pole' is a finite position"):
         backend.reset(UPRIGHT._replace(pole_angle=math.nan))
     assert run(backend) == run(cartpole())
 

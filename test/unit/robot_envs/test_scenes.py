@@ -201,6 +201,14 @@ def test_the_same_seed_gives_the_same_bits_whatever_was_before(make, name, engin
     assert not same(expected, rollout(other, 130, seed=6))
 
 
+def test_the_next_episode_touches_the_ground_as_the_first_one_did(make):
+    """A rover that begins on the ground; Bullet remembers where things touched."""
+    env = make("rover")
+    runs = [rollout(env, steps, seed=3) for steps in (4, 4, 40, 4)]
+    assert same(runs[0], runs[1])
+    assert same(runs[0], runs[3])
+
+
 def test_worlds_of_one_process_know_nothing_of_each_other(make):
     alone = [
         rollout(make(name), 40, seed) for name, seed in (("arms", 1), ("rover", 2), ("arms", 3))

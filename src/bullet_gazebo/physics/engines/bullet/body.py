@@ -14,6 +14,8 @@ from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, subtract
 
 BASE = -1
+# Which links collide, as PyBullet has it where nothing else was said: bits of groups, and of those seen.
+DYNAMIC, STATIC, EVERYTHING = 1, 2, -1
 NO_STOP = 1e16  # [rad, m]
 
 
@@ -70,6 +72,14 @@ class BulletBody(Body):
         self._base = pose.compose(self._com)  # where the centre of mass was put last
         if not is_plane(description):
             self.reset_base(pose)
+
+    def forget_contacts(self) -> None:
+        """PyBullet keeps the points at which bodies touched, while they are near, and what forces were
+        there, whatever places the bodies anew. A link that is told its collision filter loses them."""
+        for index in self._links.values():
+            fixed = self._fixed and index == BASE
+            group, mask = (STATIC, EVERYTHING ^ STATIC) if fixed else (DYNAMIC, EVERYTHING)
+            pybullet.setCollisionFilterGroupMask(self.id, index, group, mask, self._client)
 
     def _engine_joints(self) -> list[str]:
         """Names of the joints, in the engine's order."""

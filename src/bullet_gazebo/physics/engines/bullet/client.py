@@ -143,6 +143,11 @@ class BulletClient:
         """See `Engine.contacts`."""
         return contacts(self._client, self._sides)
 
+    def forget_contacts(self) -> None:
+        """See `Engine.forget_contacts`."""
+        for body in self._bodies.values():
+            body.forget_contacts()
+
     def _hold_up(self) -> None:
         """PyBullet's gravity acts on everything: a weightless link is held by a force against it."""
         for body, link in self._weightless:

@@ -57,6 +57,9 @@ class BulletEngine(Engine):
     def step(self) -> None:
         self._client.step()
 
+    def forget_contacts(self) -> None:
+        self._client.forget_contacts()
+
     def contacts(self) -> list[Contact]:
         return self._client.contacts()
 

@@ -1,0 +1,167 @@
+"""Checks of single episodes: what they give, how they begin and end, and what is refused."""
+
+from functools import partial
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from robot_envs.testing.rollouts import differences, numbers, outside, rollout, same
+from robot_envs.testing.subject import Subject, expect, expect_error
+from robot_envs.world_state import InitialState
+
+TRIES = 20  # episodes, to find one that doesn't end by itself
+
+
+def observations(subject: Subject) -> None:
+    """Observations are finite and lie in their space; reward and flags are plain Python."""
+    with subject.made() as env:
+        for at, given in enumerate(rollout(env, subject.steps, seed=1)):
+            seen = given[0]
+            wrong = outside(env.observation_space, seen)
+            expect(
+                not wrong, f"observation {at} of a rollout isn't in the observation space: {wrong}"
+            )
+            for array in numbers(seen):
+                finite = array.dtype.kind != "f" or np.isfinite(array).all()
+                expect(bool(finite), f"observation {at} of a rollout isn't finite: {seen!r}")
+            expect(type(given[-1]) is dict, f"an info is {given[-1]!r}, and no dict")
+            if len(given) == 5:
+                kinds = [type(each) for each in given[1:4]]
+                told = ", ".join(kind.__name__ for kind in kinds)
+                expect(
+                    kinds == [float, bool, bool],
+                    f"reward, terminated and truncated are {told}, and not float, bool, bool",
+                )
+
+
+def observations_are_new(subject: Subject) -> None:
+    """What was observed doesn't change behind the learner's back."""
+    with subject.made() as env:
+        env.action_space.seed(2)
+        first, _ = env.reset(seed=2)
+        kept = [array.copy() for array in numbers(first)]
+        env.step(env.action_space.sample())
+        expect(
+            same(kept, list(numbers(first))),
+            "an observation has changed with the next step; observe() must make a new array each time",
+        )
+
+
+def ends(subject: Subject) -> None:
+    """An episode is cut off after `max_steps`, which isn't its own end; behind an end there is no step."""
+    with subject.made(max_steps=1) as env:
+        action = env.action_space.sample()
+        cut = False
+        for seed in range(TRIES):
+            env.reset(seed=seed)
+            _, _, terminated, truncated, _ = env.step(action)
+            expect(
+                terminated or truncated,
+                "an episode with max_steps=1 goes on after its first step",
+            )
+            expect(not (terminated and truncated), "an episode is terminated and truncated at once")
+            cut = cut or truncated
+            behind = "step() behind an episode's end"
+            expect_error(lambda: env.step(action), behind, gymnasium.error.ResetNeeded)
+        expect(cut, f"{TRIES} episodes of random seeds all terminate with their first step")
+
+
+def beginnings(subject: Subject) -> None:
+    """No step before a reset; and the options of a reset do what they say."""
+    with subject.made() as env:
+        action = env.action_space.sample()
+        first = "step() before the first reset()"
+        expect_error(lambda: env.step(action), first, gymnasium.error.ResetNeeded)
+        unknown = {"no_such_option": 1}
+        told = "reset() with an option that doesn't exist"
+        expect_error(lambda: env.reset(options=unknown), told, ValueError)
+        begin = {"initial_state": InitialState()}
+        states = []
+        for seed in (0, 0):
+            env.reset(seed=seed, options=begin)
+            states.append(env.state.joints if env.state else {})
+        expect(
+            states[0] == states[1],
+            f"reset() to the same initial_state gives joints {states[0]} and {states[1]}",
+        )
+
+
+def wrong_actions(subject: Subject) -> None:
+    """An action that isn't of the space is refused, and moves nothing."""
+    with subject.made() as env:
+        env.action_space.seed(3)
+        actions = [env.action_space.sample() for _ in range(4)]
+        undisturbed = _given(env, actions, [])
+        disturbed = _given(env, actions, _wrong(env.action_space))
+        if env.backend.deterministic:
+            told = differences(undisturbed, disturbed)
+            expect(not told, f"a refused action has moved something: {told}")
+
+
+def _given(env: Any, actions: list[Any], wrong: list[Any]) -> list[tuple[Any, ...]]:
+    given = [env.reset(seed=3)]
+    for action in actions:
+        if given[-1][2:4] not in ((), (False, False)):
+            break
+        for each in wrong:
+            expect_error(partial(env.step, each), f"step() with the action {each!r}", ValueError)
+        given.append(env.step(action))
+    return given
+
+
+def _wrong(space: gymnasium.Space[Any]) -> list[Any]:
+    """Actions that aren't of a space."""
+    wrong: list[Any] = [None, "1", float("nan")]
+    if isinstance(space, gymnasium.spaces.Discrete):
+        return [*wrong, int(space.start) - 1, int(space.start + space.n), np.zeros(2)]
+    if isinstance(space, gymnasium.spaces.Box):
+        wrong += [np.zeros((*space.shape, 2)), np.full(space.shape, np.nan, space.dtype)]
+        above = np.asarray(space.high, np.float64) + 1.0
+        wrong += [above] if np.isfinite(above).all() else []
+    return wrong
+
+
+def closed(subject: Subject) -> None:
+    """A closed environment says so, and may be closed again."""
+    with subject.made() as env:
+        env.reset(seed=1)
+        action = env.action_space.sample()
+        env.close()
+        env.close()
+        for name, call in (("reset", env.reset), ("step", lambda: env.step(action))):
+            told = f"{name}() behind close()"
+            expect_error(call, told, gymnasium.error.ClosedEnvironmentError)
+
+
+def wrong_options(subject: Subject) -> None:
+    """An option that doesn't exist, and a control period of broken physics steps, are refused."""
+    for options in ({"no_such_option": 1}, {"control_period": 0.00123}):
+
+        def make(options: dict[str, Any] = options) -> None:
+            with subject.made(**options):
+                pass
+
+        kinds = (ValueError, TypeError, gymnasium.error.Error)
+        expect_error(make, f"making it with the options {options}", *kinds)
+
+
+def pictures(subject: Subject) -> None:
+    """Pictures have the size that was asked for, and change as the robot moves."""
+    with subject.made(render_mode="rgb_array", width=96, height=64) as env:
+        env.action_space.seed(4)
+        env.reset(seed=4)
+        first = env.render()
+        expect(
+            isinstance(first, np.ndarray)
+            and first.shape == (64, 96, 3)
+            and first.dtype == np.uint8,
+            "render() with width 96 and height 64 gives no array of uint8 of the shape (64, 96, 3)",
+        )
+        for _ in range(subject.steps):
+            _, _, terminated, truncated, _ = env.step(env.action_space.sample())
+            if terminated or truncated:
+                env.reset()
+            if not same(env.render(), first):
+                return
+        raise AssertionError(f"pictures of {subject.steps} steps are all the same")

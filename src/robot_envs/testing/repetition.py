@@ -1,0 +1,149 @@
+"""Checks that what an environment gives can be had again: by seed, elsewhere, and beside others."""
+
+import copy
+import pickle
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import SyncVectorEnv, VectorEnv
+
+from robot_envs.testing.rollouts import differences, rollout, same
+from robot_envs.testing.subject import Subject, expect
+
+WORLDS, SEED = 3, 11
+
+
+def seeding(subject: Subject) -> None:
+    """The same seed and actions give the same bits: again, after other episodes, and in another instance."""
+    with subject.made() as env:
+        if not env.backend.deterministic:
+            expect(
+                env.spec is None or env.spec.nondeterministic,
+                "it never gives the same bits again, and spec.nondeterministic doesn't say so",
+            )
+            return
+        first = rollout(env, subject.steps, SEED)
+        told = differences(first, rollout(env, subject.steps, SEED))
+        expect(not told, f"the same seed and actions give other bits the second time: {told}")
+        rollout(env, 7, SEED + 1)
+        told = differences(first, rollout(env, subject.steps, SEED))
+        expect(not told, f"the same seed and actions give other bits after other episodes: {told}")
+    with subject.made() as other:
+        told = differences(first, rollout(other, subject.steps, SEED))
+        expect(not told, f"the same seed and actions give other bits in another instance: {told}")
+
+
+def backends(subject: Subject, other: Subject) -> None:
+    """Two backends give the same bits."""
+    runs = []
+    for each in (subject, other):
+        with each.made() as env:
+            runs.append(rollout(env, subject.steps, SEED))
+    told = differences(*runs)
+    expect(not told, f"{subject.backend} and {other.backend} give other bits: {told}")
+
+
+def specification(subject: Subject) -> None:
+    """What it was made of can be copied, sent to other processes, and made again."""
+    if subject.identifier is None:
+        return
+    with subject.made() as env:
+        first, _ = env.reset(seed=SEED)
+        deterministic = env.backend.deterministic
+        try:
+            spec = pickle.loads(pickle.dumps(copy.deepcopy(env.spec)))
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise AssertionError(f"its spec can't be copied and sent: {error}") from error
+    again = gymnasium.make(spec)
+    second, _ = again.reset(seed=SEED)
+    again.close()
+    expect(
+        same(first, second) or not deterministic,
+        f"made again from its spec it begins with {second!r}, and not with {first!r}",
+    )
+
+
+def vectors(subject: Subject) -> None:
+    """Several in a vector give what each gives alone."""
+    alone = []
+    for index in range(WORLDS):
+        with subject.made() as env:
+            alone.append(_run(env, index, subject.steps))
+    for vector, kind in _vectors(subject):
+        try:
+            together = _run_all(vector, subject.steps)
+        finally:
+            vector.close()
+        for index, (mine, theirs) in enumerate(zip(alone, together, strict=True)):
+            for step, (one, other) in enumerate(zip(mine, theirs, strict=True)):
+                expect(
+                    same(one, other),
+                    f"environment {index} of {WORLDS} in a vector ({kind}) gives after {step} steps "
+                    f"{other!r}, and alone {one!r}",
+                )
+
+
+def _vectors(subject: Subject) -> list[tuple[VectorEnv, str]]:
+    options = subject.options
+    if subject.identifier is None:
+
+        def one() -> gymnasium.Env[Any, Any]:
+            return subject.make(**options)
+
+        return [(SyncVectorEnv([one] * WORLDS), "SyncVectorEnv")]
+    kinds = ["sync"]
+    if gymnasium.spec(subject.identifier).vector_entry_point is not None:
+        kinds.append("vector_entry_point")
+    return [
+        (
+            gymnasium.make_vec(
+                subject.identifier, num_envs=WORLDS, vectorization_mode=kind, **options
+            ),
+            f"make_vec, {kind}",
+        )
+        for kind in kinds
+    ]
+
+
+def _run(env: gymnasium.Env[Any, Any], index: int, steps: int) -> list[Any]:
+    """Observations and results of one alone; the step behind an end begins anew, as in a vector."""
+    env.action_space.seed(SEED)
+    given: list[Any] = [env.reset(seed=SEED + index)[0]]
+    ended = False
+    for _ in range(steps):
+        action = [env.action_space.sample() for _ in range(WORLDS)][index]
+        if ended:
+            given.append((env.reset()[0], 0.0, False, False))
+        else:
+            observation, reward, *flags, _ = env.step(action)
+            given.append((observation, float(reward), *flags))
+        ended = any(given[-1][2:])
+    return given
+
+
+def _run_all(vector: VectorEnv, steps: int) -> list[list[Any]]:
+    """The same of all in a vector."""
+    space = vector.single_action_space
+    space.seed(SEED)
+    seen, _ = vector.reset(seed=SEED)
+    given: list[list[Any]] = [[_row(seen, index)] for index in range(WORLDS)]
+    for _ in range(steps):
+        actions = np.stack([space.sample() for _ in range(WORLDS)])
+        seen, rewards, terminated, truncated, _ = vector.step(actions)
+        for index in range(WORLDS):
+            given[index].append(
+                (
+                    _row(seen, index),
+                    float(rewards[index]),
+                    bool(terminated[index]),
+                    bool(truncated[index]),
+                )
+            )
+    return given
+
+
+def _row(seen: Any, index: int) -> Any:
+    if isinstance(seen, dict):
+        return {key: _row(part, index) for key, part in seen.items()}
+    return seen[index].copy()

@@ -1,0 +1,102 @@
+"""What environments give, and where two of them differ."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+Given = list[tuple[Any, ...]]
+"""What `reset` and `step` have returned, one after the other."""
+
+PARTS = {
+    2: ("the observation", "the info"),
+    5: ("the observation", "the reward", "terminated", "truncated", "the info"),
+}
+
+
+def rollout(env: gymnasium.Env[Any, Any], steps: int, seed: int) -> Given:
+    """All that an environment gives for seeded random actions; episodes follow one another.
+
+    Args:
+        env: the environment.
+        steps: number of actions.
+        seed: of the first episode, and of the actions.
+    """
+    env.action_space.seed(seed)
+    given: Given = [env.reset(seed=seed)]
+    for _ in range(steps):
+        given.append(env.step(env.action_space.sample()))
+        if given[-1][2] or given[-1][3]:
+            given.append(env.reset())
+    return given
+
+
+def differences(one: Given, other: Given) -> str:
+    """Where the bits of two rollouts differ first, in words; empty: nowhere."""
+    for at, (first, second) in enumerate(zip(one, other, strict=False)):
+        steps = sum(len(each) == 5 for each in one[: at + 1])
+        when = f"step {steps}" if len(first) == 5 else f"the reset after {steps} steps"
+        if len(first) != len(second):
+            return f"{when}: an episode has ended in one of them only"
+        for part, mine, theirs in zip(PARTS[len(first)], first, second, strict=True):
+            if not same(mine, theirs):
+                return f"{when}: {part} is {mine!r} and {theirs!r}"
+    return "" if len(one) == len(other) else "one of them is longer"
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two things have the same bits: arrays, numbers, and containers of them."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        fits = one.dtype == other.dtype and one.shape == other.shape
+        return fits and (
+            one.tolist() == other.tolist() if one.dtype == object else _bits(one, other)
+        )
+    if isinstance(one, Mapping):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, Sequence) and not isinstance(one, (str, bytes)):
+        return len(one) == len(other) and all(map(same, one, other))
+    return bool(one == other) or (isinstance(one, float) and math.isnan(one) and math.isnan(other))
+
+
+def _bits(one: np.ndarray, other: np.ndarray) -> bool:
+    return one.tobytes() == other.tobytes()
+
+
+def outside(space: gymnasium.Space[Any], value: Any) -> str:
+    """Why a value isn't of a space, in words; empty: it is."""
+    if space.contains(value):
+        return ""
+    if isinstance(space, gymnasium.spaces.Dict) and isinstance(value, Mapping):
+        return _outside_parts(space, value)
+    if not isinstance(space, gymnasium.spaces.Box) or not isinstance(value, np.ndarray):
+        return f"{value!r} isn't of {space}"
+    if value.shape != space.shape:
+        return f"its shape is {value.shape}, and that of the space {space.shape}"
+    if not np.can_cast(value.dtype, space.dtype):
+        return f"it is of {value.dtype}, and the space of {space.dtype}"
+    wrong = ~((space.low <= value) & (value <= space.high))
+    place = tuple(np.argwhere(wrong)[0].tolist())
+    low, high = space.low[place], space.high[place]
+    return f"entry {place[0] if len(place) == 1 else place} is {value[place]}, and not in [{low}, {high}]"
+
+
+def _outside_parts(space: gymnasium.spaces.Dict, value: Mapping[str, Any]) -> str:
+    if value.keys() != space.keys():
+        return f"it has {', '.join(value)}, and the space {', '.join(space.keys())}"
+    found = ((key, outside(part, value[key])) for key, part in space.items())
+    return next(f"{key}: {why}" for key, why in found if why)
+
+
+def numbers(value: Any) -> Iterator[np.ndarray]:
+    """All arrays in a value."""
+    if isinstance(value, Mapping):
+        value = list(value.values())
+    if isinstance(value, (list, tuple)):
+        for each in value:
+            yield from numbers(each)
+    elif isinstance(value, (np.ndarray, np.generic, float, int)):
+        yield np.asarray(value)

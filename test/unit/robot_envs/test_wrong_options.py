@@ -1,0 +1,101 @@
+"""What a user can get wrong in options, actions and names: one line says what to mend."""
+
+import math
+
+import numpy as np
+import pytest
+from scenes.solo_arm import NOTHING, SOLO, Hold, Reach, episode, is_a_line
+
+from robot_envs import InitialState, Robot, RobotEnv, RobotEnvError
+from robot_envs.making import make_environment
+
+NAN = math.nan
+OPTIONS = {
+    "a backend that doesn't exist": (
+        {"backend": "rose"},
+        "there is no backend 'rose'; did you mean 'ros'",
+    ),
+    "a period that is no multiple": (
+        {"control_period": 0.0085},
+        "control period 0.0085 s is no multiple of",
+    ),
+    "a period that is no number": (
+        {"control_period": "slow"},
+        r"control_period is a number \[s\], not 'slow'",
+    ),
+    "no steps": (
+        {"max_steps": "many"},
+        "max_steps must be at least 1, and a whole number, not 'many'",
+    ),
+    "a render mode that doesn't exist": (
+        {"render_mode": "rgb"},
+        "render_mode is \"rgb_array\", not 'rgb'",
+    ),
+    "pictures of no size": ({"width": 0}, "width and height lie in"),
+    "an action out of its space": (
+        {"action": np.array([0.0, 2.0])},
+        r"an action is of Box\(-1.0, 1.0, \(2,\)",
+    ),
+    "an action that isn't finite": ({"action": np.array([0.0, NAN])}, "an action is of Box"),
+    "no action": ({"action": None}, "an action is of Box.*, not None"),
+    "a reset's unknown option": (
+        {"reset": {"initial_sate": InitialState()}},
+        "reset knows no option 'initial_sate'; did you mean 'initial_state'",
+    ),
+    "a reset's goal without goals": (
+        {"reset": {"goal": [0.0]}},
+        "Hold has no goal; only a GoalTask does",
+    ),
+    "a reset to nowhere": (
+        {"reset": {"initial_state": {"elbow": 0.3}}},
+        "initial_state is an InitialState, not",
+    ),
+    "a reset to a goal that can't be reached": (
+        {"task": Reach(), "reset": {"goal": [0.0, 3.0]}},
+        r"the goal \[0.0, 3.0\] isn't one of Reach's goals",
+    ),
+    "a class for a robot": ({"robot": Robot}, r"a robot is a Robot\(...\), not"),
+}
+
+
+@pytest.mark.parametrize("case", OPTIONS)
+def test_an_option_or_action_that_cannot_be(case):
+    options, text = OPTIONS[case]
+    with pytest.raises((RobotEnvError, ValueError), match=text) as error:
+        episode(**options)
+    assert is_a_line(error.value)
+
+
+def test_a_refused_action_moves_nothing():
+    env = RobotEnv(SOLO, Hold())
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="an action is"):
+        env.step(np.array([0.0, 2.0]))
+    after = env.step(NOTHING)[0]
+    env.reset(seed=0)
+    assert np.array_equal(after, env.step(NOTHING)[0])
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("robot", "task", "text"),
+    [
+        ("scenes.solo_arm", "Hold", "'scenes.solo_arm' must be written as module:attribute"),
+        ("scenes.solo_am:SOLO", "Hold", "no module 'scenes.solo_am'"),
+        ("scenes.solo_arm:SOLE", "Hold", "has no 'SOLE'; did you mean 'SOLO'"),
+        ("scenes.solo_arm:arm", "Hold", "is <function arm at .*no robot_envs.Robot, nor a list"),
+        ("scenes.solo_arm:SOLO", "Hol", "has no 'Hol'; did you mean 'Hold'"),
+        ("scenes.solo_arm:SOLO", "SOLO", "which is no class of robot_envs.Task"),
+    ],
+)
+def test_names_of_what_an_id_is_made_of(robot, task, text):
+    with pytest.raises(RobotEnvError, match=text) as error:
+        make_environment(robot, f"scenes.solo_arm:{task}")
+    assert is_a_line(error.value)
+
+
+def test_an_option_that_nobody_knows():
+    with pytest.raises(
+        RobotEnvError, match="no option 'sensor_noize'; did you mean 'sensor_noise'"
+    ):
+        make_environment("scenes.solo_arm:SOLO", "scenes.solo_arm:Hold", sensor_noize=1)

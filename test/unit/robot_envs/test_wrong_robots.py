@@ -1,0 +1,167 @@
+"""What a user can get wrong in a robot's description: one line says what to mend."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from scenes.solo_arm import SOLO, episode, is_a_line
+from scenes.two_arms import LEFT_CONTROLLERS
+
+from robot_envs import Pose, RobotEnvError
+
+XACRO = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">${nothing}</robot>'
+GROUP = LEFT_CONTROLLERS["pair"]
+
+
+def with_pair(**changes):
+    return {**LEFT_CONTROLLERS, "pair": {**GROUP, **changes}}
+
+
+ELBOW = {"type": "position_controllers/JointPositionController", "joint": "elbow"}
+ROBOTS = {
+    "no transmissions": (
+        {"urdf": SOLO.xml.replace("transmission", "nothing")},
+        "the robot 'arm': its URDF has no <transmission>: each joint that is to be",
+    ),
+    "a transmission of no joint": (
+        {"urdf": SOLO.xml.replace('<joint name="elbow"><hard', '<joint name="elbo"><hard')},
+        "transmission of joint 'elbo': no such joint",
+    ),
+    "a controller that isn't described": (
+        {"run": ("pear",)},
+        "there is no controller 'pear' among its parameters; did you mean 'pair'",
+    ),
+    "a joint that doesn't exist": (
+        {"controllers": with_pair(joints=["elbo"])},
+        "controller 'pair': there is no joint 'elbo'; did you mean 'elbow'",
+    ),
+    "a joint without transmission": (
+        {"controllers": with_pair(joints=["thread"])},
+        "controller 'pair': joint 'thread' has no <transmission> in the URDF",
+    ),
+    "another interface": (
+        {"controllers": with_pair(type="effort_controllers/JointGroupEffortController")},
+        "the robot has no hardware_interface::EffortJointInterface",
+    ),
+    "a type that doesn't exist": (
+        {"controllers": with_pair(type="position_controllers/JointGroupPositionControler")},
+        "no type '.*Controler'; did you mean 'position_controllers/JointGroupPositionController'",
+    ),
+    "no type": (
+        {"controllers": {"pair": {"joints": ["elbow"]}}},
+        "'pair': its parameters have no type",
+    ),
+    "no parameters": ({"controllers": {"pair": 3}}, "'pair': its parameters have no type"),
+    "two controllers of one joint": (
+        {"run": ("pair", "one"), "controllers": {**LEFT_CONTROLLERS, "one": ELBOW}},
+        "'pair' and 'one' both claim joint 'elbow'",
+    ),
+    "a controller twice": ({"run": ("pair", "pair")}, "the controllers to run name 'pair' twice"),
+    "a name for names": ({"run": "pair"}, r"run lists names: \('pair',\) and not 'pair'"),
+    "another name for names": ({"commanded": "pair"}, r"commanded lists names: \('pair',\)"),
+    "a command to what doesn't run": (
+        {"commanded": ("pear",)},
+        "'pear' is commanded, but not among the controllers that run; did you mean 'pair'",
+    ),
+    "gains that are none": (
+        {
+            "controllers": {
+                **LEFT_CONTROLLERS,
+                "gazebo_ros_control": {"pid_gains": {"elbow": {"p": "x"}}},
+            }
+        },
+        "gazebo_ros_control/pid_gains/elbow/p is 'x'",
+    ),
+    "a place that is none": (
+        {"pose": (0, 0, 1)},
+        r"its pose is a Pose\(\(x, y, z\)\), not \(0, 0, 1\)",
+    ),
+    "a place at infinity": ({"pose": Pose((math.inf, 0.0, 0.0))}, "its pose isn't finite"),
+    "no package": (
+        {"urdf": "package://my_rm/a.urdf"},
+        "there is no package 'my_rm' on ROS_PACKAGE_PATH",
+    ),
+    "no URDF": ({"urdf": None}, "a file is a path .* not None"),
+    "an empty URDF": ({"urdf": ""}, "a file is a path .* not ''"),
+    "no parameters at all": ({"controllers": None}, "a file is a path .* not None"),
+    "a broken text of parameters": (
+        {"controllers": "pair:\n  - ]"},
+        "the controllers' text: line 2",
+    ),
+    "a broken URDF": ({"urdf": "<robot"}, "not well-formed XML"),
+    "a broken world": ({"world": "<sdf><world"}, "world given as text: not well-formed XML"),
+    "an engine that doesn't exist": (
+        {"engine": "bulet"},
+        "no backend 'bulet'; did you mean 'bullet'",
+    ),
+    "a period that is no multiple": (
+        {"control_period": 0.0085},
+        "control period 0.0085 s is no multiple of the physics step 0.001 s",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+def test_a_robot_that_cannot_be(case):
+    changes, text = ROBOTS[case]
+    with pytest.raises((RobotEnvError, ValueError), match=text) as error:
+        episode(replace(SOLO, **changes))
+    assert is_a_line(error.value)
+
+
+def test_all_faults_of_a_robot_are_told_at_once():
+    robot = replace(SOLO, pose=Pose((math.nan, 0.0, 0.0)), run=("pear", "pair"))
+    with pytest.raises(RobotEnvError) as error:
+        robot.check()
+    assert [line[:20] for line in str(error.value).splitlines()] == [
+        "the robot 'arm': ",
+        "- its pose isn't fin",
+        "- there is no contro",
+    ]
+
+
+def test_gains_and_limits_of_joints_that_are_not_there_are_told_and_no_fault(caplog):
+    """As in ros_control: a file may be for several robots."""
+    strangers = {
+        "gazebo_ros_control": {"pid_gains": {"elbo": {"p": 1.0}}},
+        "joint_limits": {"sholder": {"has_effort_limits": True, "max_effort": 1.0}},
+    }
+    replace(SOLO, controllers={**LEFT_CONTROLLERS, **strangers}).check()
+    assert "no joint 'elbo', which pid_gains names; did you mean 'elbow'" in caplog.text
+    assert "no joint 'sholder', which joint_limits names; did you mean 'shoulder'" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "text"),
+    [
+        ("urdf", "arms.urdf", "there is no file .*arms.urdf; did you mean 'arm.urdf'"),
+        ("urdf", "urdf/arm.urdf", "there is no file .*urdf/arm.urdf: there is no folder .*urdf"),
+        ("urdf", "folder", "folder is a folder, and no file"),
+        ("urdf", "broken.urdf", "can't read .*broken.urdf: unclosed token: line 1"),
+        ("urdf", "broken.xacro", "can't read .*broken.xacro: name 'nothing' is not defined"),
+        ("controllers", "arm.yml", "there is no file .*arm.yml; did you mean 'arm.yaml'"),
+        ("controllers", "broken.yaml", "broken.yaml: line 1, column 6"),
+        ("controllers", "list.yaml", "list.yaml: that is no YAML of parameters"),
+        ("world", "hal.world", "there is no file .*hal.world; did you mean 'hall.world'"),
+    ],
+)
+def test_files_that_cannot_be_read(tmp_path, option, name, text):
+    for file, content in (
+        ("arm.urdf", SOLO.xml), ("broken.urdf", "<robot"), ("broken.xacro", XACRO),
+        ("arm.yaml", "a: 1"), ("broken.yaml", "a: [1"), ("list.yaml", "- 1"), ("hall.world", "<sdf/>"),
+    ):  # fmt: skip
+        (tmp_path / file).write_text(content)
+    (tmp_path / "folder").mkdir()
+    for given in (tmp_path / name, str(tmp_path / name)):
+        with pytest.raises(RobotEnvError, match=text) as error:
+            episode(replace(SOLO, **{option: given}))
+        assert is_a_line(error.value)
+
+
+def test_a_description_may_be_files_texts_and_mappings(tmp_path):
+    (tmp_path / "arm.urdf").write_text(SOLO.xml)
+    text = "pair:\n  type: position_controllers/JointGroupPositionController\n  joints: [elbow, shoulder]\n"
+    (tmp_path / "arm.yaml").write_text(text)
+    for urdf in (tmp_path / "arm.urdf", str(tmp_path / "arm.urdf"), lambda: tmp_path / "arm.urdf"):
+        for controllers in (tmp_path / "arm.yaml", str(tmp_path / "arm.yaml"), text):
+            episode(replace(SOLO, urdf=urdf, controllers=controllers))
