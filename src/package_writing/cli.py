@@ -17,7 +17,7 @@ EXIT_REFUSED = 1
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Writes a package as the command line says; returns the exit code."""
-    args = _parser().parse_args(argv)
+    args = _parser().parse_intermixed_args(argv)  # arguments may follow options
     try:
         parent = package.PARENT if args.to is None else args.to.expanduser()
         print("\n".join(_write(args, parent)))

@@ -10,9 +10,10 @@ from package_writing.gains import Gains, effort_gains, velocity_gains
 from package_writing.survey import EFFORT, POSITION, Motor, Survey
 
 TEMPLATE = Path(__file__).resolve().parent / "template"
+PARTS = TEMPLATE.with_name("parts")  # of a xacro file that adds what a robot's own lacks
+QUOTE = {'"': "&quot;"}
 FILLED = ".in"  # the end of the names of files that have something to be filled in
 PERIOD = 0.04  # [s] of an action
-STEPS = 15000  # of a training
 
 
 class Filled(string.Template):
@@ -105,44 +106,20 @@ def control_text(package: str, urdf: str, survey: Survey, fix: bool) -> str:
         survey: of that file.
         fix: whether the robot has to be fixed to the world.
     """
-    parts = [f'  <xacro:include filename="{escape(urdf)}"/>\n']
+    parts = []
     if fix:
-        parts.append(
-            "\n"
-            '  <link name="world"/>\n'
-            '  <joint name="world_joint" type="fixed">\n'
-            '    <parent link="world"/>\n'
-            f"    <child link={quoteattr(survey.root)}/>\n"
-            "  </joint>\n"
-        )
+        parts.append(_part("fixed.xml.in", {"root": escape(survey.root, QUOTE)}))
     if survey.added:
-        parts.append(
-            "\n"
-            '  <xacro:macro name="motor" params="joint interface">\n'
-            '    <transmission name="${joint}_transmission">\n'
-            "      <type>transmission_interface/SimpleTransmission</type>\n"
-            '      <joint name="${joint}">\n'
-            "        <hardwareInterface>hardware_interface/${interface}</hardwareInterface>\n"
-            "      </joint>\n"
-            '      <actuator name="${joint}_motor"/>\n'
-            "    </transmission>\n"
-            "  </xacro:macro>\n"
-        )
-        parts += [
-            f'  <xacro:motor joint={quoteattr(each.joint)} interface="{each.interface}"/>\n'
+        motors = "\n".join(
+            f'  <xacro:motor joint={quoteattr(each.joint)} interface="{each.interface}"/>'
             for each in survey.motors
-        ]
-    if not survey.has_plugin:
-        parts.append(
-            "\n"
-            "  <gazebo>\n"
-            '    <plugin name="gazebo_ros_control" filename="libgazebo_ros_control.so"/>\n'
-            "  </gazebo>\n"
         )
-    return (
-        '<?xml version="1.0"?>\n'
-        "<!-- The robot with what moves it in a simulation. -->\n"
-        f'<robot name="{package}" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
-        + "".join(parts)
-        + "</robot>\n"
-    )
+        parts.append(_part("motors.xml.in", {"motors": motors}))
+    if not survey.has_plugin:
+        parts.append(_part("plugin.xml.in", {}))
+    values = {"name": package, "urdf": escape(urdf, QUOTE), "parts": "".join(parts)}
+    return _part("control.urdf.xacro.in", values)
+
+
+def _part(name: str, values: Mapping[str, str]) -> str:
+    return Filled((PARTS / name).read_text(encoding="utf-8")).substitute(values)

@@ -159,8 +159,6 @@ def _values(wanted: Wanted, survey: Survey, urdf: str, copied: Copied) -> dict[s
         "ns": survey.namespace,
         "height": str(wanted.height),
         "period": str(contents.PERIOD),
-        "steps": str(contents.STEPS),
-        "test_command": next(each for each in _commands(wanted, copied) if " test " in each),
         "commands": "\n".join(_commands(wanted, copied)),
     }
 
@@ -201,8 +199,8 @@ def _commands(wanted: Wanted, copied: Copied) -> list[str]:
         f"{ws} roslaunch {wanted.name} simulation.launch    # look at it; Ctrl-C ends it",
         f"{ws} test {shlex.quote(str(wanted.folder))}",
         "./ws extras true    # once: Stable-Baselines3",
-        f"{run} train --algo sac --env-id {wanted.name}.environment:{wanted.name}/Reach-v0 "
-        f"--total-timesteps {contents.STEPS} --run-dir {runs}",
+        f"{run} train --algo ppo --env-id {wanted.name}.environment:{wanted.name}/Reach-v0 "
+        f"--config {here}/config/train.yaml --run-dir {runs}",
         f"{run} eval {runs} --episodes 20",
         f"{run} record {runs} --out {wanted.name}.gif",
         f"{run} eval {runs} --episodes 5 --env-kwargs backend=ros    # the same over ROS",

@@ -62,8 +62,6 @@ def look_at(xml: str, interface: str, resources: Resources) -> Survey:
         model = parse_urdf(xml, resources=resources)
     except (ControlError, DescriptionError, FileError) as error:
         raise CannotWrite(str(error)) from error
-    if robot.tag != "robot":
-        raise CannotWrite(f"the file is no URDF: it begins with <{robot.tag}>, not with <robot>")
     movable = [joint.name for joint in model.movable_joints]
     mimics = {e.get("name") for e in robot.findall("joint") if e.find("mimic") is not None}
     driven = {each.joint: each.interface for each in control.transmissions}
