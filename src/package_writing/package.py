@@ -200,7 +200,7 @@ def _commands(wanted: Wanted, copied: Copied) -> list[str]:
         f"{ws} test {shlex.quote(str(wanted.folder))}",
         "./ws extras true    # once: Stable-Baselines3",
         f"{run} train --algo ppo --env-id {wanted.name}.environment:{wanted.name}/Reach-v0 "
-        f"--config {here}/config/train.yaml --run-dir {runs}",
+        f"--config {here}/config/ppo.yaml --run-dir {runs}",
         f"{run} eval {runs} --episodes 20",
         f"{run} record {runs} --out {wanted.name}.gif",
         f"{run} eval {runs} --episodes 5 --env-kwargs backend=ros    # the same over ROS",

@@ -16,6 +16,8 @@ from mesh_files import binary_stl
 
 from package_writing import package
 from package_writing.cli import main
+from rl_workbench.training.algorithms import algorithm
+from rl_workbench.training.options.training_options import choose
 from robot_envs import RobotEnv
 
 ROBOTS = Path(__file__).resolve().parents[2] / "data/robots"
@@ -305,8 +307,11 @@ def test_it_is_written_beside_the_checkout(root):
     assert package.PARENT == root.parent
 
 
-def test_its_options_are_those_of_trainings(new):
-    """Every section of config/train.yaml is one of an algorithm that there is, for its own environment."""
-    folder, *_ = new("my_options")
-    sections = yaml.safe_load((folder / "config/train.yaml").read_text())
-    assert {each.split()[1] for each in sections} == {"my_options/Reach-v0"}
+@pytest.mark.extras("stable_baselines3")
+@pytest.mark.parametrize("algo", ["ppo", "sac"])
+def test_its_options_are_those_of_trainings(new, algo, tmp_path):
+    folder, *_ = new(f"my_{algo}")
+    flags = ["--config", str(folder / f"config/{algo}.yaml"), "--env-id", f"my_{algo}/Reach-v0"]
+    options = choose(algorithm(algo), flags)
+    given = yaml.safe_load((folder / f"config/{algo}.yaml").read_text())
+    assert options.run.total_timesteps == given["total_timesteps"]

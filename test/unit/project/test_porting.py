@@ -58,10 +58,3 @@ def test_what_an_example_says_it_was_is_in_the_table(toolkit: str) -> None:
     names = [name for line in re.findall(r"# (?:was|were): (.*)", text) for name in re.findall(r"\b_\w+", line)]
     assert names or toolkit == "gym-gazebo"
     assert [name for name in names if name not in table] == []
-
-
-def test_the_methods_that_the_page_names_are_there() -> None:
-    text = PAGE.read_text(encoding="utf-8")
-    names = set(re.findall(r"`(\w+)\((?:state|rng|action|achieved_goal)", text))
-    assert len(names) >= 8
-    assert [name for name in names if not hasattr(GoalTask, name)] == []
