@@ -40,8 +40,31 @@ def expand(
     Raises:
         CannotExpand: the file is broken or goes beyond a limit.
     """
-    path = os.fspath(path)
+    return _ask("xml", os.fspath(path), mappings, processor_time, wall_time, memory)
+
+
+def included_files(
+    path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None
+) -> list[str]:
+    """The files that a xacro file includes, or takes numbers from, as it is expanded with these arguments.
+
+    Raises:
+        CannotExpand: the file is broken or goes beyond a limit of `expand`.
+    """
+    limits = xacro_process.PROCESSOR_TIME, xacro_process.WALL_TIME, xacro_process.MEMORY
+    return _ask("files", os.fspath(path), mappings, *limits).splitlines()
+
+
+def _ask(
+    wanted: str,
+    path: str,
+    mappings: Mapping[str, str] | None,
+    processor_time: int,
+    wall_time: float,
+    memory: int,
+) -> str:
     request = {
+        "wanted": wanted,
         "path": path,
         "mappings": dict(mappings or {}),
         "processor_time": processor_time,

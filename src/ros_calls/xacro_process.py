@@ -5,7 +5,8 @@ where the kernel ends it, and not in whoever asks for it.
 
 `expansion` runs this file by itself (``python -I``), so it imports nothing of this repository before the
 request has come: JSON on standard input, with the path of its caller's modules. The answer on standard output
-is the XML or, with exit code `BROKEN`, one line that says what is wrong.
+is the XML, or the names of the files that it includes, or, with exit code `BROKEN`, one line that says what is
+wrong.
 """
 
 from __future__ import annotations
@@ -113,13 +114,15 @@ def _answer_request() -> NoReturn:
         try:
             with _one_line(xacro, path, request["memory"]):
                 document = xacro.process_file(path, mappings=request["mappings"])
-                xml = document.toprettyxml(indent="  ").encode(errors="surrogateescape")
-                if len(xml) > OUTPUT:
+                files = "\n".join(sorted(set(xacro.all_includes)))
+                text = files if request["wanted"] == "files" else document.toprettyxml(indent="  ")
+                told = text.encode(errors="surrogateescape")
+                if len(told) > OUTPUT:
                     raise ValueError(f"expands to more than {OUTPUT >> 20} MiB")
         except _Broken as fault:
             answer.write(str(fault).encode(errors="replace"))
             sys.exit(BROKEN)
-        answer.write(xml)
+        answer.write(told)
     sys.exit(0)
 
 

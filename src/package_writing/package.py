@@ -1,0 +1,215 @@
+"""One package: what is wanted, how it comes about, and what is told of it."""
+
+import math
+import os
+import re
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from bullet_gazebo.physics.meshes.mesh_files import Resources
+from package_writing import contents
+from package_writing.errors import CannotWrite
+from package_writing.survey import Survey, look_at
+from package_writing.urdf_files import Copied, copy_urdf
+from robot_envs import Pose, Robot, RobotEnvError, files
+
+TREE = Path(__file__).resolve().parents[2]  # the source tree
+IS_CHECKOUT = (TREE / "ws").is_file()
+PARENT = TREE.parent if IS_CHECKOUT else Path()
+"""Where packages are written unless somebody says otherwise: beside the checkout."""
+
+INTERFACES = ("effort", "position", "velocity")
+ARM = contents.TEMPLATE / "urdf/two_link_arm.urdf.xacro"
+OURS = ("cartpole", "controller_manager", "gazebo_ros", "xacro")  # the template depends on them
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What somebody wants.
+
+    Args:
+        name: of the package.
+        folder: where it will be.
+        urdf: the robot's file; None: a two-link arm.
+        arguments: of xacro.
+        base: "fixed" or "free", of a robot that isn't fixed to the world; None: nothing is said.
+        height: where it is spawned [m].
+        interface: of its joints, if they have no transmissions.
+    """
+
+    name: str
+    folder: Path
+    urdf: Path | None
+    arguments: Mapping[str, str]
+    base: str | None
+    height: float
+    interface: str
+
+
+def read_arguments(texts: Sequence[str]) -> dict[str, str]:
+    """Arguments of xacro, written as there.
+
+    Raises:
+        CannotWrite: if one isn't NAME:=VALUE.
+    """
+    found = {}
+    for text in texts:
+        name, sign, value = text.partition(":=")
+        if not sign or not re.fullmatch(r"\w+", name):
+            raise CannotWrite(f"'{text}' is no argument of xacro, which are written NAME:=VALUE")
+        found[name] = value
+    return found
+
+
+def write(wanted: Wanted, made: Path) -> list[str]:
+    """Writes the package into an empty folder.
+
+    Returns:
+        What a user is told.
+
+    Raises:
+        CannotWrite: if the robot can't be read, simulated or moved.
+    """
+    if not math.isfinite(wanted.height):
+        raise CannotWrite(f"--height is a number of metres, not {wanted.height}")
+    source = wanted.urdf or ARM
+    copied = copy_urdf(source, wanted.arguments, wanted.name, made)
+    _check_packages(copied)
+    resources = _resources(wanted.name, made)
+    survey = look_at(copied.xml, f"{wanted.interface.capitalize()}JointInterface", resources)
+    fix = _has_to_be_fixed(wanted, survey, source)
+    urdf, xml = copied.place, copied.xml
+    if survey.added or not survey.has_plugin or fix:
+        urdf = f"{wanted.name}_control.urdf.xacro"
+        text = contents.control_text(wanted.name, copied.place, survey, fix)
+        (made / "urdf" / urdf).write_text(text, encoding="utf-8")
+        xml = files.read_urdf(made / "urdf" / urdf, wanted.arguments)
+        survey = look_at(xml, "", resources)
+    values = _values(wanted, survey, urdf, copied)
+    contents.fill(made, wanted.name, values)
+    robot = Robot(
+        urdf=xml,
+        controllers=yaml.safe_load((made / "config/controllers.yaml").read_text()),
+        run=tuple(map(contents.controller, survey.motors)),
+        name=wanted.name,
+        pose=Pose((0.0, 0.0, wanted.height)),
+        namespace=survey.namespace,
+    )
+    try:
+        robot.check()
+    except RobotEnvError as error:
+        raise CannotWrite(" ".join(str(error).split())) from error
+    return list(_told(wanted, copied, survey, urdf))
+
+
+def _has_to_be_fixed(wanted: Wanted, survey: Survey, source: Path) -> bool:
+    if survey.model.fixed_base or wanted.base == "free":
+        return False
+    if wanted.base == "fixed":
+        return True
+    raise CannotWrite(
+        f"{source}: nothing fixes its link '{survey.root}' to the world: --base fixed does (an arm), --base "
+        "free lets it stand or fall (a vehicle, a walker; --height says from where)"
+    )
+
+
+def _check_packages(copied: Copied) -> None:
+    for name in copied.packages:
+        if _package(name) is None:
+            raise CannotWrite(
+                f"it names the package '{name}', which isn't found: ./ws --with FOLDER rosrun cartpole "
+                "new_robot.py ..., where FOLDER has that package"
+            )
+
+
+def _package(name: str) -> Path | None:
+    try:
+        return files.locate(f"{files.PACKAGE}{name}/package.xml").parent
+    except RobotEnvError:
+        return None
+
+
+def _resources(name: str, folder: Path) -> Resources:
+    others = files.resources()
+    return Resources(package=lambda each: str(folder) if each == name else others.package(each))
+
+
+def _values(wanted: Wanted, survey: Survey, urdf: str, copied: Copied) -> dict[str, str]:
+    needed = [each for each in copied.packages if each not in OURS]
+    pairs = [f"{name}:={value}" for name, value in wanted.arguments.items()]
+    linear = {each.linear for each in survey.motors}
+    namespace = f'\n    namespace="{survey.namespace}",' if survey.namespace else ""
+    arguments = f"\n    arguments={dict(wanted.arguments)!r}," if pairs else ""
+    return {
+        "name": wanted.name,
+        "urdf": urdf,
+        "dependencies": "".join(f"  <exec_depend>{each}</exec_depend>\n" for each in needed),
+        "controllers": contents.names_text(survey),
+        "controllers_yaml": contents.controllers_text(survey),
+        "ranges": contents.ranges_text(survey),
+        "units": "m" if linear == {True} else "rad, m" if True in linear else "rad",
+        "run": " ".join(map(contents.controller, survey.motors)),
+        "arguments": arguments.replace("'", '"'),
+        "launch_arguments": "".join(f" {shlex.quote(each)}" for each in pairs),
+        "namespace": namespace,
+        "ns": survey.namespace,
+        "height": str(wanted.height),
+        "period": str(contents.PERIOD),
+        "commands": "\n".join(_commands(wanted, copied)),
+    }
+
+
+def _told(wanted: Wanted, copied: Copied, survey: Survey, urdf: str) -> Iterator[str]:
+    yield f"written: {wanted.folder}"
+    joints = ", ".join(each.joint for each in survey.motors)
+    if urdf != copied.place:
+        yield (
+            f"the file has no transmissions, no plugin of ros_control, or nothing that fixes it: what it lacks "
+            f"is in urdf/{urdf}, which includes it"
+        )
+    yield f"joints with a motor and a controller: {joints}"
+    if survey.passive:
+        yield f"joints that move without a motor, and that tasks don't see: {', '.join(survey.passive)}"
+    held = [each.joint for each in survey.motors if not each.limited]
+    if held:
+        yield (
+            f"limits of effort and velocity that are 0 would hold {', '.join(held)}: config/controllers.yaml "
+            "lifts them; the true ones belong into the URDF"
+        )
+    for path in copied.outside:
+        yield f"not copied, and read from where it is: {path}"
+    for warning in survey.model.warnings:
+        yield f"note: {warning}"
+    yield f"in {TREE}, to go on:" if IS_CHECKOUT else "to go on:"
+    yield from (f"  {each}" for each in _commands(wanted, copied))
+
+
+def _commands(wanted: Wanted, copied: Copied) -> list[str]:
+    """Those that a user goes on with, in the checkout."""
+    place = os.path.relpath(wanted.folder, TREE) if wanted.folder.parent == PARENT else wanted.folder
+    here = shlex.quote(str(place))
+    ws = f"./ws {''.join(f'--with {each} ' for each in _others(copied))}--with {here}"
+    run = f"{ws} rosrun cartpole workbench.py"
+    runs = f"runs/{wanted.name}"
+    return [
+        f"{ws} roslaunch {wanted.name} simulation.launch    # look at it; Ctrl-C ends it",
+        f"{ws} test {shlex.quote(str(wanted.folder))}",
+        "./ws extras true    # once: Stable-Baselines3",
+        f"{run} train --algo ppo --env-id {wanted.name}.environment:{wanted.name}/Reach-v0 "
+        f"--config {here}/config/ppo.yaml --run-dir {runs}",
+        f"{run} eval {runs} --episodes 20",
+        f"{run} record {runs} --out {wanted.name}.gif",
+        f"{run} eval {runs} --episodes 5 --env-kwargs backend=ros    # the same over ROS",
+    ]
+
+
+def _others(copied: Copied) -> Iterator[str]:
+    """Folders of ws's that have packages which the robot needs."""
+    needed = [path.resolve() for each in copied.packages if (path := _package(each)) is not None]
+    for folder in filter(None, os.environ.get("CARTPOLE_WITH", "").split(":")):
+        if any(path.is_relative_to(Path(folder).resolve()) for path in needed):
+            yield shlex.quote(folder)

@@ -1,0 +1,132 @@
+"""What a URDF is made of, as far as a package for it has to know."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+from bullet_gazebo.control.description import RobotDescription, read_description
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.joint import JointHandle
+from bullet_gazebo.physics.description import DescriptionError, ModelDescription
+from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.meshes.mesh_files import Resources
+from file_reading.errors import FileError
+from file_reading.xml_parser import parse
+from package_writing.errors import CannotWrite
+
+PLUGIN = "libgazebo_ros_control.so"
+EFFORT, POSITION, VELOCITY = (f"{kind}JointInterface" for kind in ("Effort", "Position", "Velocity"))
+SHARE = 0.6  # of a joint's range, about its middle, that postures to reach are drawn from
+WIDEST = 1.8  # [rad, m], half of what they are drawn from
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A joint that is moved, and the interface that moves it."""
+
+    joint: str
+    interface: str
+    low: float  # of the postures to reach [rad, m]
+    high: float
+    linear: bool
+    limited: bool  # whether the URDF's limits of effort and velocity leave it able to move
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What a URDF says."""
+
+    model: ModelDescription
+    motors: tuple[Motor, ...]
+    passive: tuple[str, ...]  # joints that move, with no motor
+    added: bool  # the motors are none of the URDF's: it needs transmissions
+    has_plugin: bool
+    namespace: str  # of the plugin
+    root: str  # the link that all hangs from
+
+
+def look_at(xml: str, interface: str, resources: Resources) -> Survey:
+    """Reads a URDF.
+
+    Args:
+        xml: the text.
+        interface: of joints that have no transmission, where none has.
+        resources: where meshes lie.
+
+    Raises:
+        CannotWrite: if it can't be read or simulated, or nothing in it can be moved.
+    """
+    try:
+        robot, control = parse(xml), read_description(xml)
+        model = parse_urdf(xml, resources=resources)
+    except (ControlError, DescriptionError, FileError) as error:
+        raise CannotWrite(str(error)) from error
+    movable = [joint.name for joint in model.movable_joints]
+    mimics = {e.get("name") for e in robot.findall("joint") if e.find("mimic") is not None}
+    driven = {each.joint: each.interface for each in control.transmissions}
+    added = not driven
+    if added:
+        driven = {name: interface for name in movable if name not in mimics}
+    motors = tuple(_motors(control, driven, movable))
+    if not motors:
+        raise CannotWrite(
+            "nothing in it moves: it needs a joint that is revolute, continuous or prismatic"
+        )
+    plugin = next(_plugins(robot), None)
+    namespace = "" if plugin is None else (plugin.findtext("robotNamespace") or "")
+    return Survey(
+        model=model,
+        motors=motors,
+        passive=tuple(name for name in movable if name not in driven),
+        added=added,
+        has_plugin=plugin is not None,
+        namespace=namespace.strip().strip("/"),
+        root=_root(robot),
+    )
+
+
+def _motors(
+    control: RobotDescription, driven: dict[str, str], movable: list[str]
+) -> Iterator[Motor]:
+    for name, interface in driven.items():
+        if name not in movable:
+            raise CannotWrite(
+                f"its transmission of joint '{name}' moves nothing: there is no such joint, it is fixed, "
+                "or it carries no mass (<inertial>)"
+            )
+        joint = control.joints[name]
+        limits = joint.limits
+        yield Motor(
+            name,
+            interface,
+            *_range(joint),
+            linear=joint.kind == "prismatic",
+            limited=limits.effort != 0.0 and limits.velocity != 0.0,
+        )
+
+
+def _range(joint: JointHandle) -> tuple[float, float]:
+    lower, upper = joint.limits.lower, joint.limits.upper
+    if lower is None or upper is None:
+        lower, upper = (-math.pi, math.pi)
+    if lower == upper:
+        raise CannotWrite(
+            f"joint '{joint.name}' can't move: lower and upper of its <limit> are both {lower:g}; write its "
+            "range there, or make it continuous"
+        )
+    middle, half = (lower + upper) / 2.0, min(SHARE * (upper - lower) / 2.0, WIDEST)
+    return middle - half, middle + half
+
+
+def _plugins(robot: Element) -> Iterator[Element]:
+    for block in robot.findall("gazebo"):
+        for plugin in block.findall("plugin"):
+            if plugin.get("filename", "").endswith(PLUGIN):
+                yield plugin
+
+
+def _root(robot: Element) -> str:
+    children = {e.get("link") for e in robot.findall("joint/child")}
+    links = (link.get("name", "") for link in robot.findall("link"))
+    return next(name for name in links if name not in children)

@@ -1,0 +1,60 @@
+"""The examples of docs/porting.md are environments, and do something."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from robot_envs import GoalTask, RobotEnv
+
+PAGE = Path(__file__).resolve().parents[3] / "docs/porting.md"
+TOOLKITS = ("openai_ros", "frobs_rl", "gym-gazebo", "ros-gazebo-gym")
+
+
+def sections() -> dict[str, str]:
+    parts = re.split(r"^## (.*)\n", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def example(toolkit: str) -> tuple[RobotEnv, str]:
+    (text,) = re.findall(r"```python\n(.*?)```", sections()[toolkit], re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(compile(text, f"the example of {toolkit}", "exec"), names)
+    return names["env"], text
+
+
+@pytest.mark.parametrize("toolkit", TOOLKITS)
+@pytest.mark.filterwarnings("ignore:.*maximum value is infinity|.*minimum value is -infinity")
+def test_an_example_is_an_environment(toolkit: str) -> None:
+    env, _ = example(toolkit)
+    try:
+        check_env(env, skip_render_check=True)
+        env.action_space.seed(0)
+        first, _ = env.reset(seed=0)
+        seen, rewards = [], []
+        for _ in range(40):
+            observation, reward, terminated, truncated, _ = env.step(env.action_space.sample())
+            seen.append(str(observation))
+            rewards.append(reward)
+            if terminated or truncated:
+                break
+        assert len(set(seen)) > 2, "it moves"
+        assert np.isfinite(rewards).all()
+        assert isinstance(env.task, GoalTask) == isinstance(first, dict)
+    finally:
+        env.close()
+
+
+@pytest.mark.parametrize("toolkit", TOOLKITS)
+def test_what_an_example_says_it_was_is_in_the_table(toolkit: str) -> None:
+    env, text = example(toolkit)
+    env.close()
+    table = "".join(line for line in sections()[toolkit].splitlines() if line.startswith("|"))
+    names = [name for line in re.findall(r"# (?:was|were): (.*)", text) for name in re.findall(r"\b_\w+", line)]
+    assert names or toolkit == "gym-gazebo"
+    assert [name for name in names if name not in table] == []

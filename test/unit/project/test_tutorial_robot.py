@@ -1,0 +1,170 @@
+"""Every command of docs/tutorial_robot.md, in order, with shorter trainings: a package of one's own through `ws`.
+
+A block `sh skip` is another way to begin. One of Python that names a file is put at that file's end. Simulations are
+started, seen to be there, and ended; with RViz their launch files are read.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import signal
+import socket
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+ENGLISH, CHINESE = (ROOT / "docs" / name for name in ("tutorial_robot.md", "tutorial_robot.zh.md"))
+BLOCK = re.compile(r"^```(\S+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LIMIT = 300.0  # [s] for one command
+SHORT = "--total-timesteps 300 --eval-frequency 300 --eval-episodes 1 --confirm-episodes 1".split()
+SHORTER = {
+    "train": [*SHORT, "--n-envs", "1", "--n-steps", "150", "--n-epochs", "1"],
+    "eval": ["--episodes", "1"],
+    "record": ["--max-steps", "10", "--size", "160x120"],
+    "train.launch": [f"more:={' '.join(SHORT)} --learning-starts 100"],
+}
+
+
+class Block(NamedTuple):
+    language: str
+    mark: str
+    text: str
+
+
+def blocks(page: Path) -> list[Block]:
+    found = BLOCK.finditer(page.read_text(encoding="utf-8"))
+    return [Block(match[1], match[2] or "", match[3]) for match in found]
+
+
+@pytest.fixture(scope="module")
+def environment() -> dict[str, str]:
+    """A user's, with a master of its own."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        master = f"http://127.0.0.1:{free.getsockname()[1]}"
+    plain = {name: os.environ[name] for name in ("HOME", "CARTPOLE_WS_DIR") if name in os.environ}
+    return {**plain, "PATH": "/usr/local/bin:/usr/bin:/bin", "ROS_MASTER_URI": master,
+            "OMP_NUM_THREADS": "1"}  # fmt: skip
+
+
+class Reader:
+    """Somebody who does what the page says, in a folder beside which the package is written.
+
+    Args:
+        folder: where commands run.
+        environment: of theirs.
+    """
+
+    def __init__(self, folder: Path, environment: dict[str, str]) -> None:
+        self.folder, self.environment = folder, environment
+        self.simulation: subprocess.Popen[str] | None = None
+        self.done: set[str] = set()
+
+    def read(self, block: Block) -> None:
+        if block.mark == "skip" or block.language == "text":
+            return
+        if block.language == "python":
+            self.write(block)
+            return
+        for line in block.text.splitlines():
+            if line not in self.done:
+                self.do(shlex.split(line, comments=True))
+                self.done.add(line)
+
+    def write(self, block: Block) -> None:
+        if block.mark:
+            with (self.folder / block.mark).open("a", encoding="utf-8") as file:
+                file.write(f"\n\n{block.text}")
+        else:
+            self.run(["--with", "../my_arm", "python3", "-c", block.text])
+
+    def do(self, words: list[str]) -> None:
+        assert words[0] == "./ws", words
+        words = [each.replace("../my_arm", str(self.folder.parent / "my_arm")) for each in words[1:]]
+        if "new_robot.py" in words:
+            words += ["--to", str(self.folder.parent)]
+        elif "roslaunch" in words:
+            self.launch(words)
+            return
+        elif "rostopic" in words:
+            assert self.simulation is not None
+        elif "workbench.py" in words:
+            self.end_simulation()
+            words += SHORTER.get(words[words.index("workbench.py") + 1], [])
+        self.run(words)
+
+    def launch(self, words: list[str]) -> None:
+        self.end_simulation()
+        if "rviz:=true" in words:
+            words.insert(words.index("roslaunch") + 1, "--nodes")
+            assert {"/rviz", "/gazebo"} <= set(self.run(words).split())
+        elif "train.launch" in words:
+            self.run([*words, *SHORTER["train.launch"]])
+        else:
+            self.simulation = subprocess.Popen(
+                [ROOT / "ws", *words, "gui:=false"], cwd=self.folder, env=self.environment, text=True,
+                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
+            )  # fmt: skip
+            code = (
+                "from robot_envs.backends.ros.bring_up import ready; from robot_envs.scene import Scene;"
+                "from my_arm.robot import ROBOT; from ros_calls.waiting import wait_until;"
+                "import rosgraph; assert wait_until(rosgraph.is_master_online, 180, 'master');"
+                "ready(Scene([ROBOT])).wait(180)"
+            )
+            self.run(["--with", str(self.folder.parent / "my_arm"), "python3", "-c", code])
+
+    def end_simulation(self) -> None:
+        if self.simulation is not None:
+            os.killpg(self.simulation.pid, signal.SIGINT)
+            self.simulation.communicate(timeout=LIMIT)
+            self.simulation = None
+
+    def run(self, words: list[str]) -> str:
+        """What a command printed; it has to succeed."""
+        done = subprocess.run(
+            [ROOT / "ws", *words], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
+            capture_output=True, text=True, timeout=LIMIT, check=False,
+        )  # fmt: skip
+        told = f"{shlex.join(words)}\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}"
+        assert done.returncode == 0 and "Traceback" not in done.stderr, told
+        return done.stdout
+
+
+@pytest.fixture
+def reader(tmp_path: Path, environment: dict[str, str]) -> Iterator[Reader]:
+    checkout = tmp_path / "checkout"
+    checkout.mkdir()
+    reader = Reader(checkout, environment)
+    yield reader
+    reader.end_simulation()
+
+
+@pytest.mark.slow
+@pytest.mark.extras("stable_baselines3")
+def test_every_command_works(reader: Reader) -> None:
+    for block in blocks(ENGLISH):
+        reader.read(block)
+    for place in ("my_arm.gif", "runs/my_arm/best.pt", "runs/tip/best.pt"):
+        assert (reader.folder / place).is_file(), place
+
+
+def test_both_languages_have_the_same_commands() -> None:
+    mine, other = blocks(ENGLISH), blocks(CHINESE)
+    assert len(mine) > 10
+    assert [block[:2] for block in mine] == [block[:2] for block in other]
+
+    def code(page: list[Block]) -> list[str]:
+        return [re.sub(r" *#.*", "", block.text) for block in page]
+
+    assert code(mine) == code(other)
+
+
+@pytest.mark.parametrize("page", [ENGLISH, CHINESE], ids=lambda page: page.name)
+def test_links_are_there(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), target
