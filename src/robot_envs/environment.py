@@ -121,11 +121,12 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         space = task.observation_space()
         self._read = observation_reader(space, type(task).__name__)
         self.observation_space = space
-        self._aimed = isinstance(task, GoalTask)
+        self._aimed = task if isinstance(task, GoalTask) else None
         if isinstance(task, GoalTask):
             self.observation_space = _goal_space(task, space)
             self.compute_reward = task.compute_reward  # environments without goals have none
         period = self.scene.robots[0].control_period if control_period is None else control_period
+        self.control_period = period
         shown = period if period > 0.0 else self.scene.robots[0].control_period  # [s] a picture
         sensor = Sensor(self.scene.joints, shown, sensor_noise, sensor_delay, encoder_step)
         self._sensor = None if sensor.is_exact else sensor
@@ -214,8 +215,8 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         self._steps = 0
         if self._window is not None:
             self._window.show(self._positions())
-        if self._aimed:
-            seen = self._with_goals(seen, measured)
+        if self._aimed is not None:
+            seen = self._aimed.with_goals(seen, measured)
         return seen, {**self.task.info(state), **info}
 
     def _known_options(self, options: dict[str, Any]) -> dict[str, Any]:
@@ -276,8 +277,8 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         if not math.isfinite(reward):
             raise ValueError(f"{type(task).__name__}.reward() returned {reward}")
         seen = self._read(task.observe(measured))
-        if self._aimed:
-            seen = self._with_goals(seen, measured)
+        if self._aimed is not None:
+            seen = self._aimed.with_goals(seen, measured)
         return seen, reward, terminated, truncated, task.info(state)
 
     def _act(self, commands: Commands) -> WorldState:
@@ -286,16 +287,6 @@ class RobotEnv(gymnasium.Env[Any, Any]):
             return self.backend.act(commands)
         sent = {**self._state.commands, **commands}
         return self.backend.act(self._actuator(sent))._replace(commands=sent)
-
-    def _with_goals(self, seen: Any, state: WorldState) -> dict[str, Any]:
-        """An observation beside the goal that the state achieves, and that of the episode."""
-        desired = self.task.desired  # type: ignore[attr-defined]  # of a GoalTask
-        achieved = self.task.achieved(state)  # type: ignore[attr-defined]
-        return {
-            "observation": seen,
-            "achieved_goal": np.asarray(achieved, desired.dtype),
-            "desired_goal": desired.copy(),
-        }
 
     def _positions(self) -> dict[str, float]:
         """Of the joints [rad, m], of the first robot, by plain name."""

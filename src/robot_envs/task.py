@@ -118,6 +118,17 @@ class GoalTask(Task):
     def is_success(self, achieved: np.ndarray, desired: np.ndarray) -> Any:
         """Whether goals are reached: (..., n) and (..., n) to (...) of bool."""
 
+    def with_goals(self, observation: Any, state: WorldState) -> dict[str, Any]:
+        """What an environment of this task observes.
+
+        Args:
+            observation: what `observe` returned, in the form of its space.
+            state: of which that is.
+        """
+        achieved = np.asarray(self.achieved(state), self.desired.dtype)
+        desired = self.desired.copy()
+        return {"observation": observation, "achieved_goal": achieved, "desired_goal": desired}
+
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> Any:
         """The reward for achieving one goal where another one is desired: (..., n) and (..., n) to (...).
 

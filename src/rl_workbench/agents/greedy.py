@@ -43,15 +43,15 @@ class Spread(nn.Module):
     """
 
     middle: torch.Tensor
-    half: torch.Tensor
+    reach: torch.Tensor
 
     def __init__(self, middle: np.ndarray, half: np.ndarray) -> None:
         super().__init__()
         self.register_buffer("middle", torch.from_numpy(middle.copy()))
-        self.register_buffer("half", torch.from_numpy(half.copy()))
+        self.register_buffer("reach", torch.from_numpy(half.copy()))
 
     def forward(self, actions: torch.Tensor) -> torch.Tensor:
-        return self.middle + self.half * actions
+        return self.middle + self.reach * actions
 
 
 class Continuous(nn.Module):

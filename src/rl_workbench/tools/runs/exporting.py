@@ -12,11 +12,18 @@ from torch import nn
 from rl_workbench.agents.greedy import Choice
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.episodes import TEST_SEED
-from rl_workbench.tools.runs.exported import FORMAT, Observation, batch, described, read, written
+from rl_workbench.tools.runs.exported import (
+    FORMAT,
+    Observation,
+    batch,
+    described,
+    read,
+    written,
+)
 from rl_workbench.tools.runs.policies import LearnedPolicy
 from rl_workbench.tools.runs.runs import Run
 from rl_workbench.training.environments.answers import as_float32
-from rl_workbench.training.run.folder import versions
+from rl_workbench.training.run.folder import LIBRARIES, versions
 
 TRIED = 1000  # observations
 ROUNDING = 1e-5  # what another order of the same sums makes, in single precision
@@ -95,7 +102,7 @@ def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement
         "flattened_from": None if original == space else described(original),
         "action_space": described(policy.env.action_space),
         "agreement": agreement._asdict(),
-        "versions": versions(),
+        "versions": {name: each for name, each in versions().items() if name in LIBRARIES},
     }
     return written(module, metadata), agreement
 

@@ -30,6 +30,11 @@ KINDS = {
                              "observation_scale": "0.4,1,0.2,3"}),
     "three": ("reinforce", {"env_id": "Acrobot-v1", "episodes": 6, "eval_frequency": 0,
                             "env_kwargs": {"max_episode_steps": 30}}),
+    "gaussian": ("reinforce", {"env_id": "Pendulum-v1", "episodes": 6, "eval_frequency": 0,
+                               "env_kwargs": {"max_episode_steps": 30}}),
+    "goals": ("reinforce", {"env_id": "robot_envs.robots:robot_envs/TwoLinkReachGoal-v0",
+                            "episodes": 2, "batch_episodes": 1, "eval_frequency": 0,
+                            "env_kwargs": {"max_steps": 20}, "normalize_observations": "true"}),
     "document": ("reinforce-document", {}),
 }  # fmt: skip
 CONTINUOUS = {"env_id": "Pendulum-v1", "eval_frequency": 0, "eval_episodes": 1}
@@ -44,6 +49,15 @@ SB3 = {
     "sac-sde": ("sac", CONTINUOUS | OFF_POLICY | {"use_sde": True}),
     "td3": ("td3", CONTINUOUS | OFF_POLICY),
     "ddpg": ("ddpg", CONTINUOUS | OFF_POLICY),
+    "sac-her": (
+        "sac",
+        OFF_POLICY
+        | {
+            "env_id": "robot_envs.robots:robot_envs/TwoLinkReachGoal-v0",
+            "env_kwargs": {"max_steps": 20},
+            "her": True,
+        },
+    ),
     "dqn-sb3": (
         "dqn-sb3",
         OFF_POLICY | {"learning_rate": 0.01, "target_update_interval": 20, "seed": 2},
@@ -79,6 +93,17 @@ def train(folder: Path, name: str) -> Path:
     return workbench_runs.policy_gradient(folder, algorithm, **options)
 
 
+def seen_by(space: spaces.Space) -> list:
+    """Observations as a space of vectors, or of a dict of them, has them."""
+    draw = np.random.default_rng(1).normal
+    if isinstance(space, spaces.Dict):
+        parts = {name: draw(size=(200, *each.shape)) for name, each in space.items()}
+        return [
+            {name: part[n].astype(np.float32) for name, part in parts.items()} for n in range(200)
+        ]
+    return list(draw(size=(200, *space.shape)).astype(np.float32))
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return train(tmp_path_factory.mktemp("runs") / "dueling", "dueling")
@@ -94,8 +119,7 @@ def test_the_file_acts_as_the_policy(tmp_path: Path, name: str, capsys) -> None:
     told = capsys.readouterr().out
     assert told.startswith(f"{out}: the policy of {run.resolve()}/") and "of 1000 obs" in told
     policy, file = load_learned(open_run(run)), open_exported(out)
-    size = policy.env.observation_space.shape[0]
-    observations = np.random.default_rng(1).normal(size=(200, size)).astype(np.float32)
+    observations = seen_by(policy.env.observation_space)
     wanted = np.array([policy.act(each) for each in observations])
     assert len(np.unique(wanted)) > 1, "there is something to choose"
     found = [file.act(each) for each in observations]
