@@ -37,6 +37,9 @@ COMMANDS = {
         "watching", "episodes as GIF, MP4 or a page that plays them, without a display"
     ),
     "plot": _Command("drawing", "the training curves of runs as PNG"),
+    "export": _Command(
+        "exporting", "a policy as TorchScript, which torch runs without this package"
+    ),
     "policy": _Command("drawing", "the policy over the pole's angle and velocity as PNG"),
     "compare": _Command("comparing", "groups of runs: table per seed, IQM, intervals, curves"),
     TRAIN: _Command("", "train by DQN, REINFORCE or Stable-Baselines3"),

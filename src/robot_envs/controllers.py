@@ -11,6 +11,7 @@ from bullet_gazebo.control.user_types import find_type
 from bullet_gazebo.state.names import did_you_mean
 
 KINDS = ("Float64", "Float64MultiArray")  # of command topics that take numbers
+QUANTITIES = ("position", "velocity", "effort")  # that they command
 Loaded = dict[str, Controller]
 
 
@@ -21,13 +22,18 @@ class CommandPort(NamedTuple):
         name: of the controller.
         joints: as many numbers, in this order.
         single: whether it takes one number, and no list.
-        holds: whether it holds positions, so that an episode starts with those where its joints stand.
+        quantity: what the numbers are: "position", "velocity" or "effort".
     """
 
     name: str
     joints: tuple[str, ...]
     single: bool
-    holds: bool
+    quantity: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether it holds positions, so that an episode starts with those where its joints stand."""
+        return self.quantity == QUANTITIES[0]
 
     def at_start(self, positions: Mapping[str, float]) -> float | tuple[float, ...]:
         """What it holds when an episode starts: where the joints stand, or zeros."""
@@ -101,9 +107,11 @@ def _port(controller: Controller, parameters: Mapping[str, Any]) -> CommandPort:
     described = parameters[controller.name]
     listed = described.get("joints") or [described.get("joint")]
     joints = tuple(listed) if set(listed) == set(controller.claimed) else controller.claimed
-    kind = controller.type_name.rpartition("/")[2]
-    holds = "Position" in kind or "Position" in controller.interface
-    return CommandPort(controller.name, joints, controller.inputs[0].kind == KINDS[0], holds)
+    names = (controller.type_name.rpartition("/")[2], controller.interface)
+    known = [each for name in names for each in QUANTITIES if each.capitalize() in name]
+    # A type that says nothing of it, of a user's own, takes what its joints take.
+    quantity = "position" if "position" in known else (known or QUANTITIES[2:])[0]
+    return CommandPort(controller.name, joints, controller.inputs[0].kind == KINDS[0], quantity)
 
 
 def faults(

@@ -14,13 +14,13 @@ from bullet_gazebo.state.names import did_you_mean
 from robot_envs import task_checks
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.choice import make_backend
-from robot_envs.errors import TaskError
+from robot_envs.goals import aim, goal_space, with_goals
 from robot_envs.pictures.picture import HEIGHT, WIDTH, RobotPicture
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.spaces import action_reader, observation_reader
 from robot_envs.task import GoalTask, Task
-from robot_envs.task_checks import check_steps, check_task, goal_space
+from robot_envs.task_checks import check_steps, check_task
 from robot_envs.variation import Randomisation
 from robot_envs.variation.actuation import Actuator
 from robot_envs.variation.randomisation import UniformRandomisation
@@ -124,13 +124,14 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         space = task_checks.space(task, "observation_space")
         self._read = observation_reader(space, type(task).__name__)
         self.observation_space = space
-        self._aimed = isinstance(task, GoalTask)
+        self._aimed = task if isinstance(task, GoalTask) else None
         if isinstance(task, GoalTask):
             self.observation_space = goal_space(task, space)
             self.compute_reward = task.compute_reward  # environments without goals have none
         period = self.scene.robots[0].control_period if control_period is None else control_period
         if not isinstance(period, (int, float)):
             raise ValueError(f"control_period is a number [s], not {period!r}")
+        self.control_period = period
         shown = period if period > 0.0 else self.scene.robots[0].control_period  # [s] a picture
         sensor = Sensor(self.scene.joints, shown, sensor_noise, sensor_delay, encoder_step)
         self._sensor = None if sensor.is_exact else sensor
@@ -222,15 +223,15 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         self._state = state
         if self._actuator is not None:
             self._actuator.begin(state.commands)
-        if isinstance(self.task, GoalTask):
-            self._aim(self.task, state, options.get("goal"))
+        if self._aimed is not None:
+            aim(self._aimed, state, self.np_random, options.get("goal"))
         measured = state if self._sensor is None else self._sensor.begin(state, self.np_random)
         seen = self._read(self.task.observe(measured))
         self._steps = 0
         if self._window is not None:
             self._window.show(self._positions())
-        if self._aimed:
-            seen = self._with_goals(seen, measured)
+        if self._aimed is not None:
+            seen = with_goals(self._aimed, seen, measured)
         return seen, {**task_checks.told(self.task, self.task.info(state)), **info}
 
     def _known_options(self, options: dict[str, Any]) -> dict[str, Any]:
@@ -244,18 +245,6 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         if not isinstance(options.get("initial_state", self._initial), InitialState):
             raise ValueError(f"initial_state is an InitialState, not {options['initial_state']!r}")
         return options
-
-    def _aim(self, task: GoalTask, state: WorldState, wanted: Any) -> None:
-        drawn = task.goal(self.np_random, state)
-        space = task.goals()
-        given = drawn if wanted is None else wanted
-        try:
-            goal = np.asarray(given, space.dtype)
-        except (TypeError, ValueError):  # no numbers
-            goal = np.array(math.nan)
-        if not space.contains(goal):
-            raise TaskError(f"the goal {given} isn't one of {type(task).__name__}'s goals: {space}")
-        task.desired = goal
 
     def _vary(self) -> dict[str, Any]:
         if self._randomisation is None:
@@ -297,8 +286,8 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         if type(reward) is not float or not math.isfinite(reward):
             reward = task_checks.number(task, "reward", reward)
         seen = self._read(task.observe(measured))
-        if self._aimed:
-            seen = self._with_goals(seen, measured)
+        if self._aimed is not None:
+            seen = with_goals(self._aimed, seen, measured)
         info: Any = task.info(state)
         if type(info) is not dict:
             info = task_checks.told(task, info)
@@ -310,13 +299,6 @@ class RobotEnv(gymnasium.Env[Any, Any]):
             return self.backend.act(commands)
         sent = {**self._state.commands, **commands}
         return self.backend.act(self._actuator(sent))._replace(commands=sent)
-
-    def _with_goals(self, seen: Any, state: WorldState) -> dict[str, Any]:
-        """An observation beside the goal that the state achieves, and that of the episode."""
-        task: Any = self.task  # a GoalTask
-        desired = task.desired
-        achieved = task_checks.goal(task, "achieved", task.achieved(state), desired)
-        return {"observation": seen, "achieved_goal": achieved, "desired_goal": desired.copy()}
 
     def _positions(self) -> dict[str, float]:
         """Of the joints [rad, m], of the first robot, by plain name."""

@@ -62,22 +62,8 @@ def space(task: Task, method: str) -> gymnasium.Space[Any]:
     """
     made = getattr(task, method)()
     if not isinstance(made, gymnasium.Space):
-        raise _wrong(task, method, made, "a gymnasium.Space")
+        raise wrong(task, method, made, "a gymnasium.Space")
     return made
-
-
-def goal_space(task: GoalTask, observations: gymnasium.Space[Any]) -> gymnasium.spaces.Dict:
-    """Of the observations of a goal environment.
-
-    Raises:
-        TaskError: if the task's goals are no Box.
-    """
-    goals = space(task, "goals"), space(task, "goals")
-    if not isinstance(goals[0], gymnasium.spaces.Box):
-        raise _wrong(task, "goals", goals[0], "a gymnasium.spaces.Box")
-    return gymnasium.spaces.Dict(
-        {"observation": observations, "achieved_goal": goals[0], "desired_goal": goals[1]}
-    )
 
 
 def number(task: Task, method: str, given: Any) -> float:
@@ -91,7 +77,7 @@ def number(task: Task, method: str, given: Any) -> float:
     except (TypeError, ValueError):
         found = math.nan
     if not math.isfinite(found):
-        raise _wrong(task, method, given, "a finite number")
+        raise wrong(task, method, given, "a finite number")
     return found
 
 
@@ -102,7 +88,7 @@ def flag(task: Task, method: str, given: Any) -> bool:
         TaskError: if it is neither.
     """
     if not isinstance(given, (bool, np.bool_)):
-        raise _wrong(task, method, given, "True or False")
+        raise wrong(task, method, given, "True or False")
     return bool(given)
 
 
@@ -113,7 +99,7 @@ def told(task: Task, given: Any) -> dict[str, Any]:
         TaskError: if it is no dict.
     """
     if not isinstance(given, dict):
-        raise _wrong(task, "info", given, "a dict")
+        raise wrong(task, "info", given, "a dict")
     return given
 
 
@@ -128,7 +114,7 @@ def goal(task: GoalTask, method: str, given: Any, like: np.ndarray) -> np.ndarra
     except (TypeError, ValueError):
         found = np.array(math.nan)
     if found.shape != like.shape or not math.isfinite(found.sum()):
-        raise _wrong(task, method, given, f"finite numbers of the shape {like.shape}")
+        raise wrong(task, method, given, f"finite numbers of the shape {like.shape}")
     return found
 
 
@@ -137,7 +123,7 @@ def short(given: Any) -> str:
     return textwrap.shorten(repr(given), 160, placeholder=" ...")
 
 
-def _wrong(task: Task, method: str, given: Any, wanted: str) -> TaskError:
+def wrong(task: Task, method: str, given: Any, wanted: str) -> TaskError:
     return TaskError(
         f"{type(task).__name__}.{method}() returned {short(given)}; it must be {wanted}"
     )

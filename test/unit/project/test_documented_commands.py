@@ -26,7 +26,7 @@ from bullet_gazebo_msgs.srv import StepWorldRequest
 from gazebo_msgs.srv import GetWorldPropertiesRequest
 
 from bullet_gazebo.ros.clients import gzclient
-from cartpole import dqn_train, pg_train, workbench
+from cartpole import dqn_train, pg_train, policy_node, workbench
 from rl_workbench.training import cli as training_cli
 
 pytestmark = pytest.mark.usefixtures("signals")
@@ -102,6 +102,7 @@ def of(*starts: str) -> list[Command]:
 GROUPS = {
     "trainings": of("rosrun cartpole pg_train.py", "rosrun cartpole dqn_train.py"),
     "workbench": of("rosrun cartpole workbench.py"),
+    "policies": of("rosrun cartpole policy_node.py"),
     "scripts": of("python3"),
     "launches": of("roslaunch"),
     "requests": of("rosservice call"),
@@ -164,6 +165,11 @@ def test_the_workbench_takes_it(command: Command, only_parsing: None, monkeypatc
         assert arguments[0] in suites or arguments[0] == "SUITE"
     with pytest.raises(Parsed):
         workbench.main([name, *arguments])
+
+
+@pytest.mark.parametrize("command", GROUPS["policies"], ids=str)
+def test_a_policys_node_takes_it(command: Command) -> None:
+    assert policy_node.parse(list(command.words[3:]), {}).run
 
 
 @pytest.mark.parametrize("command", GROUPS["scripts"], ids=str)

@@ -15,6 +15,7 @@ from rl_workbench.agents.dqn.replay import Batch, ReplayBuffer
 from rl_workbench.agents.dqn.returns import NStepReturns
 from rl_workbench.agents.dqn.schedules import Epsilon, learning_rate
 from rl_workbench.agents.dqn.settings import DQNSettings
+from rl_workbench.agents.greedy import SingleChoice
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import load_optimizer, number, sequence, set_generator, whole
 
@@ -93,6 +94,12 @@ class DQNAgent:
         if self.normaliser is not None:
             observation = self.normaliser(observation)
         return int(self._values(observation).argmax())
+
+    def greedy_network(self) -> SingleChoice:
+        """The same as a torch module: observations (N, D) to actions (N,)."""
+        if self.normaliser is None:
+            return SingleChoice(self.q_net)
+        return SingleChoice(nn.Sequential(self.normaliser.network(), self.q_net))
 
     @torch.no_grad()
     def q_values(self, observations: np.ndarray) -> np.ndarray:

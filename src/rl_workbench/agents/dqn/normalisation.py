@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from rl_workbench.agents.greedy import Scaling
 from rl_workbench.states import array, whole
 
 CLIP = 10.0  # [deviations]
@@ -41,6 +42,10 @@ class Normaliser:
         """Observations (..., D) in deviations from the mean, float32, within +-10."""
         scaled: np.ndarray = (observations - self._offset) * self._scale
         return np.clip(scaled, -CLIP, CLIP)
+
+    def network(self) -> Scaling:
+        """The same as a torch module, which doesn't follow what is counted from now on."""
+        return Scaling(self._offset, self._scale, CLIP)
 
     def state_dict(self) -> dict[str, Any]:
         """Count, mean and squares."""

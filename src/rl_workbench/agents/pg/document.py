@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from rl_workbench.agents.greedy import SingleChoice
 from rl_workbench.agents.pg.settings import DocumentSettings
 from rl_workbench.agents.pg.two_networks import TwoNetworks
 from rl_workbench.errors import WorkbenchError
@@ -201,6 +202,10 @@ class PolicyGradientAgent(TwoNetworks):
     def act_greedily(self, observation: np.ndarray) -> int:
         """The more probable action."""
         return 0 if self.probability_of_zero(observation) >= 0.5 else 1
+
+    def greedy_network(self) -> SingleChoice:
+        """The same as a torch module: observations (N, 4) to actions (N,)."""
+        return SingleChoice(self._output)
 
     def learn(self, episode: Episode) -> Losses:
         """Updates both networks once from one episode.

@@ -72,6 +72,10 @@ class GaussianNetwork(nn.Module):
             observations = torch.tanh(self.hidden(observations))
         return self.fc(observations)
 
+    def layers(self) -> list[nn.Module]:
+        """From prepared observations to the means."""
+        return [self.hidden, nn.Tanh(), self.fc] if self.has_hidden else [self.fc]
+
     def deviations(self) -> torch.Tensor:
         """Logarithms of them, (n,)."""
         return self.log_std.clamp_min(SMALLEST_LOG_STD)

@@ -15,6 +15,7 @@ import torch
 from torch import nn
 
 from rl_workbench.agents.dqn.normalisation import Normaliser
+from rl_workbench.agents.greedy import ClippedAction, Scaling, SingleChoice, Spread
 from rl_workbench.agents.pg.document import (
     Episode,
     Losses,
@@ -115,6 +116,17 @@ class ReinforceAgent(TwoNetworks):
     def act_greedily(self, observation: np.ndarray) -> Any:
         """The most probable action."""
         return self._actor.greedy(observation)
+
+    def greedy_network(self) -> nn.Module:
+        """The same as a torch module: observations (N, D) to actions (N, ...)."""
+        scaling = Scaling(np.zeros_like(self._factors), self._factors)
+        normaliser = [] if self._normaliser is None else [self._normaliser.network()]
+        outputs = nn.Sequential(scaling, *normaliser, *self._network.layers())
+        bounds = self._actions
+        if not isinstance(bounds, Bounds):
+            return SingleChoice(outputs)
+        spread = Spread(bounds.middle, bounds.half)
+        return ClippedAction(nn.Sequential(outputs, spread), bounds.low, bounds.high)
 
     def learn(self, episode: Episode) -> Losses | None:
         """Takes an episode; the last one of a batch updates both networks.

@@ -35,6 +35,10 @@ class SoftmaxNetwork(nn.Module):
             observations = torch.tanh(self.hidden(observations))
         return torch.softmax(self.fc(observations), dim=1)
 
+    def layers(self) -> list[nn.Module]:
+        """From prepared observations to the preferences, of which `forward` makes probabilities."""
+        return [self.hidden, nn.Tanh(), self.fc] if self._has_hidden else [self.fc]
+
     @property
     def has_hidden(self) -> bool:
         """Whether there is a layer between observation and action."""

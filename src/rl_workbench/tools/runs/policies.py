@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
+from torch import nn
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
@@ -27,6 +28,7 @@ class LearnedPolicy(NamedTuple):
     act: Callable[[Any], Any]  # greedily, for one observation: (D,), or a dict as it learned from
     preference: Callable[[np.ndarray], np.ndarray]  # of (N, D): (N,), see meaning
     meaning: str  # of the preference: positive is the last action, or a push to the right
+    network: nn.Module  # of `act`, for many observations: see Policy
     env: gymnasium.Env[Any, Any]
     checkpoint: Path
     steps: int  # of the training that it is from

@@ -51,7 +51,8 @@ def load_policy(
         values = agent.q_values(observations)
         return np.asarray(values[:, -1] - values[:, 0])
 
-    return Policy(agent.act_greedily, preference, "Q(right) - Q(left)")
+    network = agent.greedy_network()
+    return Policy(agent.act_greedily, preference, "Q(right) - Q(left)", network)
 
 
 class DQNTraining(Algorithm):

@@ -64,18 +64,20 @@ def load_policy(
     """The policy of a checkpoint; see `policy.load_policy`."""
     agent = make_agent(options, env)
     agent.load_state_dict(content["agent"])
+    network = agent.greedy_network()
     if is_continuous(env.action_space):
         return Policy(
             agent.act_greedily,
             lambda seen: np.array([np.ravel(agent.act_greedily(each))[0] for each in seen]),
             "action",
+            network,
         )
 
     def preference(observations: np.ndarray) -> np.ndarray:
         found = [agent.probabilities(each) for each in observations]
         return np.array([each[-1] - each[0] for each in found])
 
-    return Policy(agent.act_greedily, preference, "P(right) - P(left)")
+    return Policy(agent.act_greedily, preference, "P(right) - P(left)", network)
 
 
 class PolicyGradientTraining(Algorithm):

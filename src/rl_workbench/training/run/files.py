@@ -35,17 +35,23 @@ def write_atomically(path: Path, write: Writer) -> None:
     _sync_folder(path.parent)
 
 
-def write_file(path: Path, write: Writer) -> None:
+def write_file(path: Path, write: Writer, told: Path | None = None) -> None:
     """The same for what a user asked for: makes the folder, and tells what the disk refuses.
+
+    Args:
+        told: the name for the error, if the user gave another one.
 
     Raises:
         WorkbenchError: if it does; an older file of that name is untouched.
     """
+    told = told or path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, write)
+    except FileExistsError as error:
+        raise WorkbenchError(f"can't write {told}: {told.parent} is no folder") from error
     except OSError as error:
-        raise WorkbenchError(f"can't write {path}: {error.strerror or error}") from error
+        raise WorkbenchError(f"can't write {told}: {error.strerror or error}") from error
 
 
 def check_writable(path: Path) -> None:
@@ -57,7 +63,7 @@ def check_writable(path: Path) -> None:
     if path.is_dir():
         raise WorkbenchError(f"can't write {path}: it is a folder")
     probe = path.with_name(f".{path.name}.probe")
-    write_file(probe, as_text(""))
+    write_file(probe, as_text(""), path)
     probe.unlink()
 
 

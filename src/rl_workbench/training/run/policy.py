@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
+from torch import nn
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.training_options import TrainingOptions
@@ -17,6 +18,7 @@ class Policy(NamedTuple):
     act: Callable[[Any], Any]  # greedily, for one observation: (D,), or a dict as it learned from
     preference: Callable[[np.ndarray], np.ndarray]  # of (N, D): (N,), see meaning
     meaning: str  # of the preference: positive is the last action, or a push to the right
+    network: nn.Module  # for TorchScript: of (N, D), float32, a Dict's parts side by side: (N, ...)
 
 
 def load_policy(

@@ -18,6 +18,7 @@ from rl_workbench.training.run.files import write_atomically
 from rl_workbench.training.run.policy import Policy
 from rl_workbench.training.sb3.callback import FrameCallback, LossWriter
 from rl_workbench.training.sb3.model import checked_of, make_model, repeatable_of
+from rl_workbench.training.sb3.network import greedy_network
 from rl_workbench.training.sb3.options import ON_POLICY
 from rl_workbench.training.sb3.state import check_weights, restore, state_of
 
@@ -153,6 +154,7 @@ def load_policy(
         lambda observation: model.policy.predict(observation, deterministic=True)[0],
         preference,
         meaning,
+        greedy_network(model, options.kind.name),
     )
 
 

@@ -1,0 +1,199 @@
+"""The command policy_node.py: a trained policy moves a robot over ROS."""
+
+import argparse
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium
+from gymnasium import spaces
+
+from cartpole.ros_options import ros_options
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.output import reader_may_go
+from rl_workbench.tools.commands.shared import env_options, number
+from rl_workbench.tools.runs.exported import described, open_exported
+from rl_workbench.tools.runs.policies import WHICH, load_learned
+from rl_workbench.tools.runs.runs import open_run
+from rl_workbench.training.environments.answers import as_float32
+from rl_workbench.training.environments.making import make_environment
+from rl_workbench.training.run.interrupt import Interrupt
+from robot_envs.backends.choice import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
+from robot_envs.environment import RobotEnv
+from robot_envs.errors import RobotEnvError
+from robot_envs.robot import Robot
+from robot_envs.task import Task
+
+NODE = "policy_node"
+OVER_ROS = (LOCKSTEP, REALTIME)
+DESCRIPTION = """\
+A trained policy moves a robot over ROS, simulated or real: it subscribes to /joint_states and publishes
+what the policy commands to the controllers, each control period of ROS time, with the robot and the task of
+the run's environment. Commands stay within the URDF's limits. Where joint states are late the robot is
+stopped, and goes on when they come; Ctrl-C stops it and ends. Nothing is started, spawned or set: robot and
+controllers have to run.
+
+RUN is a run folder, or a file that `workbench.py export` has written."""
+EPILOG = """\
+Each option is a private parameter, too: <param name="late" value="0.2"/>, _late:=0.2
+Exit codes: 0 done, 1 failed, 2 wrong arguments; 130 after Ctrl-C."""
+
+
+class Deployed(NamedTuple):
+    """A policy with the robot and the task that it has learned."""
+
+    robot: Robot
+    task: Task
+    act: Callable[[Any], Any]  # the action for an observation of the task's
+    period: float  # [s] of control
+
+
+@reader_may_go()
+def main(argv: list[str] | None = None) -> int:
+    """Runs the policy as the arguments say; returns the process's exit code."""
+    argv = sys.argv[1:] if argv is None else argv
+    interrupt = Interrupt().install()
+    try:
+        flags, parameters, name = ros_options(argv, NODE)
+        arguments = parse(flags, parameters)
+        need_ros("it")
+        with interrupt.reading():
+            from robot_envs.backends.deployment.policy_node import PolicyNode, run_node
+
+            robot, task, act, period = load(
+                arguments.run, arguments.checkpoint, env_options(arguments)
+            )
+        interrupt.defer()
+        run_node(
+            name,
+            argv,
+            lambda: PolicyNode(
+                robot, task, act, period,
+                arguments.late, arguments.seed, arguments.goal, arguments.max_speed or math.inf,
+            ),
+            interrupt.requested,
+        )  # fmt: skip
+        return interrupt.exit_code
+    except (WorkbenchError, RobotEnvError) as error:
+        print(f"{NODE}.py: {error}", file=sys.stderr, flush=True)
+        return interrupt.exit_code or 1
+    except KeyboardInterrupt:
+        print(f"{NODE}.py: interrupted", file=sys.stderr)
+        return interrupt.exit_code or 130
+
+
+def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
+    """What flags and private parameters say; a flag counts more.
+
+    Raises:
+        SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
+    """
+    parser = argparse.ArgumentParser(
+        f"{NODE}.py",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add = parser.add_argument
+    add("run", type=Path, metavar="RUN", help="a run folder, or an exported policy")
+    add("--checkpoint", choices=WHICH, default="best",
+        help="of a run folder: by evaluation, or the newest (default best)")  # fmt: skip
+    add("--late", type=_positive, metavar="S",
+        help="the robot is stopped where its joints' states are older (default 5 control periods, "
+        "and 0.1 at least)")  # fmt: skip
+    add("--max-speed", type=_positive_or_0, default=1.0, metavar="SHARE",
+        help="of the joints' velocity limits, that commanded positions go with at most (default 1; "
+        "0: no limit)")  # fmt: skip
+    add("--goal", type=_numbers, metavar="X,Y,...",
+        help="of a task with goals (default: it draws one); the topic ~goal takes others")  # fmt: skip
+    add("--seed", type=number(0), default=0, metavar="N", help="of what the task draws (default 0)")
+    add("--env-kwargs", nargs="+", default=[], metavar="KEY=VALUE",
+        help="options of the environment, such as the task's; several with commas")  # fmt: skip
+    named = [f"--{name.replace('_', '-')}={_text(value)}" for name, value in parameters.items()]
+    return parser.parse_args([*named, *flags])
+
+
+def _text(value: Any) -> str:
+    return ",".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(each) for each in text.split(",")]
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"must be above 0: {text}")
+    return value
+
+
+def _positive_or_0(text: str) -> float:
+    return 0.0 if float(text) == 0.0 else _positive(text)
+
+
+def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
+    """The policy of a run folder, or of an exported file, with what it moves.
+
+    Args:
+        path: of the folder or file.
+        which: checkpoint of a run folder.
+        options: of the environment, on top of the training's own.
+
+    Raises:
+        WorkbenchError: if there is no such policy, or no such environment.
+        RobotEnvError: if its environment isn't one of a robot.
+    """
+    if path.is_dir():
+        run = open_run(path)
+        learned = load_learned(run, which, _in_process({**run.env_kwargs, **options}))
+        env, env_id, act = learned.env, run.env_id, learned.act
+    else:
+        exported = open_exported(path)
+        env_id, act = exported.metadata["env_id"], exported.act
+        recorded = {**exported.metadata["env_kwargs"], **options}
+        sees_dict = exported.metadata["observation_space"]["kind"] == "Dict"
+        env = make_environment(env_id, _in_process(recorded), keep_dict=sees_dict)
+        _check_same(path, exported.metadata, env)
+    try:
+        base = env.unwrapped
+        if not isinstance(base, RobotEnv):
+            raise RobotEnvError(
+                f"{path} is a policy of {env_id}, which is no environment of a robot"
+            )
+        if base.scene.several:
+            raise RobotEnvError(f"{path} is a policy of {env_id}, which has several robots")
+        return Deployed(base.scene.robots[0], base.task, _of_task(env, act), base.control_period)
+    finally:
+        env.close()
+
+
+def _in_process(options: dict[str, Any]) -> dict[str, Any]:
+    """The same without a simulator over ROS: the environment is asked for its robot and task alone."""
+    if options.get("backend") in OVER_ROS:
+        options["backend"] = IN_PROCESS
+    if options.get("control_period") == 0.0:  # as fast as the joint states come
+        options["control_period"] = None
+    return options
+
+
+def _check_same(path: Path, metadata: dict[str, Any], env: gymnasium.Env[Any, Any]) -> None:
+    found = {"observation_space": env.observation_space, "action_space": env.action_space}
+    for name, space in found.items():
+        if metadata[name] != described(space):
+            env.close()
+            raise WorkbenchError(
+                f"{path} was exported for another {name.replace('_', ' ')} than {metadata['env_id']} has "
+                f"now: {space}"
+            )
+
+
+def _of_task(env: gymnasium.Env[Any, Any], act: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """The policy for what the task observes, where the training flattened that."""
+    own = env.unwrapped.observation_space
+    if env.observation_space == own:
+        return lambda observation: act(as_float32(observation))
+    return lambda observation: act(as_float32(spaces.flatten(own, observation)))

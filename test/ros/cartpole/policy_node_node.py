@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+"""policy_node.py on the cart-pole, in real time: it balances, stops where states are late, and at Ctrl-C."""
+
+import os
+import signal
+import sys
+import threading
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+
+import training_runs
+from pg_train_runs import Place, Process
+from subscribed import wait_until_heard
+
+import cartpole  # noqa: F401 - registers the environments
+from rl_workbench import cli
+from ros_utils import ros_controllers, ros_gazebo
+from ros_utils.readiness import Ready
+
+BOUND = 180.0  # [s of wall time] for anything
+READY = Ready(["cartpole"], ["joint_state_controller", "stand_cart_position_controller"])
+SLOWLY = 0.3  # of real time: a busy machine is in time as well
+UPRIGHT, LONG = 0.2, 2.5  # [rad], [s of simulated time]
+PUSHED = [0.0, 0.04]  # [m], [rad]: held as it is, the cart's pole is down within a second
+TRAINING = {
+    "env_id": "cartpole/Balance-v0", "env_kwargs": {"noise": 0.05}, "seed": 1, "episodes": 300,
+    "stop_at_length": 800, "eval_frequency": 0, "eval_episodes": 1,
+    "observation_scale": "0.4,1.0,0.2,2.0", "policy_learning_rate": 0.03,
+    "value_learning_rate": 0.01, "value_epochs": 20,
+}  # fmt: skip
+MOVES, LATE = "the policy moves the robot", "no joint state on /joint_states for 1 s"
+OVER, AGAIN, STOPPED = "an episode would be over here", "going on", "the robot is stopped"
+
+
+class PolicyNode(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("policy_on_robot")
+        cls.place = Place(os.environ["ROS_MASTER_URI"])
+        cls.addClassCleanup(cls.place.close)
+        training_runs.run(training_runs.options_of("reinforce", TRAINING), cls.place.run)
+        cls.exported = cls.place.folder / "policy.pt"
+        assert cli.main(["export", str(cls.place.run), "--out", str(cls.exported)]) == 0
+        READY.wait(BOUND)
+        assert ros_gazebo.gazebo_set_max_update_rate(SLOWLY)
+
+    def setUp(self):
+        self.news = threading.Condition()
+        self.joints, self.commands = [], []  # (time, cart, pole); numbers
+        for topic, kind, take in (
+            ("/joint_states", JointState, self.take_joints),
+            ("/stand_cart_position_controller/command", Float64, self.take_command),
+        ):
+            subscriber = rospy.Subscriber(topic, kind, take, queue_size=None)
+            self.addCleanup(subscriber.unregister)
+
+    def take_joints(self, message):
+        found = dict(zip(message.name, message.position, strict=True))
+        with self.news:
+            at = message.header.stamp.to_sec()
+            self.joints.append((at, found["stand_cart"], found["cart_pole"]))
+            self.news.notify_all()
+
+    def take_command(self, message):
+        with self.news:
+            self.commands.append(message.data)
+            self.news.notify_all()
+
+    def eventually(self, what, holds):
+        with self.news:
+            self.assertTrue(self.news.wait_for(holds, BOUND), f"{what}:\n{self.node.output}")
+
+    def start(self, policy) -> Process:
+        self.node = self.place.start(
+            "rosrun", "cartpole", "policy_node.py", str(policy), "--late=1"
+        )
+        self.addCleanup(lambda: (self.node.send(signal.SIGKILL), self.node.end()))
+        self.node.wait_for(MOVES, BOUND)
+        self.assertTrue(
+            wait_until_heard("/joint_states", "/stand_cart_position_controller/command")
+        )
+        return self.node
+
+    def put(self, positions):
+        """Joints in place, at rest; returns how many joint states were there before."""
+        with self.news:
+            count = len(self.joints)
+        answer = ros_gazebo.gazebo_set_model_configuration(
+            "cartpole", ["stand_cart", "cart_pole"], positions
+        )
+        self.assertTrue(answer)
+        return count
+
+    def stays_upright(self) -> bool:
+        """Whether it does, from a push on."""
+        self.put(PUSHED)
+        with self.news:
+            self.joints.clear()
+
+        def has_fallen():
+            return any(abs(pole) > UPRIGHT for _, _, pole in self.joints)
+
+        self.eventually(
+            "joint states",
+            lambda: self.joints and (has_fallen() or self.joints[-1][0] - self.joints[0][0] > LONG),
+        )
+        return not has_fallen()
+
+    def ends_with_a_stop(self, code):
+        """At a position at which the cart was, and nothing after it."""
+        self.assertEqual(self.node.end(BOUND), code, self.node.output)
+        self.assertIn(STOPPED, self.node.output.splitlines()[-1])
+        self.eventually(
+            "the last command is where the cart was",
+            lambda: (
+                self.commands[-1:] == self.commands[-2:-1]
+                and any(cart == self.commands[-1] for _, cart, _ in self.joints)
+            ),
+        )
+
+    def test_a_trained_policy_balances_the_pole_until_ctrl_c(self):
+        node = self.start(self.place.run)
+        self.assertTrue(any(self.stays_upright() for _ in range(5)), node.output)
+        second = self.place.start("rosrun", "cartpole", "policy_node.py", str(self.exported))
+        self.assertEqual(second.end(BOUND), 1)
+        (line,) = second.output.splitlines()
+        self.assertRegex(line, "^policy_node.py: a node /policy_node runs at .* already")
+        node.interrupt()
+        self.ends_with_a_stop(130)
+
+    def test_it_stops_while_states_are_late_and_goes_on_with_them(self):
+        """With the exported policy."""
+        node = self.start(self.exported)
+        self.assertNotIn(LATE, node.output)
+        self.assertTrue(ros_controllers.stop_controllers_srv(["joint_state_controller"]))
+        node.wait_for(LATE, BOUND)
+        with self.news:
+            self.commands.clear()
+        self.eventually("the same command", lambda: len(self.commands) > 20)
+        with self.news:
+            self.assertEqual(len(set(self.commands[5:])), 1)  # some were on their way
+            held = self.commands[-1]
+            self.assertTrue(any(cart == held for _, cart, _ in self.joints))
+        self.assertEqual(node.output.count(LATE), 1)
+        self.assertTrue(ros_controllers.start_controllers_srv(["joint_state_controller"]))
+        node.wait_for(OVER, BOUND)  # it has fallen meanwhile
+        self.put(PUSHED)
+        node.wait_for(AGAIN, BOUND)
+        self.assertTrue(ros_gazebo.gazebo_reset_sim())
+        with self.news:
+            self.commands.clear()
+        self.eventually("commands after a reset of the time", lambda: len(self.commands) > 20)
+        self.assertEqual(node.output.count(MOVES), 2)
+        node.send(signal.SIGTERM)
+        self.ends_with_a_stop(143)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("cartpole", "policy_on_robot", PolicyNode)
