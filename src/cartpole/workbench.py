@@ -1,11 +1,12 @@
-"""The command workbench.py: rl_workbench's command line, with the cart-pole's environments."""
+"""The command workbench.py: rl_workbench's command line, with all environments of this project."""
 
 import sys
 from pathlib import Path
 
+import robot_envs.robots  # noqa: F401 - registers its environments, as importing cartpole does its own
 from rl_workbench import cli
 
-PROGRAM = (sys.executable, "-m", "cartpole.workbench")  # importing cartpole registers them
+PROGRAM = (sys.executable, "-m", "cartpole.workbench")  # knows the same environments
 
 
 def main(argv: list[str] | None = None) -> int:

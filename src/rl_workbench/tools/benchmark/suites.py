@@ -45,7 +45,7 @@ def read_suite(name: str, path: Path | None = None) -> Suite:
         WorkbenchError: if the file has no such suite, or it makes no sense.
     """
     path = path or default_file(CONFIG)
-    section = read_section(path, None, name)
+    section = read_section(path, (), name)
     unknown = [key for key in section if key not in KEYS]
     if unknown or not isinstance(section.get("variants"), dict) or not section["variants"]:
         raise WorkbenchError(f"{path}: a suite has variants, and perhaps {', '.join(KEYS[:-1])}")

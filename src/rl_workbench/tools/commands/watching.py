@@ -168,7 +168,19 @@ def _record(arguments: argparse.Namespace, run: Run) -> None:
 
 
 def _player(arguments: argparse.Namespace, run: Run, which: str) -> Player:
-    options = {"render_mode": "rgb_array", **size_options(run.env_id, arguments.size)}
+    sized = size_options(run.env_id, arguments.size)
+    try:
+        return _player_of(arguments, run, which, sized)
+    except WorkbenchError:
+        if not sized:
+            raise
+    return _player_of(arguments, run, which, {})  # pictures of its own size can be scaled
+
+
+def _player_of(
+    arguments: argparse.Namespace, run: Run, which: str, sized: dict[str, int]
+) -> Player:
+    options = {"render_mode": "rgb_array", **sized}
     title = which if len(arguments.checkpoint) > 1 else ""
     if which != RANDOM:
         policy = _policy(arguments, run, which, **options)

@@ -67,7 +67,7 @@ def draw_without_display() -> None:
 
 
 def size_options(env_id: str, size: Size | None) -> dict[str, int]:
-    """Options that make an environment draw pictures of that size; none if it has no such options."""
+    """Options that may make an environment draw pictures of that size; none if it has no such options."""
     if size is None:
         return {}
     spec = spec_of(env_id)
@@ -77,7 +77,8 @@ def size_options(env_id: str, size: Size | None) -> dict[str, int]:
         return {}
     known = inspect.signature(maker).parameters
     given = {"width": size[0], "height": size[1]}
-    return given if given.keys() <= known.keys() else {}
+    takes_all = any(each.kind is each.VAR_KEYWORD for each in known.values())
+    return given if takes_all or given.keys() <= known.keys() else {}
 
 
 def film_episode(

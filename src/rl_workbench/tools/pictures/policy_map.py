@@ -13,6 +13,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.figure import new_figure
 from rl_workbench.tools.runs.episodes import episode_steps
 from rl_workbench.tools.runs.policies import LearnedPolicy
+from rl_workbench.training.environments.names import without_module
 
 POINTS = 161  # of each axis
 LONGEST = 1500  # [steps] of the episode that is drawn over the policy
@@ -63,11 +64,12 @@ def state_plane(env_id: str) -> StatePlane:
     Raises:
         WorkbenchError: if its observation isn't a cart-pole's.
     """
-    if env_id not in PLANES:
+    name = without_module(env_id)
+    if name not in PLANES:
         raise WorkbenchError(
             f"{env_id} has no pole's angle and velocity; policy draws {', '.join(PLANES)}"
         )
-    return PLANES[env_id]
+    return PLANES[name]
 
 
 def policy_map(plane: StatePlane, policy: LearnedPolicy, seed: int, title: str) -> Figure:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.options.config_file import default_file, read_section
+from rl_workbench.training.options.config_file import default_file, read_section, section_names
 from rl_workbench.training.options.options import unknown
 
 CONFIG = "sweep.yaml"
@@ -42,10 +42,10 @@ def read_ranges(
         WorkbenchError: if there is none, it names an unknown option, or a range is none.
     """
     origin = path or default_file(CONFIG)
-    section = read_section(origin, f"{algorithm} {env_id}", None)
-    section = section or read_section(origin, algorithm, None)
+    names = section_names(f"{algorithm} {{env_id}}", env_id)
+    section = read_section(origin, (*names, algorithm), None)
     if not section:
-        raise WorkbenchError(f"{origin} has no section {algorithm!r} nor '{algorithm} {env_id}'")
+        raise WorkbenchError(f"{origin} has no section {algorithm!r} nor {names[-1]!r}")
     for name in section:
         if name not in known:
             raise WorkbenchError(f"{origin}: {unknown('option', str(name), known)}")

@@ -62,15 +62,15 @@ def _nearest(missing: str) -> str:
 
 def unknown_environment(env_id: str) -> str:
     """The words for an id that isn't registered: the nearest one, or how one's own are named."""
-    known = {without_module(each): each for each in gymnasium.registry}
-    near = get_close_matches(without_module(env_id), list(known), 1)
+    near = get_close_matches(without_module(env_id), sorted(gymnasium.registry), 1)
     module = module_of(env_id)
     text = f"unknown environment {env_id!r}"
     if not near:
         registered = f"; {module} registers none of that name" if module else f"; {FORM}"
         return text + registered
-    is_its = module and near[0].rpartition("/")[0] == without_module(env_id).rpartition("/")[0]
-    return f"{text}; did you mean {f'{module}:' if is_its else ''}{near[0]}?"
+    is_its = near[0].rpartition("/")[0] == without_module(env_id).rpartition("/")[0]
+    text += f"; did you mean {f'{module}:' if module and is_its else ''}{near[0]}?"
+    return text if module or is_its else f"{text} {FORM[0].upper()}{FORM[1:]}"
 
 
 def spec_of(env_id: str) -> EnvSpec | None:

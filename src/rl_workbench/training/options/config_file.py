@@ -2,12 +2,14 @@
 
 import contextlib
 import importlib.util
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.environments.names import without_module
 from rl_workbench.training.options.options import unknown
 
 TREE = Path(__file__).resolve().parents[4]
@@ -35,10 +37,26 @@ def default_file(name: str) -> Path:
     raise WorkbenchError(f"config/{name} is neither in {TREE} nor in a package on ROS_PACKAGE_PATH")
 
 
-def read_section(path: Path, env_id: str | None, preset: str | None) -> dict[str, Any]:
-    """The options of a preset, or else of an environment; none where the file has none for it.
+def section_names(form: str, env_id: str | None) -> tuple[str, ...]:
+    """What an environment's section may be called: by its whole id, or without the module that registers it.
+
+    Args:
+        form: with `{env_id}`.
+        env_id: None if no environment is named; then there are none.
+    """
+    ids = (env_id, without_module(env_id)) if env_id else ()
+    return tuple(dict.fromkeys(form.format(env_id=each) for each in ids))
+
+
+def read_section(path: Path, names: Sequence[str], preset: str | None) -> dict[str, Any]:
+    """The options of a preset, or else of the first section that there is; none where there is none.
 
     A file without sections holds options that count for every environment.
+
+    Args:
+        path: the file.
+        names: of sections, see `section_names`.
+        preset: a section that has to be there.
 
     Raises:
         WorkbenchError: if the file can't be read, or has no such preset.
@@ -48,7 +66,7 @@ def read_section(path: Path, env_id: str | None, preset: str | None) -> dict[str
         if preset:
             raise WorkbenchError(f"{path} has no sections, so no preset {preset!r} either")
         return content
-    name = preset or env_id or ""
+    name = preset or next((each for each in names if each in content), "")
     if preset and preset not in content:
         raise WorkbenchError(f"{path}: {unknown('preset', preset, list(content))}")
     section = content.get(name) or {}

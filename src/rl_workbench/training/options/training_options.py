@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.command_line import CommandLine, flag
-from rl_workbench.training.options.config_file import default_file, read_section
+from rl_workbench.training.options.config_file import default_file, read_section, section_names
 from rl_workbench.training.options.kind import AlgorithmKind
 from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.record import CONFIG_RECORD, read_record
@@ -118,8 +118,7 @@ def choose(
     path = Path(special["config"]) if "config" in special else default_file(kind.config)
     preset = special.get("preset")
     wanted = given.get("env_id", None if preset else default)
-    registered = wanted and wanted.rpartition(":")[2]  # without the module that registers it
-    section = read_section(path, registered and kind.section.format(env_id=registered), preset)
+    section = read_section(path, section_names(kind.section, wanted), preset)
     merged = ({"env_id": wanted} if wanted else {}) | options.read(section, origin)
     return make_options(kind, until_the_steps(merged, given))._replace(showing=showing)
 

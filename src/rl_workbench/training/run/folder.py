@@ -4,7 +4,6 @@ import contextlib
 import fcntl
 import os
 import platform
-import re
 import shlex
 import sys
 import time
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.environments.names import as_file_name
 from rl_workbench.training.options.record import CONFIG_RECORD, read_record
 from rl_workbench.training.run.files import as_json, write_atomically
 
@@ -31,7 +31,7 @@ def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]
         WorkbenchError: if the folder holds something already, another training runs in it, or it
             can't be made or written to.
     """
-    name = re.sub("[/:]", "-", f"{env}__{experiment}__{seed}__{int(time.time())}")
+    name = as_file_name(f"{env}__{experiment}__{seed}__{int(time.time())}")
     folder = Path(run_dir or Path("runs") / name)
     try:
         if run_dir:

@@ -117,3 +117,13 @@ def test_whether_there_is_one_robot(monkeypatch) -> None:
     assert not shares_robot(env)
     monkeypatch.setattr(env.unwrapped, "shares_robot", True, raising=False)
     assert shares_robot(env)
+    wrapped = gymnasium.wrappers.TransformReward(gymnasium.wrappers.TimeLimit(env, 5), abs)
+    assert shares_robot(wrapped), "however it is wrapped"
+
+
+def test_a_wrapper_may_say_that_there_is_one_robot() -> None:
+    class Connected(gymnasium.Wrapper):
+        shares_robot = True
+
+    env = Connected(gymnasium.make(POLE))
+    assert shares_robot(gymnasium.wrappers.TimeLimit(env, 5))

@@ -1,0 +1,223 @@
+"""Environments of a module of one's own, `module:namespace/Name-v0`, with a goal, in every command."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from PIL import Image
+
+import rl_workbench
+from rl_workbench import cli
+from rl_workbench.tools.runs.episodes import episode_steps
+from rl_workbench.tools.runs.policies import load_learned
+from rl_workbench.tools.runs.runs import open_run
+from rl_workbench.training.cli import PROGRAM
+
+pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.slow]
+
+ENV_ID = "own_arm.tasks:own_arm/Reach-v0"
+MODULE = """
+import gymnasium
+from goal_environments import Reach
+
+gymnasium.register("own_arm/Reach-v0", Reach, reward_threshold=-7.5)
+"""
+SMALL = ["--env-id", ENV_ID, "--env-kwargs", "moves=4", "--total-timesteps=300", "--eval-episodes=2",
+         "--eval-frequency=100", "--confirm-episodes=0", "--learning-starts=50"]  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def module(tmp_path_factory: pytest.TempPathFactory):
+    """A package of the user's, found as `ws --with FOLDER` has it found, also by other processes."""
+    folder = tmp_path_factory.mktemp("with")
+    (folder / "own_arm").mkdir()
+    (folder / "own_arm/__init__.py").touch()
+    (folder / "own_arm/tasks.py").write_text(MODULE)
+    support = Path(__file__).resolve().parents[3] / "support"
+    source = Path(rl_workbench.__file__).parents[1]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        known = os.environ.get("PYTHONPATH", "")
+        patch.setenv("PYTHONPATH", f"{folder}:{support}:{source}:{known}")
+        yield folder
+
+
+@pytest.fixture(scope="module")
+def trained(module: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    command = [*PROGRAM, "train", "--algo", "dqn", *SMALL, "--run-dir", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_train_names_its_folder(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["train", "--algo", "dqn", *SMALL, "--seed", "7"]) == 0
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert folder.name.startswith("own_arm.tasks-own_arm-Reach-v0__dqn__7__")
+    assert f"training dqn in {ENV_ID} with seed 7" in capsys.readouterr().out
+
+
+def test_another_process_goes_on(trained: Path) -> None:
+    command = [*PROGRAM, "train", "--resume", str(trained), "--total-timesteps", "340"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "going on at step 300 of 340" in done.stdout
+
+
+def test_eval_knows_the_line_and_the_successes(trained: Path, capsys) -> None:
+    assert cli.main(["eval", str(trained), "--episodes", "3", "--json", "-"]) == 0
+    told = capsys.readouterr()
+    found = json.loads(told.out)
+    assert found["solved"] is (found["mean"] >= -7.5)
+    assert len(found["successes"]) == 3
+    assert found["success_rate"] == sum(found["successes"]) / 3
+    assert "success |" not in told.err and f"success {found['success_rate']:.0%}" in told.err
+    assert told.err.splitlines()[0].endswith(("| success", "| no success"))
+
+
+def test_enjoy_opens_its_window(trained: Path, monkeypatch, capsys) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    assert cli.main(["enjoy", str(trained)]) == 0
+    assert "return" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("size", [[], ["--size", "96x96"]])
+def test_record(trained: Path, tmp_path: Path, capsys, size: list[str]) -> None:
+    out = tmp_path / "episode.gif"
+    wanted = ["--checkpoint", "best", "random", "--no-captions", *size]
+    assert cli.main(["record", str(trained), "--out", str(out), *wanted]) == 0
+    width = 96 if size else 64
+    assert Image.open(out).size == (2 * width, width)
+    assert "success" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("over", ["episodes", "steps"])
+def test_plot_and_compare(trained: Path, tmp_path: Path, capsys, over: str) -> None:
+    picture, figures = tmp_path / "curves.png", tmp_path / "figures.json"
+    assert cli.main(["plot", str(trained), "--out", str(picture), "--over", over]) == 0
+    wanted = ["--episodes", "3", "--json", str(figures), "--out", str(tmp_path / "seeds.png")]
+    assert cli.main(["compare", str(trained), *wanted]) == 0
+    (group,) = json.loads(figures.read_text())["groups"].values()
+    assert group["runs"][0]["success"] in (0.0, 1 / 3, 2 / 3, 1.0)
+    head, _, row, *_ = capsys.readouterr().out.splitlines()[1:]
+    assert "| success |" in head and "%" in row
+    one, two = Image.open(picture), Image.open(tmp_path / "seeds.png")
+    assert one.width > 1200 and two.width > 1200, "returns and successes, side by side"
+
+
+def test_view_plays_it(trained: Path, server) -> None:
+    from rl_workbench.tools.viewing.recorder import _environment
+
+    run = open_run(trained)
+    env = _environment(run, {})
+    learned = load_learned(run, env=env)
+    *_, last = episode_steps(env, learned.act, 3)
+    assert last.success in (True, False)
+    env.close()
+
+
+def test_benchmark_trains_in_processes_of_their_own(tmp_path: Path, capsys) -> None:
+    options = ["env_kwargs=moves=4", "total_timesteps=200", "learning_starts=50", "eval_frequency=0",
+               "confirm_episodes=0", "eval_episodes=1"]  # fmt: skip
+    wanted = ["--seeds", "1", "--episodes", "2", "--out", str(tmp_path / "out")]
+    command = ["benchmark", "--env-id", ENV_ID, "--params", *options, *wanted]
+    assert cli.main(command) == 0
+    table = (tmp_path / "out/results.md").read_text()
+    assert "| success |" in table and "0 of 1" in table and "Solved: -7.5." in table
+
+
+@pytest.mark.extras("optuna")
+def test_sweep_searches_what_is_not_given(tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    options = ["env_kwargs=moves=4", "learning_starts=50", "eval_frequency=100", "gamma=0.5",
+               "confirm_episodes=0"]  # fmt: skip
+    wanted = ["--trials", "1", "--total-timesteps", "200", "--out", str(out)]
+    assert cli.main(["sweep", "--env-id", ENV_ID, "--params", *options, *wanted]) == 0
+    (trial,) = json.loads((out / "trials.json").read_text())
+    assert trial["state"] == "complete" and "gamma" not in trial["options"]
+    (section,) = yaml.safe_load((out / "best.yaml").read_text())
+    assert section == ENV_ID
+    assert open_run(out / "trial_0000_seed_0").config["hyperparameters"]["gamma"] == 0.5
+
+
+@pytest.mark.extras("optuna")
+def test_a_sweep_of_an_option_that_does_not_exist(capsys, tmp_path: Path) -> None:
+    wanted = ["--params", "gama=0.5", "--out", str(tmp_path / "study")]
+    assert cli.main(["sweep", "--env-id", ENV_ID, *wanted]) == 1
+    assert "--params: unknown option 'gama'; did you mean gamma?" in capsys.readouterr().err
+    assert not (tmp_path / "study").exists()
+
+
+@pytest.mark.parametrize("section", [ENV_ID, "own_arm/Reach-v0"])
+def test_a_section_of_options_is_found_by_either_name(tmp_path: Path, capsys, section: str) -> None:
+    config = tmp_path / "options.yaml"
+    config.write_text(f"{section}: {{gamma: 0.25}}\nother: {{gamma: 0.5}}\n")
+    run = tmp_path / "run"
+    wanted = ["--config", str(config), "--run-dir", str(run), *SMALL]
+    assert cli.main(["train", "--algo", "dqn", *wanted]) == 0
+    assert open_run(run).config["hyperparameters"]["gamma"] == 0.25
+
+
+@pytest.mark.parametrize(
+    ("env_id", "words"),
+    [
+        ("own_arm/Reech-v0", "unknown environment 'own_arm/Reech-v0'; did you mean own_arm/Reach-v0?"),
+        ("other/Reach-v0", "did you mean own_arm/Reach-v0? One of your own is named with its module,"),
+        ("zzz/yyy", "unknown environment 'zzz/yyy'; one of your own is named with its module, as in "),
+        ("own_arm.tasks:own_arm/Reech-v0", "; did you mean own_arm.tasks:own_arm/Reach-v0?"),
+        ("own_arm.tasks:zzz", "; own_arm.tasks registers none of that name"),
+        ("own_arm.task:own_arm/Reach-v0", "no module 'own_arm.task', did you mean own_arm.tasks?; "),
+        ("own_amr.tasks:own_arm/Reach-v0", "there is no module 'own_amr', did you mean own_arm?; "),
+        ("own_arm.broken:own_arm/Reach-v0", "ZeroDivisionError: division by zero (", ),
+        ("own_arm.needy:own_arm/Reach-v0", "ModuleNotFoundError: No module named 'nowhere' ("),
+        ("own_arm.leaving:own_arm/Reach-v0", "can't make own_arm.leaving:own_arm/Reach-v0: SystemExit"),
+    ],
+)  # fmt: skip
+def test_a_name_that_leads_nowhere_is_one_line(
+    module: Path, tmp_path: Path, capsys, env_id: str, words: str
+) -> None:
+    (module / "own_arm/broken.py").write_text("1 / 0\n")
+    (module / "own_arm/needy.py").write_text("import nowhere\n")
+    (module / "own_arm/leaving.py").write_text("raise SystemExit\n")
+    __import__("own_arm.tasks")
+    wanted = ["--env-id", env_id, "--run-dir", str(tmp_path / "run")]
+    assert cli.main(["train", "--algo", "dqn", *wanted]) == 1
+    told = capsys.readouterr().err
+    assert words in told and told.count("\n") == 1
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_task_that_raises_in_the_midst_names_its_line(tmp_path: Path, capsys) -> None:
+    run = tmp_path / "run"
+    wanted = [*SMALL, "--env-kwargs", "moves=4,fails_at=7", "--run-dir", str(run)]
+    assert cli.main(["train", "--algo", "dqn", *wanted]) == 1
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert f"{ENV_ID} failed in step(): RuntimeError: a joint is stuck (" in last
+    assert "goal_environments.py:" in last and "stopped after 6 steps" in last
+    assert f"--resume {run}" in last
+
+
+def test_a_run_whose_module_is_gone_is_plotted_all_the_same(
+    trained: Path, tmp_path: Path, capsys
+) -> None:
+    """In a process that doesn't find the module."""
+    found = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    found["PYTHONPATH"] = str(Path(rl_workbench.__file__).parents[1])
+    out = str(tmp_path / "curve.png")
+    command = [sys.executable, "-m", "rl_workbench"]
+    done = subprocess.run(
+        [*command, "plot", str(trained), "--out", out], env=found, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    done = subprocess.run(
+        [*command, "eval", str(trained)], env=found, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "there is no module 'own_arm'" in done.stderr and done.stderr.count("\n") == 1
