@@ -7,8 +7,8 @@ The loop is what somebody writes who needs just this robot: PyBullet reads its U
 reads the joints, computes one line of control for each that is driven, writes and steps. A step is as many
 ticks in all three; the environments' take in observation, reward and resets. The rates of a round are taken
 one after the other; the table shows medians over rounds, also of the ratios. What is in one process is
-measured by the processor's time, so that it counts little what else the machine does. Prints a table and writes
-robots.json.
+measured by the processor's time, so that it counts little what else the machine does. Prints a table and
+writes robots.json.
 """
 
 import contextlib
