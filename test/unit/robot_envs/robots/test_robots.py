@@ -3,16 +3,19 @@
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+import yaml
 from gymnasium.utils.env_checker import check_env
 from scenes.rollout import rollout, same
 
 import robot_envs.robots
 from robot_envs.making import named
 
+ROOT = Path(__file__).resolve().parents[4]
 IDS = sorted(each for each in gymnasium.registry if each.startswith("robot_envs/"))
 
 
@@ -29,6 +32,11 @@ def test_registering_them_loads_neither_their_files_nor_a_physics_engine() -> No
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_each_has_options_to_train_it_with() -> None:
+    sections = yaml.safe_load((ROOT / "config/sb3.yaml").read_text(encoding="utf-8"))
+    assert sorted(each for each in sections if "robot_envs/" in each) == [f"sac {i}" for i in IDS]
 
 
 @pytest.mark.parametrize("identifier", IDS)
