@@ -8,7 +8,8 @@ import numpy as np
 from cartpole.robot import CART_JOINT, POLE_JOINT, ROBOT
 from cartpole.tasks import CartPoleTask
 from robot_envs.backends.backend import RobotBackend
-from robot_envs.environment import RobotEnv, Viewer
+from robot_envs.environment import RobotEnv
+from robot_envs.pictures.drawn import Viewer
 from robot_envs.pictures.picture import Camera
 
 CAMERA = Camera(target=(0.0, 0.0, 0.19), distance=1.65, yaw=14.0, pitch=-9.0)

@@ -2,20 +2,19 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 import gymnasium
-import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
-from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.state.names import did_you_mean
 from robot_envs import task_checks
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.choice import make_backend
 from robot_envs.goals import aim, goal_space, with_goals
-from robot_envs.pictures.picture import HEIGHT, WIDTH, RobotPicture
+from robot_envs.pictures.drawn import DrawnEnv, Viewer
+from robot_envs.pictures.picture import HEIGHT, WIDTH
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.spaces import action_reader, observation_reader
@@ -26,29 +25,11 @@ from robot_envs.variation.actuation import Actuator
 from robot_envs.variation.randomisation import UniformRandomisation
 from robot_envs.variation.sensing import Noise, Sensor
 from robot_envs.world_state import Commands, InitialState, WorldState
-from web_page.display import hindrance
-
-if TYPE_CHECKING:
-    from viser import ViserServer
-
-    from robot_envs.pictures.page import RobotOnPage
 
 RESET_OPTIONS = ("initial_state", "goal")
 
 
-class Viewer(Protocol):
-    """A window that shows the robot."""
-
-    def show(self, positions: Mapping[str, float]) -> None:
-        """Shows joints at their positions [rad, m], by name."""
-        ...
-
-    def close(self) -> None:
-        """Closes the window; may be called twice."""
-        ...
-
-
-class RobotEnv(gymnasium.Env[Any, Any]):
+class RobotEnv(DrawnEnv):
     """A robot with a task, as Gymnasium knows environments.
 
     Two attributes tell a training what it may rely on:
@@ -143,15 +124,7 @@ class RobotEnv(gymnasium.Env[Any, Any]):
                 UniformRandomisation(self.scene, randomisation) if randomisation else None
             )
         self._randomisation = randomisation
-        self.metadata = {
-            "render_modes": ["human", "rgb_array"] if window and not hindrance() else ["rgb_array"],
-            "render_fps": max(1, round(1.0 / shown)),
-        }
-        self.render_mode = _known_mode(render_mode, window is not None)
-        self._picture = RobotPicture(
-            self.scene.robots[0], width, height, camera=camera, base=self._base
-        )
-        self._window = window(shown) if window and render_mode == "human" else None
+        self._draw(shown, camera, (width, height), window, render_mode)
         self._spec: EnvSpec | None = None
         self._state: WorldState | None = None
         self._commands = self.scene.commands
@@ -228,8 +201,7 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         measured = state if self._sensor is None else self._sensor.begin(state, self.np_random)
         seen = self._read(self.task.observe(measured))
         self._steps = 0
-        if self._window is not None:
-            self._window.show(self._positions())
+        self._show()
         if self._aimed is not None:
             seen = with_goals(self._aimed, seen, measured)
         return seen, {**task_checks.told(self.task, self.task.info(state)), **info}
@@ -280,8 +252,7 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         if terminated or truncated:
             self._steps = None
         measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)
-        if self._window is not None:
-            self._window.show(self._positions())
+        self._show()
         reward: Any = task.reward(state, action)
         if type(reward) is not float or not math.isfinite(reward):
             reward = task_checks.number(task, "reward", reward)
@@ -300,58 +271,11 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         sent = {**self._state.commands, **commands}
         return self.backend.act(self._actuator(sent))._replace(commands=sent)
 
-    def _positions(self) -> dict[str, float]:
-        """Of the joints [rad, m], of the first robot, by plain name."""
-        robot, joints = self.scene.robots[0], self._state.joints if self._state else {}
-        names = {name: self.scene.joint(robot, name) for name in robot.joints}
-        return {plain: joints[name].position for plain, name in names.items() if name in joints}
-
-    def _base(self) -> Pose:
-        """Where the first robot's root link is."""
-        robot = self.scene.robots[0]
-        if robot.links.fixed_base:
-            return self.scene.stand(self._initial, robot).compose(robot.links.root_pose)
-        return self.backend.base()
-
-    def render(self) -> np.ndarray | None:
-        """A picture of the robot as it is, (height, width, 3). A window shows it by itself.
-
-        Raises:
-            SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
-        """
-        return self._picture(self._positions()) if self.render_mode == "rgb_array" else None
-
-    def draw_on(self, server: "ViserServer", beside: int = 0) -> "RobotOnPage":
-        """Draws the robot on a page of viser's: its visuals, a ground and lights, seen as in the pictures.
-
-        Needs no render mode, with any backend:
-
-            server = viser.ViserServer()
-            robot = env.unwrapped.draw_on(server)
-            ...  # env.reset(), env.step(action)
-            robot()
-
-        Args:
-            server: the page's.
-            beside: so many robots of this kind are on the page already; it is drawn beside them.
-
-        Returns:
-            What moves the robot on the page to where it is in that moment: a function, which takes a
-            caption to show below the robot, or nothing, and may raise `SimulatorError`. Its two halves
-            are `look()`, which tells where the robot is, and `show()`, which moves it there, then or later.
-
-        Raises:
-            SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
-        """
-        return self._picture.draw_on(server, self._positions, beside)
-
     def close(self) -> None:
         """Closes the backend and the window; may be called twice."""
         self._closed = True
         self._steps = None
-        if self._window is not None:
-            self._window.close()
-        self._picture.close()
+        self._end_drawing()
         self.backend.close()
 
     def _check_open(self) -> None:
@@ -359,11 +283,3 @@ class RobotEnv(gymnasium.Env[Any, Any]):
             raise gymnasium.error.ClosedEnvironmentError(
                 "this environment is closed; make another one"
             )
-
-
-def _known_mode(mode: str | None, has_window: bool) -> str | None:
-    known = ("human", "rgb_array") if has_window else ("rgb_array",)
-    if mode is not None and mode not in known:
-        names = " or ".join(f'"{name}"' for name in known)
-        raise ValueError(f"render_mode is {names}, not {mode!r}")
-    return mode
