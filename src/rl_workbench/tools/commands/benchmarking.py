@@ -11,6 +11,7 @@ from typing import Any
 
 from file_reading.content import open_text
 from rl_workbench.curves import evaluation_curves, seed_curves
+from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.benchmark import tables
 from rl_workbench.tools.benchmark.results import RunResult, examine
@@ -26,7 +27,7 @@ from rl_workbench.tools.commands.shared import number, write_figure
 from rl_workbench.tools.pictures.panels import seed_panels, variant_panels
 from rl_workbench.tools.runs.runs import Run, open_run
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.environments.names import as_file_name, threshold
+from rl_workbench.training.environments.names import threshold
 from rl_workbench.training.options.options import key_values
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.files import as_json, as_text, write_file

@@ -5,13 +5,13 @@ import time
 from pathlib import Path
 from typing import Any
 
+from rl_workbench.env_ids import as_file_name
 from rl_workbench.extras import need
 from rl_workbench.tools.commands.shared import number
 from rl_workbench.tools.sweep.ranges import read_ranges
 from rl_workbench.tools.sweep.sweep import Sweep, run_sweep
 from rl_workbench.tools.sweep.trainers import trainer
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.environments.names import as_file_name
 from rl_workbench.training.options.options import key_values
 from rl_workbench.training.options.training_options import known_options
 from rl_workbench.training.run.interrupt import Interrupt

@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from rl_workbench.env_ids import without_module
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.figure import new_figure
 from rl_workbench.tools.runs.episodes import episode_steps
 from rl_workbench.tools.runs.policies import LearnedPolicy
-from rl_workbench.training.environments.names import without_module
 
 POINTS = 161  # of each axis
 LONGEST = 1500  # [steps] of the episode that is drawn over the policy

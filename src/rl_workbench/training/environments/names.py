@@ -1,7 +1,6 @@
 """Ids of environments: Gymnasium's form `module:namespace/Name-v0`, whose module registers the rest."""
 
 import contextlib
-import re
 from difflib import get_close_matches
 from importlib import import_module
 from pkgutil import iter_modules
@@ -10,27 +9,12 @@ from typing import Any
 import gymnasium
 from gymnasium.envs.registration import EnvSpec
 
+from rl_workbench.env_ids import module_of, without_module
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.extras import finding_modules
 from rl_workbench.training.environments.checked import EnvironmentFailure, told
 
 FORM = "one of your own is named with its module, as in my_module:my_robot/Reach-v0"
-
-
-def without_module(env_id: str) -> str:
-    """The id under which it is registered."""
-    return env_id.partition(":")[2] or env_id
-
-
-def module_of(env_id: str) -> str:
-    """The module that registers it; empty if the id names none."""
-    module, colon, _ = env_id.partition(":")
-    return module if colon else ""
-
-
-def as_file_name(env_id: str) -> str:
-    """For the names of files and folders."""
-    return re.sub("[/:]", "-", env_id)
 
 
 def import_module_of(env_id: str) -> None:

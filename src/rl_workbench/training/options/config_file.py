@@ -8,8 +8,8 @@ from typing import Any
 
 import yaml
 
+from rl_workbench.env_ids import without_module
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.environments.names import without_module
 from rl_workbench.training.options.options import unknown
 
 TREE = Path(__file__).resolve().parents[4]

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.environments.names import as_file_name
 from rl_workbench.training.options.record import CONFIG_RECORD, read_record
 from rl_workbench.training.run.files import as_json, write_atomically
 
