@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import whole
 from rl_workbench.training.environments.checked import CheckedEnvironment
 from rl_workbench.training.environments.making import make_environment
 
@@ -46,6 +47,16 @@ def test_a_lost_connection_is_the_environments_and_not_the_disks(error: OSError)
         env.reset()
     with pytest.raises(WorkbenchError, match=words):
         env.step(0)
+
+
+def test_the_place_is_in_the_users_code_where_a_library_refuses_what_that_asks_for() -> None:
+    class Asking(Device):
+        def _answer(self) -> Any:
+            return whole("what")  # of this project's, which tasks may call as they call Gymnasium
+
+    words = r"^Device-v0 failed in step\(\): ValueError: .* \(\S*test_failing.py:\d+\)$"
+    with pytest.raises(WorkbenchError, match=words):
+        CheckedEnvironment(Asking(0.0), "Device-v0").step(0)
 
 
 def test_a_constructor_with_a_mistake(monkeypatch) -> None:
