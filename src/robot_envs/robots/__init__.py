@@ -13,22 +13,38 @@
 from robot_envs.making import register
 
 register(
-    "robot_envs/TwoLinkReach-v0", f"{__name__}.two_link_arm:ROBOT", f"{__name__}.two_link_arm:Reach"
+    "robot_envs/TwoLinkReach-v0",
+    "robot_envs.robots.two_link_arm:ROBOT",
+    "robot_envs.robots.two_link_arm:Reach",
+    reward_threshold=15.0,
 )
 register(
     "robot_envs/TwoLinkReachGoal-v0",
-    f"{__name__}.two_link_arm:ROBOT",
-    f"{__name__}.two_link_arm:ReachGoal",
+    "robot_envs.robots.two_link_arm:ROBOT",
+    "robot_envs.robots.two_link_arm:ReachGoal",
+    reward_threshold=-20.0,
 )
 register(
     "robot_envs/SixJointReach-v0",
-    f"{__name__}.six_joint_arm:ROBOT",
-    f"{__name__}.six_joint_arm:Reach",
+    "robot_envs.robots.six_joint_arm:ROBOT",
+    "robot_envs.robots.six_joint_arm:Reach",
+    reward_threshold=30.0,
 )
-register("robot_envs/Furuta-v0", f"{__name__}.furuta:ROBOT", f"{__name__}.furuta:SwingUp")
+register(
+    "robot_envs/Furuta-v0",
+    "robot_envs.robots.furuta:ROBOT",
+    "robot_envs.robots.furuta:SwingUp",
+    reward_threshold=240.0,
+)
 register(
     "robot_envs/DoublePendulum-v0",
-    f"{__name__}.double_pendulum:ROBOT",
-    f"{__name__}.double_pendulum:Balance",
+    "robot_envs.robots.double_pendulum:ROBOT",
+    "robot_envs.robots.double_pendulum:Balance",
+    reward_threshold=475.0,
 )
-register("robot_envs/Hopper-v0", f"{__name__}.hopper:ROBOT", f"{__name__}.hopper:HopForward")
+register(
+    "robot_envs/Hopper-v0",
+    "robot_envs.robots.hopper:ROBOT",
+    "robot_envs.robots.hopper:HopForward",
+    reward_threshold=450.0,
+)

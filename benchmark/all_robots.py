@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 """Steps a second of the robots that come along: in-process, over ROS, and as a loop on PyBullet alone.
 
-    ./ws python3 benchmark/robots.py [--out FOLDER] [--seconds 2.0] [--rounds 5]
+    ./ws python3 benchmark/all_robots.py [--out FOLDER] [--seconds 2.0] [--rounds 5]
 
 The loop is what somebody writes who needs just this robot: PyBullet reads its URDF, and each tick of 1 ms
 reads the joints, computes one line of control for each that is driven, writes and steps. A step is as many
 ticks in all three; the environments' take in observation, reward and resets. The rates of a round are taken
 one after the other; the table shows medians over rounds, also of the ratios. What is in one process is
 measured by the processor's time, so that it counts little what else the machine does. Prints a table and
-writes robots.json.
+writes all_robots.json.
 """
 
 import contextlib
@@ -221,7 +221,7 @@ def main() -> None:
         results[identifier] = figures(taken)
         print(f"{identifier:30} {hand:9,.0f} {here:11,.0f} {share:6.0%} {ros:9,.0f} {over:14.0%}")
     print(f"target: in-process {TARGET:.0%} of the loop by hand")
-    reporting.write(chosen.out, "robots", results)
+    reporting.write(chosen.out, "all_robots", results)
 
 
 if __name__ == "__main__":
