@@ -38,6 +38,9 @@ setup(
     version=ElementTree.parse("package.xml").findtext("version"),
     packages=find_packages("src"),
     package_dir={"": "src"},
-    package_data={"rl_workbench.tools.pictures": ["page.html"]},
+    package_data={
+        "package_writing": ["parts/*", "template/**/*"],
+        "rl_workbench.tools.pictures": ["page.html"],
+    },
     cmdclass={"build_py": BuildWithData},
 )

@@ -21,6 +21,7 @@ from urllib.parse import unquote
 ROOT = Path(__file__).resolve().parents[1]
 HISTORY = "CHANGELOG.md"
 RESULTS = ("runs", "models")  # folders that trainings make, as in .gitignore
+BESIDE = ".."  # the reader's own folders
 BLOCK = re.compile(
     r"^ {0,3}(?P<fence>```|~~~)(?P<fenced>.*?)^ {0,3}(?P=fence)[^\n]*$"
     r"|(?:\A|(?<=\n\n))(?P<indented>(?:(?: {4}|\t)[^\n]*\n|\n)+)",
@@ -100,7 +101,7 @@ def paths(code: str, root: Path) -> Iterator[str]:
         place = word.rstrip(".,;:)").split("::")[0]
         top, slash, _ = place.partition("/")
         named = not PLACEHOLDER.search(place)
-        if slash and top and top not in RESULTS and named and (root / top).is_dir():
+        if slash and top and top not in (*RESULTS, BESIDE) and named and (root / top).is_dir():
             yield place
 
 

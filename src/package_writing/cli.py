@@ -33,12 +33,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="new_robot.py",
-        description="Writes a catkin package of your own for a robot: URDF, controllers, launch files, a task "
-        "that can be trained at once, a test. Nothing that is there is overwritten.",
+        description="Writes a catkin package of your own for a robot: URDF, controllers, launch files, a "
+        "task that can be trained at once, a test. Nothing that is there is overwritten.",
     )
     parser.add_argument("name", help="of the package, such as my_arm")
     parser.add_argument(
-        "--urdf", type=Path, metavar="FILE", help="the robot, URDF or xacro; without: a two-link arm"
+        "--urdf",
+        type=Path,
+        metavar="FILE",
+        help="the robot, URDF or xacro; without: a two-link arm",
     )
     parser.add_argument(
         "arguments", nargs="*", metavar="ARG:=VALUE", help="arguments of the xacro file"
@@ -52,7 +55,11 @@ def _parser() -> argparse.ArgumentParser:
         help="of a robot that the file doesn't fix to the world: fix it (an arm), or let it stand or fall",
     )  # fmt: skip
     parser.add_argument(
-        "--height", type=float, default=0.0, metavar="Z", help="where it is spawned [m] (default: 0)"
+        "--height",
+        type=float,
+        default=0.0,
+        metavar="Z",
+        help="where it is spawned [m] (default: 0)",
     )
     parser.add_argument(
         "--interface", choices=package.INTERFACES, default="effort",
@@ -70,7 +77,9 @@ def _write(args: argparse.Namespace, parent: Path) -> list[str]:
             f"{folder} is there already; take another name, or another place with --to FOLDER"
         )
     if not parent.is_dir():
-        raise CannotWrite(f"there is no folder {parent}; make it, or name another one with --to FOLDER")
+        raise CannotWrite(
+            f"there is no folder {parent}; make it, or name another one with --to FOLDER"
+        )
     wanted = package.Wanted(
         args.name, folder, args.urdf, package.read_arguments(args.arguments), args.base, args.height,
         args.interface,

@@ -62,9 +62,13 @@ def controllers_text(survey: Survey) -> str:
         lines.append("")
     unlimited = [motor.joint for motor in survey.motors if not motor.limited]
     if unlimited:
-        lines += ["# The URDF's limits of effort and velocity are 0, which holds a joint.", "joint_limits:"]
         lines += [
-            f"  {joint}: {{has_effort_limits: false, has_velocity_limits: false}}" for joint in unlimited
+            "# The URDF's limits of effort and velocity are 0, which holds a joint.",
+            "joint_limits:",
+        ]
+        lines += [
+            f"  {joint}: {{has_effort_limits: false, has_velocity_limits: false}}"
+            for joint in unlimited
         ]
         lines.append("")
     return "\n".join(lines)

@@ -9,7 +9,9 @@ from bullet_gazebo.physics.mechanics.mass_matrix import (
     poses_at_zero,
 )
 
-FREQUENCY = 12.0  # [rad/s], at least, of a joint on its p and d with all that it carries stretched out
+FREQUENCY = (
+    12.0  # [rad/s], at least, of a joint on its p and d with all that it carries stretched out
+)
 HIGHEST = 250.0  # [rad/s], of what a joint moves in itself: steps of 1 ms can't follow more
 MOST = 25.0  # times that, which it may carry
 SAG = 0.1  # [rad, m], below its weight on p alone

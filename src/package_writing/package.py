@@ -15,7 +15,7 @@ from package_writing import contents
 from package_writing.errors import CannotWrite
 from package_writing.survey import Survey, look_at
 from package_writing.urdf_files import Copied, copy_urdf
-from robot_envs import Pose, Robot, RobotEnvError, files
+from robot_envs import Robot, RobotEnvError, controllers, files
 
 TREE = Path(__file__).resolve().parents[2]  # the source tree
 IS_CHECKOUT = (TREE / "ws").is_file()
@@ -83,7 +83,8 @@ def write(wanted: Wanted, made: Path) -> list[str]:
     survey = look_at(copied.xml, f"{wanted.interface.capitalize()}JointInterface", resources)
     fix = _has_to_be_fixed(wanted, survey, source)
     urdf, xml = copied.place, copied.xml
-    if survey.added or not survey.has_plugin or fix:
+    lacks = list(_lacks(survey, fix))
+    if lacks:
         urdf = f"{wanted.name}_control.urdf.xacro"
         text = contents.control_text(wanted.name, copied.place, survey, fix)
         (made / "urdf" / urdf).write_text(text, encoding="utf-8")
@@ -91,19 +92,16 @@ def write(wanted: Wanted, made: Path) -> list[str]:
         survey = look_at(xml, "", resources)
     values = _values(wanted, survey, urdf, copied)
     contents.fill(made, wanted.name, values)
+    parameters = yaml.safe_load((made / "config/controllers.yaml").read_text(encoding="utf-8"))
     robot = Robot(
-        urdf=xml,
-        controllers=yaml.safe_load((made / "config/controllers.yaml").read_text()),
-        run=tuple(map(contents.controller, survey.motors)),
-        name=wanted.name,
-        pose=Pose((0.0, 0.0, wanted.height)),
-        namespace=survey.namespace,
+        urdf=xml, controllers=parameters, run=tuple(map(contents.controller, survey.motors))
     )
-    try:
-        robot.check()
-    except RobotEnvError as error:
-        raise CannotWrite(" ".join(str(error).split())) from error
-    return list(_told(wanted, copied, survey, urdf))
+    movable = [each.name for each in survey.model.movable_joints]
+    wrong = list(controllers.faults(robot.run, None, parameters, robot.hardware(), movable))
+    if wrong:
+        raise CannotWrite("; ".join(wrong))
+    added = f"urdf/{urdf}, which includes it, adds {' and '.join(lacks)}" if lacks else ""
+    return list(_told(wanted, copied, survey, added))
 
 
 def _has_to_be_fixed(wanted: Wanted, survey: Survey, source: Path) -> bool:
@@ -163,14 +161,21 @@ def _values(wanted: Wanted, survey: Survey, urdf: str, copied: Copied) -> dict[s
     }
 
 
-def _told(wanted: Wanted, copied: Copied, survey: Survey, urdf: str) -> Iterator[str]:
+def _lacks(survey: Survey, fix: bool) -> Iterator[str]:
+    """What has to be added to the robot's file."""
+    if fix:
+        yield f"a joint that fixes '{survey.root}' to the world"
+    if survey.added:
+        yield f"transmissions ({survey.motors[0].interface})"
+    if not survey.has_plugin:
+        yield "ros_control's plugin"
+
+
+def _told(wanted: Wanted, copied: Copied, survey: Survey, added: str) -> Iterator[str]:
     yield f"written: {wanted.folder}"
     joints = ", ".join(each.joint for each in survey.motors)
-    if urdf != copied.place:
-        yield (
-            f"the file has no transmissions, no plugin of ros_control, or nothing that fixes it: what it lacks "
-            f"is in urdf/{urdf}, which includes it"
-        )
+    if added:
+        yield f"what the file lacks: {added}"
     yield f"joints with a motor and a controller: {joints}"
     if survey.passive:
         yield f"joints that move without a motor, and that tasks don't see: {', '.join(survey.passive)}"
@@ -190,7 +195,9 @@ def _told(wanted: Wanted, copied: Copied, survey: Survey, urdf: str) -> Iterator
 
 def _commands(wanted: Wanted, copied: Copied) -> list[str]:
     """Those that a user goes on with, in the checkout."""
-    place = os.path.relpath(wanted.folder, TREE) if wanted.folder.parent == PARENT else wanted.folder
+    place = (
+        os.path.relpath(wanted.folder, TREE) if wanted.folder.parent == PARENT else wanted.folder
+    )
     here = shlex.quote(str(place))
     ws = f"./ws {''.join(f'--with {each} ' for each in _others(copied))}--with {here}"
     run = f"{ws} rosrun cartpole workbench.py"

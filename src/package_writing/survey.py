@@ -16,7 +16,9 @@ from file_reading.xml_parser import parse
 from package_writing.errors import CannotWrite
 
 PLUGIN = "libgazebo_ros_control.so"
-EFFORT, POSITION, VELOCITY = (f"{kind}JointInterface" for kind in ("Effort", "Position", "Velocity"))
+EFFORT, POSITION, VELOCITY = (
+    f"{kind}JointInterface" for kind in ("Effort", "Position", "Velocity")
+)
 SHARE = 0.6  # of a joint's range, about its middle, that postures to reach are drawn from
 WIDEST = 1.8  # [rad, m], half of what they are drawn from
 

@@ -5,7 +5,7 @@ where the kernel ends it, and not in whoever asks for it.
 
 `expansion` runs this file by itself (``python -I``), so it imports nothing of this repository before the
 request has come: JSON on standard input, with the path of its caller's modules. The answer on standard output
-is the XML, or the names of the files that it includes, or, with exit code `BROKEN`, one line that says what is
+is the XML or the names of the files that it includes; with exit code `BROKEN`, one line that says what is
 wrong.
 """
 

@@ -21,21 +21,26 @@ from rl_workbench.training.options.training_options import choose
 from robot_envs import RobotEnv
 
 ROBOTS = Path(__file__).resolve().parents[2] / "data/robots"
-JOINT = """<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/><axis xyz="0 1 0"/>{4}</joint>"""
+JOINT = """<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>
+<axis xyz="0 1 0"/>{4}</joint>"""
 LINK = """<link name="{0}"><inertial><origin xyz="0 0 0.1"/><mass value="0.5"/>
 <inertia ixx="0.002" iyy="0.002" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial>{1}</link>"""
 LIMIT = '<limit lower="-1" upper="2" effort="20" velocity="3"/>'
-MOTOR = """<transmission name="t_{0}"><type>transmission_interface/SimpleTransmission</type><joint name="{0}">
-<hardwareInterface>hardware_interface/{1}JointInterface</hardwareInterface></joint><actuator name="a"/></transmission>"""
+MOTOR = """<transmission name="t_{0}"><type>transmission_interface/SimpleTransmission</type>
+<joint name="{0}"><hardwareInterface>hardware_interface/{1}JointInterface</hardwareInterface></joint>
+<actuator name="a"/></transmission>"""
 PLUGIN = '<gazebo><plugin name="c" filename="libgazebo_ros_control.so">{}</plugin></gazebo>'
 SWING = JOINT.format("swing", "revolute", "base", "rod", LIMIT)
 FIXED = '<link name="world"/>' + JOINT.format("stand", "fixed", "world", "base", "")
 
 
 def robot(*parts: str, name: str = "theirs") -> str:
-    return f'<robot name="{name}" xmlns:xacro="http://www.ros.org/wiki/xacro">{"".join(parts)}</robot>'
+    return (
+        f'<robot name="{name}" xmlns:xacro="http://www.ros.org/wiki/xacro">{"".join(parts)}</robot>'
+    )
 
 
+NOBODYS = '<collision><geometry><mesh filename="package://nobodys/rod.stl"/></geometry></collision>'
 BARE = (LINK.format("base", ""), LINK.format("rod", ""), SWING)
 
 
@@ -140,7 +145,10 @@ def test_a_robot_whose_base_is_free(new):
 
 def test_a_namespace_of_the_plugin(new):
     text = robot(
-        *BARE, FIXED, MOTOR.format("swing", "Effort"), PLUGIN.format("<robotNamespace>/one</robotNamespace>")
+        *BARE,
+        FIXED,
+        MOTOR.format("swing", "Effort"),
+        PLUGIN.format("<robotNamespace>/one</robotNamespace>"),
     )
     folder, made, task, _ = new("my_named", text)
     assert made.namespace == "one"
@@ -219,7 +227,9 @@ def test_a_package_that_it_needs_is_depended_on(new, tmp_path, monkeypatch):
     (other / "urdf/links.xacro").write_text(robot(LINK.format("base", "") + LINK.format("rod", "")))
     urdf = other / "urdf/arm.urdf.xacro"
     urdf.write_text(
-        robot('<xacro:include filename="$(find their_description)/urdf/links.xacro"/>', SWING, FIXED)
+        robot(
+            '<xacro:include filename="$(find their_description)/urdf/links.xacro"/>', SWING, FIXED
+        )
     )
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}/ws:{os.environ['ROS_PACKAGE_PATH']}")
     monkeypatch.setenv("CARTPOLE_WITH", str(tmp_path / "ws"))
@@ -242,14 +252,12 @@ def test_a_package_that_it_needs_is_depended_on(new, tmp_path, monkeypatch):
         (robot(*BARE, FIXED, MOTOR.format("swung", "Effort")), [], "transmission of joint 'swung'"),
         (robot(*BARE, FIXED, MOTOR.format("swing", "Hydraulic")), [], "HydraulicJointInterface"),
         (
-            robot(*BARE[:2], FIXED, JOINT.format("swing", "revolute", "base", "rod", "<limit effort='1' velocity='1'/>")),
+            robot(*BARE[:2], FIXED, SWING.replace('lower="-1" upper="2" ', "")),
             [],
             "joint 'swing' can't move: lower and upper",
         ),
         (
-            robot(BARE[0], SWING, FIXED, LINK.format(
-                "rod", '<collision><geometry><mesh filename="package://nobodys/rod.stl"/></geometry></collision>'
-            )),
+            robot(BARE[0], SWING, FIXED, LINK.format("rod", NOBODYS)),
             [],
             "the package 'nobodys', which isn't found: ./ws --with FOLDER",
         ),
@@ -290,7 +298,9 @@ def test_a_name_that_can_not_be_is_told_with_one_that_can(tmp_path, capsys, name
 @pytest.mark.parametrize("there", ["folder", "file", "link"])
 def test_nothing_is_overwritten(tmp_path, capsys, there):
     place = tmp_path / "my_arm"
-    {"folder": place.mkdir, "file": place.touch, "link": lambda: place.symlink_to("nowhere")}[there]()
+    {"folder": place.mkdir, "file": place.touch, "link": lambda: place.symlink_to("nowhere")}[
+        there
+    ]()
     assert main(["my_arm", "--to", str(tmp_path)]) == 1
     assert "is there already" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["my_arm"]
@@ -304,7 +314,7 @@ def test_places_that_can_not_be(tmp_path, capsys):
 
 
 def test_it_is_written_beside_the_checkout(root):
-    assert package.PARENT == root.parent
+    assert root.parent == package.PARENT
 
 
 @pytest.mark.extras("stable_baselines3")

@@ -1,7 +1,7 @@
 """Every command of the documentation is one that its program takes: flags, files, arguments, requests.
 
-Those of the tutorial and of README's workbench are run by test_tutorial.py, those of docs/catkin.md by
-test_catkin_workspace.py. A command that nothing here knows how to look at is a fault.
+Those of the tutorials and of README's workbench are run by test_tutorial.py and test_tutorial_robot.py, those
+of docs/catkin.md by test_catkin_workspace.py. A command that nothing here knows how to look at is a fault.
 """
 
 from __future__ import annotations
@@ -27,12 +27,16 @@ from gazebo_msgs.srv import GetWorldPropertiesRequest
 
 from bullet_gazebo.ros.clients import gzclient
 from cartpole import dqn_train, pg_train, policy_node, workbench
+from package_writing import cli as new_robot
 from rl_workbench.training import cli as training_cli
 
 pytestmark = pytest.mark.usefixtures("signals")
 
 ROOT = Path(__file__).resolve().parents[3]
-RUN_ELSEWHERE = ("docs/tutorial_dqn.md", "docs/tutorial_dqn.zh.md", "docs/catkin.md")
+RUN_ELSEWHERE = (
+    "docs/tutorial_dqn.md", "docs/tutorial_dqn.zh.md", "docs/tutorial_robot.md", "docs/tutorial_robot.zh.md",
+    "docs/catkin.md",
+)  # fmt: skip
 STARTS = re.compile(r"(\./ws|rosrun|roslaunch|rosservice|gz|spawn_model)\s")
 PLACEHOLDERS = {"your_script.py", "ppo.py", "my_arm"}  # the reader's own
 TRAININGS = {"pg_train.py": pg_train.main, "dqn_train.py": dqn_train.main}
@@ -106,6 +110,7 @@ GROUPS = {
     "scripts": of("python3"),
     "launches": of("roslaunch"),
     "requests": of("rosservice call"),
+    "packages": of("rosrun cartpole new_robot.py"),
     "tests": of("test", "rostest", "check", "shell", "tensorboard"),
     "window": of("rosrun gazebo_ros gzclient"),
     "gains": of("rosrun dynamic_reconfigure dynparam set"),
@@ -140,6 +145,15 @@ def test_a_training_runs(command: Command, tmp_path: Path, monkeypatch, capsys) 
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "my_env.py").write_text(THEIR_ENVIRONMENT)
     assert TRAININGS[program](flags) == 0, capsys.readouterr()
+
+
+@pytest.mark.parametrize("command", GROUPS["packages"], ids=str)
+def test_new_robot_takes_it(command: Command, only_parsing: None, monkeypatch) -> None:
+    monkeypatch.setattr(
+        argparse.ArgumentParser, "parse_intermixed_args", argparse.ArgumentParser.parse_args
+    )
+    with pytest.raises(Parsed):
+        new_robot.main(command.words[3:])
 
 
 @pytest.mark.parametrize("command", GROUPS["window"], ids=str)

@@ -1,4 +1,4 @@
-"""The examples of docs/porting.md are environments, and do something."""
+"""The examples of docs/porting.md and of docs/environments.md are environments, and do something."""
 
 from __future__ import annotations
 
@@ -12,23 +12,29 @@ from gymnasium.utils.env_checker import check_env
 
 from robot_envs import GoalTask, RobotEnv
 
-PAGE = Path(__file__).resolve().parents[3] / "docs/porting.md"
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 TOOLKITS = ("openai_ros", "frobs_rl", "gym-gazebo", "ros-gazebo-gym")
+OWN = ("Another robot", "Another task")
 
 
-def sections() -> dict[str, str]:
-    parts = re.split(r"^## (.*)\n", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
+def sections(page: str = "porting.md") -> dict[str, str]:
+    text = (DOCS / page).read_text(encoding="utf-8")
+    parts = re.split(r"^## (.*)\n", text, flags=re.MULTILINE)
     return dict(zip(parts[1::2], parts[2::2], strict=True))
 
 
 def example(toolkit: str) -> tuple[RobotEnv, str]:
-    (text,) = re.findall(r"```python\n(.*?)```", sections()[toolkit], re.DOTALL)
-    names: dict[str, Any] = {}
-    exec(compile(text, f"the example of {toolkit}", "exec"), names)
-    return names["env"], text
+    """An environment, and how it is made: the first block of a section, or of those that make one."""
+    page = "environments.md" if toolkit in OWN else "porting.md"
+    names = OWN if toolkit in OWN else (toolkit,)
+    blocks = [re.findall(r"```python\n(.*?)```", sections(page)[name], re.DOTALL) for name in names]
+    text = "\n".join(block[0] for block in blocks)
+    made: dict[str, Any] = {}
+    exec(compile(text, f"the example of {toolkit}", "exec"), made)
+    return made["env"], text
 
 
-@pytest.mark.parametrize("toolkit", TOOLKITS)
+@pytest.mark.parametrize("toolkit", [*TOOLKITS, OWN[1]])
 @pytest.mark.filterwarnings("ignore:.*maximum value is infinity|.*minimum value is -infinity")
 def test_an_example_is_an_environment(toolkit: str) -> None:
     env, _ = example(toolkit)
@@ -55,6 +61,10 @@ def test_what_an_example_says_it_was_is_in_the_table(toolkit: str) -> None:
     env, text = example(toolkit)
     env.close()
     table = "".join(line for line in sections()[toolkit].splitlines() if line.startswith("|"))
-    names = [name for line in re.findall(r"# (?:was|were): (.*)", text) for name in re.findall(r"\b_\w+", line)]
+    names = [
+        name
+        for line in re.findall(r"# (?:was|were): (.*)", text)
+        for name in re.findall(r"\b_\w+", line)
+    ]
     assert names or toolkit == "gym-gazebo"
     assert [name for name in names if name not in table] == []

@@ -1,7 +1,7 @@
-"""Every command of docs/tutorial_robot.md, in order, with shorter trainings: a package of one's own through `ws`.
+"""Every command of docs/tutorial_robot.md, in order, with shorter trainings: a package of one's own.
 
-A block `sh skip` is another way to begin. One of Python that names a file is put at that file's end. Simulations are
-started, seen to be there, and ended; with RViz their launch files are read.
+A block `sh skip` is another way to begin. One of Python that names a file is put at that file's end.
+Simulations are started, seen to be there, and ended; with RViz their launch files are read.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ ROOT = Path(__file__).resolve().parents[3]
 ENGLISH, CHINESE = (ROOT / "docs" / name for name in ("tutorial_robot.md", "tutorial_robot.zh.md"))
 BLOCK = re.compile(r"^```(\S+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LIMIT = 300.0  # [s] for one command
-SHORT = "--total-timesteps 300 --eval-frequency 300 --eval-episodes 1 --confirm-episodes 1".split()
+SHORT = "--total-timesteps 300 --eval-frequency 300 --eval-episodes 1 --confirm-episodes 1"
 SHORTER = {
-    "train": [*SHORT, "--n-envs", "1", "--n-steps", "150", "--n-epochs", "1"],
-    "eval": ["--episodes", "1"],
-    "record": ["--max-steps", "10", "--size", "160x120"],
-    "train.launch": [f"more:={' '.join(SHORT)} --learning-starts 100"],
+    "train": f"{SHORT} --n-envs 1 --n-steps 150 --n-epochs 1",
+    "eval": "--episodes 1",
+    "record": "--max-steps 10 --size 160x120",
+    "train.launch": f"'more:={SHORT} --learning-starts 100'",
 }
 
 
@@ -85,7 +85,9 @@ class Reader:
 
     def do(self, words: list[str]) -> None:
         assert words[0] == "./ws", words
-        words = [each.replace("../my_arm", str(self.folder.parent / "my_arm")) for each in words[1:]]
+        words = [
+            each.replace("../my_arm", str(self.folder.parent / "my_arm")) for each in words[1:]
+        ]
         if "new_robot.py" in words:
             words += ["--to", str(self.folder.parent)]
         elif "roslaunch" in words:
@@ -95,7 +97,7 @@ class Reader:
             assert self.simulation is not None
         elif "workbench.py" in words:
             self.end_simulation()
-            words += SHORTER.get(words[words.index("workbench.py") + 1], [])
+            words += SHORTER.get(words[words.index("workbench.py") + 1], "").split()
         self.run(words)
 
     def launch(self, words: list[str]) -> None:
@@ -104,7 +106,7 @@ class Reader:
             words.insert(words.index("roslaunch") + 1, "--nodes")
             assert {"/rviz", "/gazebo"} <= set(self.run(words).split())
         elif "train.launch" in words:
-            self.run([*words, *SHORTER["train.launch"]])
+            self.run([*words, *shlex.split(SHORTER["train.launch"])])
         else:
             self.simulation = subprocess.Popen(
                 [ROOT / "ws", *words, "gui:=false"], cwd=self.folder, env=self.environment, text=True,

@@ -116,6 +116,12 @@ def test_the_robots_that_come_along_move_as_in_the_workspace(python: Path, tmp_p
     assert as_in_the_workspace(python, code, tmp_path).count("([") == 6
 
 
+def test_a_package_of_ones_own_is_written(python: Path, tmp_path: Path) -> None:
+    code = "from package_writing.cli import main; print(main(['my_arm', '--to', '.']))"
+    assert run(python, "-c", code, cwd=tmp_path).splitlines()[-1] == "0"
+    assert (tmp_path / "my_arm/urdf/two_link_arm.urdf.xacro").is_file()
+
+
 def test_rl_workbench_trains(python: Path, tmp_path: Path) -> None:
     command = python.with_name("rl-workbench")
     robot = ["--env-id", "cartpole/Classic-v0"]
