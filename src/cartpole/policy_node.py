@@ -1,9 +1,10 @@
 """The command policy_node.py: a trained policy moves a robot over ROS."""
 
 import argparse
+import contextlib
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from rl_workbench.tools.runs.exported import described, open_exported
 from rl_workbench.tools.runs.policies import WHICH, load_learned
 from rl_workbench.tools.runs.runs import open_run
 from rl_workbench.training.environments.answers import as_float32
+from rl_workbench.training.environments.checked import told
 from rl_workbench.training.environments.making import make_environment
 from rl_workbench.training.run.interrupt import Interrupt
 from robot_envs.backends.choice import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
@@ -66,15 +68,14 @@ def main(argv: list[str] | None = None) -> int:
                 arguments.run, arguments.checkpoint, env_options(arguments)
             )
         interrupt.defer()
-        run_node(
-            name,
-            argv,
-            lambda: PolicyNode(
-                robot, task, act, period,
-                arguments.late, arguments.seed, arguments.goal, arguments.max_speed or math.inf,
-            ),
-            interrupt.requested,
-        )  # fmt: skip
+        way = arguments.max_speed or math.inf
+
+        def make() -> PolicyNode:
+            late, seed, goal = arguments.late, arguments.seed, arguments.goal
+            return PolicyNode(robot, task, act, period, late, seed, goal, way)
+
+        with _told_in_one_line():
+            run_node(name, argv, make, interrupt.requested)
         return interrupt.exit_code
     except (WorkbenchError, RobotEnvError) as error:
         print(f"{NODE}.py: {error}", file=sys.stderr, flush=True)
@@ -82,6 +83,17 @@ def main(argv: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"{NODE}.py: interrupted", file=sys.stderr)
         return interrupt.exit_code or 130
+
+
+@contextlib.contextmanager
+def _told_in_one_line() -> Iterator[None]:
+    """What the user's task raises, whatever it is, once the robot is stopped."""
+    try:
+        yield
+    except RobotEnvError:
+        raise
+    except Exception as error:
+        raise RobotEnvError(f"the robot is stopped, the task failed: {told(error)}") from error
 
 
 def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:

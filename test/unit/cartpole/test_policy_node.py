@@ -102,6 +102,19 @@ def test_private_parameters_are_options_and_flags_count_more() -> None:
     assert found.run == Path("RUN")
 
 
+def test_a_mistake_in_a_task_is_one_line_with_its_place(run: Path, monkeypatch, capsys) -> None:
+    from robot_envs.backends.deployment import policy_node as node
+
+    def fails(*arguments: object) -> None:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(node, "run_node", fails)
+    assert policy_node.main([str(run)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "the robot is stopped, the task failed: ZeroDivisionError: division by zero (" in line
+    assert "test_policy_node.py:" in line
+
+
 def test_without_a_master_it_says_so(run: Path, monkeypatch, capsys) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
     assert policy_node.main([str(run)]) == 1
