@@ -16,6 +16,7 @@ from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.choice import make_backend
 from robot_envs.errors import TaskError
 from robot_envs.pictures.picture import HEIGHT, WIDTH, RobotPicture
+from robot_envs.pictures.surroundings import Surroundings
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.spaces import action_reader, observation_reader
@@ -148,7 +149,12 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         }
         self.render_mode = _known_mode(render_mode, window is not None)
         self._picture = RobotPicture(
-            self.scene.robots[0], width, height, camera=camera, base=self._base
+            self.scene.robots[0],
+            width,
+            height,
+            camera=camera,
+            base=self._base,
+            beside=Surroundings(self.scene, self._poses),
         )
         self._window = window(shown) if window and render_mode == "human" else None
         self._spec: EnvSpec | None = None
@@ -329,7 +335,11 @@ class RobotEnv(gymnasium.Env[Any, Any]):
         robot = self.scene.robots[0]
         if robot.links.fixed_base:
             return self.scene.stand(self._initial, robot).compose(robot.links.root_pose)
-        return self.backend.base()
+        return self.backend.poses([f"{robot.model}::{robot.links.root}"])[0]
+
+    def _poses(self, links: Sequence[str]) -> Sequence[Pose]:
+        """Where links are, each named model::link."""
+        return self.backend.poses(links)
 
     def render(self) -> np.ndarray | None:
         """A picture of the robot as it is, (height, width, 3). A window shows it by itself.

@@ -7,6 +7,7 @@ import unittest
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import rostest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
@@ -27,8 +28,8 @@ def models():
 class Scenes:
     """The tests. All environments of the same robots share one simulator, which the first one starts."""
 
-    def make(self, backend="ros", task=None):
-        made = RobotEnv(self.robots, task or self.task(), backend=backend)
+    def make(self, backend="ros", task=None, **options):
+        made = RobotEnv(self.robots, task or self.task(), backend=backend, **options)
         self.addCleanup(made.close)
         return made
 
@@ -41,6 +42,18 @@ class Scenes:
 
     def test_it_keeps_what_environments_of_robots_promise(self):
         check_robot_env(lambda **options: RobotEnv(self.robots, self.task(), **options), ("ros",))
+
+    def test_pictures_show_the_same_as_of_the_world_in_process(self):
+        pictures = []
+        for backend in ("ros", "bullet"):
+            env = self.make(backend, render_mode="rgb_array", width=160, height=80)
+            env.action_space.seed(1)
+            env.reset(seed=1)
+            for _ in range(10):
+                env.step(env.action_space.sample())
+            pictures.append(env.render())
+            env.close()
+        self.assertTrue(np.array_equal(*pictures))
 
     def test_objects_go_with_the_last_environment_that_has_them(self):
         names = {each.name for each in self.task().objects}
