@@ -159,7 +159,7 @@ class Engine(ABC):
         """Integrates the world by one time step."""
 
     def forget_contacts(self) -> None:
-        """Takes bodies for never having touched: the next step goes by where they are, not by where they were.
+        """Takes bodies for never having touched: the next step goes by where they are, and nothing else.
 
         To be called when an episode begins, before bodies are placed. An engine that remembers nothing of
         contacts from one step to the next has nothing to do.
