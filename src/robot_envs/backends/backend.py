@@ -1,5 +1,6 @@
 """What an environment needs of a world, be it simulated here, over ROS, or real."""
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from bullet_gazebo.physics.pose import Pose
@@ -37,8 +38,8 @@ class RobotBackend(Protocol):
         """Gives the first robot other masses, lengths and friction; to be called before a reset."""
         ...
 
-    def base(self) -> Pose:
-        """Where the frame of the first robot's root link is, in the world."""
+    def poses(self, links: Sequence[str]) -> list[Pose]:
+        """Where the frames of links are, each named model::link, in the world."""
         ...
 
     def close(self) -> None:

@@ -2,7 +2,7 @@
 
 import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from operator import attrgetter
 from typing import Any
 
@@ -19,7 +19,7 @@ from bullet_gazebo.physics.pose import Pose, normalized
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
-from bullet_gazebo.state.names import UnknownName, find_model
+from bullet_gazebo.state.names import UnknownName, find_link, find_model
 from bullet_gazebo.state.query import NOTHING, StateReader
 from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action
 from robot_envs.backends.in_process_variation import InProcessChanges
@@ -210,9 +210,17 @@ class InProcessWorld:
         """
         self._apply(variation)
 
-    def base(self) -> Pose:
-        """See `RobotBackend.base`."""
-        return self._model.root_state()[0]
+    def poses(self, links: Sequence[str]) -> list[Pose]:
+        """See `RobotBackend.poses`.
+
+        Raises:
+            SimulatorError: for a link that isn't there.
+        """
+        try:
+            found = [find_link(self._sim.world, name) for name in links]
+        except UnknownName as error:
+            raise SimulatorError(str(error)) from error
+        return [model.link_state(link)[0] for model, link in found]
 
     def close(self) -> None:
         """Frees the world; may be called twice."""

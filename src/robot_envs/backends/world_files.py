@@ -3,7 +3,7 @@
 import logging
 from dataclasses import replace
 
-from bullet_gazebo.physics.description import DescriptionError, Light
+from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
 from bullet_gazebo.physics.files.model_file import read_entity
 from bullet_gazebo.physics.files.reading import Reading
 from bullet_gazebo.physics.files.world_file import (
@@ -59,13 +59,29 @@ def _read(source: Source) -> WorldDescription:
         raise RobotEnvError(f"world {_told(source)}: {error}") from error
 
 
-def world_models(source: Source | None) -> list[str]:
-    """Names of the models that a world file brings; none for `EMPTY`.
+def world_models(source: Source | None) -> dict[str, ModelDescription]:
+    """The models that a world file brings; none for `EMPTY`.
 
     Raises:
         RobotEnvError: if it can't be read.
     """
-    return [] if source is None or source == EMPTY else list(_read(source).models)
+    return {} if source is None or source == EMPTY else _read(source).models
+
+
+def object_model(thing: Object) -> ModelDescription:
+    """What an object is.
+
+    Raises:
+        RobotEnvError: if its file can't be read, or is that of a light.
+    """
+    text = read_text(thing.file)
+    try:
+        entity = read_entity(text, thing.name, resources(), Reading())
+    except DescriptionError as error:
+        raise RobotEnvError(f"the object '{thing.name}' ({_told(thing.file)}): {error}") from error
+    if isinstance(entity, Light):
+        raise RobotEnvError(f"the object '{thing.name}' is a light; an object is a model")
+    return entity
 
 
 def spawn(world: World, thing: Object) -> None:
@@ -74,12 +90,9 @@ def spawn(world: World, thing: Object) -> None:
     Raises:
         RobotEnvError: if its file can't be read or simulated, or the world has a model of that name.
     """
-    text = read_text(thing.file)
+    model = object_model(thing)
     try:
-        entity = read_entity(text, thing.name, resources(), Reading())
-        if isinstance(entity, Light):
-            raise RobotEnvError(f"the object '{thing.name}' is a light; an object is a model")
-        world.spawn(thing.name, entity, thing.pose.compose(entity.initial_pose))
+        world.spawn(thing.name, model, thing.pose.compose(model.initial_pose))
     except NameTaken as error:
         raise RobotEnvError(
             f"the object '{thing.name}': the world has a model of that name; give it another one"

@@ -1,6 +1,6 @@
 """What is seen of an environment: its pictures, its page, its window."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import gymnasium
@@ -10,6 +10,7 @@ from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.pictures.picture import RobotPicture
+from robot_envs.pictures.surroundings import Surroundings
 from robot_envs.scene import Scene
 from robot_envs.world_state import InitialState, WorldState
 from web_page.display import hindrance
@@ -54,7 +55,13 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             "render_fps": max(1, round(1.0 / period)),
         }
         self.render_mode = _known_mode(render_mode, window is not None)
-        self._picture = RobotPicture(self.scene.robots[0], *size, camera=camera, base=self._base)
+        self._picture = RobotPicture(
+            self.scene.robots[0],
+            *size,
+            camera=camera,
+            base=self._base,
+            beside=Surroundings(self.scene, self._poses),
+        )
         self._window = window(period) if window and render_mode == "human" else None
 
     def _show(self) -> None:
@@ -79,7 +86,11 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         robot = self.scene.robots[0]
         if robot.links.fixed_base:
             return self.scene.stand(self._initial, robot).compose(robot.links.root_pose)
-        return self.backend.base()
+        return self.backend.poses([f"{robot.model}::{robot.links.root}"])[0]
+
+    def _poses(self, links: Sequence[str]) -> Sequence[Pose]:
+        """Where links are, each named model::link."""
+        return self.backend.poses(links)
 
     def render(self) -> np.ndarray | None:
         """A picture of the robot as it is, (height, width, 3). A window shows it by itself.

@@ -79,7 +79,7 @@ class RobotOnPage:
         scene.add_frame(self._node, show_axes=False, position=beside * aside)
         self._seen = _seen(placement)
         self._picture = Picture(server, logger.warning, below=self._node)
-        self._picture.draw([self._seen], [])
+        self._picture.draw(self._seen, [])
         self()
 
     def __call__(self, caption: str = "") -> None:
@@ -100,10 +100,9 @@ class RobotOnPage:
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
         """
         positions, base = self._positions(), self._placement.base()
-        poses = self._placement.links(positions, base)
-        rows = [
-            [*poses[link.name].position, *poses[link.name].orientation] for link in self._seen.links
-        ]
+        found = self._placement.poses(positions, base)
+        poses = [found[model.name][link.name] for model in self._seen for link in model.links]
+        rows = [[*pose.position, *pose.orientation] for pose in poses]
         return Placed(np.array(rows), np.array(self._placement.strayed(positions, base)))
 
     def show(self, placed: Placed, caption: str = "") -> None:
@@ -139,13 +138,17 @@ def _draw_ground(server: viser.ViserServer) -> None:
     ground.move(np.array([(*ZERO, *IDENTITY)] * sum(len(model.links) for model in seen)))
 
 
-def _seen(placement: Placement) -> SeenModel:
-    shapes: dict[str, list[Shape]] = defaultdict(list)
-    for link, shape in placement.shapes:
-        shapes[link].append(shape)
-    return SeenModel(
-        0, placement.name, [SeenLink(name, shapes[name]) for name in placement.description.links]
-    )
+def _seen(placement: Placement) -> list[SeenModel]:
+    """The robot with all of its links, and of what is beside it those that are seen."""
+    models = []
+    for number, (name, shapes) in enumerate(placement.models.items()):
+        links: dict[str, list[Shape]] = defaultdict(list)
+        if not number:
+            links |= {link: [] for link in placement.description.links}
+        for link, shape in shapes:
+            links[link].append(shape)
+        models.append(SeenModel(number, name, [SeenLink(*each) for each in links.items()]))
+    return models
 
 
 def _look(page: viser.InitialCameraConfig, camera: Camera) -> None:

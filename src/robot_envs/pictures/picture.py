@@ -8,6 +8,7 @@ import numpy as np
 from bullet_gazebo.physics.pose import Pose, add
 from bullet_gazebo.pictures.camera import Camera
 from robot_envs.pictures.placement import Placement
+from robot_envs.pictures.surroundings import Surroundings
 from robot_envs.robot import Robot
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ class RobotPicture:
         camera: where it is seen from, as it is spawned; by default so that all that the joints can
             reach is seen.
         base: where its root link is now, which the camera follows; None: where it is spawned.
+        beside: what else is in its world; None: nothing.
 
     Raises:
         ValueError: for a size that no picture has.
@@ -44,12 +46,14 @@ class RobotPicture:
         *,
         camera: Camera | None = None,
         base: Callable[[], Pose] | None = None,
+        beside: Surroundings | None = None,
     ) -> None:
         for side in (width, height):
             if not 1 <= side <= LARGEST or side != int(side):
                 raise ValueError(f"a picture's width and height lie in [1, {LARGEST}], not {side}")
-        self._robot, self._size = robot, (int(width), int(height))
-        self._camera, self._base = camera, base
+        self._size = (int(width), int(height))
+        self._camera = camera
+        self._placement = lambda: Placement(robot, base, beside)
         self._drawn: _DrawnRobot | None = None
 
     def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
@@ -59,7 +63,7 @@ class RobotPicture:
             RobotEnvError: if the robot's file can't be read.
         """
         if self._drawn is None:
-            self._drawn = _DrawnRobot(Placement(self._robot, self._base), self._camera, self._size)
+            self._drawn = _DrawnRobot(self._placement(), self._camera, self._size)
         return self._drawn(positions)
 
     def draw_on(
@@ -72,8 +76,7 @@ class RobotPicture:
         """
         from robot_envs.pictures.page import RobotOnPage
 
-        placement = Placement(self._robot, self._base)
-        return RobotOnPage(server, placement, positions, self._camera, self._size, beside)
+        return RobotOnPage(server, self._placement(), positions, self._camera, self._size, beside)
 
     def close(self) -> None:
         """Frees what it has loaded; may be called twice."""
@@ -91,10 +94,12 @@ class _DrawnRobot:
         self._placement, self._size = placement, size
         self._camera = placement.camera(camera, size[0] / size[1])
         self.scene = Scene()
-        self.scene.add("robot", placement.shapes)
+        for name, shapes in placement.models.items():
+            self.scene.add(name, shapes)
 
     def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
         base = self._placement.base()
-        self.scene.place("robot", self._placement.links(positions, base))
+        for name, poses in self._placement.poses(positions, base).items():
+            self.scene.place(name, poses)
         target = add(self._camera.target, self._placement.strayed(positions, base))
         return self.scene.picture(self._camera.at(target), *self._size)

@@ -10,6 +10,7 @@ from bullet_gazebo.physics.mechanics.kinematics import link_poses
 from bullet_gazebo.physics.pose import Pose, Vector, subtract
 from bullet_gazebo.pictures.camera import Camera, overview
 from bullet_gazebo.pictures.solids import box_around, moved, solid_of, visible_shapes
+from robot_envs.pictures.surroundings import Shapes, Surroundings
 from robot_envs.robot import Robot
 
 QUARTERS = (0.0, pi / 2.0, pi, -pi / 2.0)  # [rad] of a joint without stops
@@ -21,12 +22,19 @@ class Placement:
     Args:
         robot: the robot.
         base: where its root link is now; None: where it is spawned.
+        beside: what else is in its world; None: nothing.
 
     Raises:
         RobotEnvError: if the robot's file can't be read.
     """
 
-    def __init__(self, robot: Robot, base: Callable[[], Pose] | None = None) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        base: Callable[[], Pose] | None = None,
+        beside: Surroundings | None = None,
+    ) -> None:
+        self._beside = beside
         self.name, self.description = robot.model, robot.links
         self.shapes = visible_shapes(self.description)
         self._start = robot.pose.compose(self.description.root_pose)
@@ -35,12 +43,31 @@ class Placement:
         self._slides = {joint.name: 0.0 for joint in slides}
         self._carried = slides[-1].child if slides else None
 
-    def links(self, positions: Mapping[str, float], base: Pose) -> dict[str, Pose]:
-        """The frame of every link in the world, for joints' positions and where the root link is."""
-        return link_poses(self.description, base, positions)
+    @property
+    def models(self) -> dict[str, Shapes]:
+        """What is seen of each model, the robot first."""
+        return {self.name: self.shapes, **(self._beside.shapes if self._beside else {})}
+
+    def poses(self, positions: Mapping[str, float], base: Pose) -> dict[str, dict[str, Pose]]:
+        """The frame of every link in the world, by model.
+
+        Args:
+            positions: of the robot's joints [rad, m].
+            base: where its root link is.
+
+        Raises:
+            SimulatorError: if the backend has to be asked, and doesn't answer.
+        """
+        others = self._beside.poses() if self._beside else {}
+        own = {} if self.name in others else link_poses(self.description, base, positions)
+        return {self.name: own, **others}
 
     def reach(self) -> np.ndarray:
-        """Corners of boxes around all that the joints can reach from the start [m]: (n, 3)."""
+        """Corners of boxes around all that robots' joints can reach from the start [m]: (n, 3)."""
+        others = [Placement(each).reach() for each in self._beside.robots] if self._beside else []
+        return np.concatenate([self._own_reach(), *others])
+
+    def _own_reach(self) -> np.ndarray:
         reached = [{}, *({joint.name: place} for joint, place in self._places())]
         poses = [link_poses(self.description, self._start, each) for each in reached]
         corners = [

@@ -50,7 +50,7 @@ class FreeRobot(unittest.TestCase):
                 for _ in range(4):
                     env.step(np.ones(1, np.float32))
                 pictures[backend].append(env.render())
-            places[backend] = env.backend.base()
+            places[backend] = env.backend.poses([f"{robot.model}::{robot.links.root}"])[0]
             env.close()
         for ours, theirs in zip(*pictures.values(), strict=True):
             self.assertTrue(np.array_equal(ours, theirs))

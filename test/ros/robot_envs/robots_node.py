@@ -1,18 +1,13 @@
 #!/usr/bin/env python3
-"""The robots that come along give over ROS in lock-step the bits that they give in this process."""
+"""The robots that come along, over ROS in lock-step: the bits in this process, and the conformance suite."""
 
-import sys
 import unittest
-from pathlib import Path
 
 import gymnasium
 import rostest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
-
-from scenes.rollout import rollout, same
-
 import robot_envs.robots  # noqa: F401 - registers the environments
+from robot_envs.testing import check_robot_env, differences, rollout
 
 # One of each robot; the others differ in what is made of the same numbers.
 IDS = tuple(
@@ -30,9 +25,11 @@ class Robots(unittest.TestCase):
                     gymnasium.make(identifier),
                 )
                 for seed in (1, 2):  # the second time after other episodes
-                    self.assertTrue(same(rollout(over_ros, 30, seed), rollout(here, 30, seed)))
+                    given = rollout(over_ros, 30, seed)
+                    self.assertEqual(differences(given, rollout(here, 30, seed)), "")
                 over_ros.close()
                 here.close()
+                check_robot_env(identifier, ("ros",), steps=30)
 
 
 if __name__ == "__main__":

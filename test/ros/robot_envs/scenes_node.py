@@ -7,16 +7,17 @@ import unittest
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import rostest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
 
-from scenes.rollout import rollout, same
 from scenes.rover import ROVER, Push
 from scenes.two_arms import LEFT, RIGHT, Volley
 
 from robot_envs import InitialState, Pose, RobotEnv, RobotEnvError, SimulatorError
 from robot_envs.backends.ros import bring_up
+from robot_envs.testing import check_robot_env, differences, rollout
 
 
 def models():
@@ -27,15 +28,32 @@ def models():
 class Scenes:
     """The tests. All environments of the same robots share one simulator, which the first one starts."""
 
-    def make(self, backend="ros", task=None):
-        made = RobotEnv(self.robots, task or self.task(), backend=backend)
+    def make(self, backend="ros", task=None, **options):
+        made = RobotEnv(self.robots, task or self.task(), backend=backend, **options)
         self.addCleanup(made.close)
         return made
 
     def test_the_bits_are_those_of_the_world_in_process(self):
         over_ros, here = self.make(), self.make("bullet")
         for seed in (7, 8):  # the second time after other episodes
-            self.assertTrue(same(rollout(over_ros, 130, seed), rollout(here, 130, seed)))
+            self.assertEqual(
+                differences(rollout(over_ros, 130, seed), rollout(here, 130, seed)), ""
+            )
+
+    def test_it_keeps_what_environments_of_robots_promise(self):
+        check_robot_env(lambda **options: RobotEnv(self.robots, self.task(), **options), ("ros",))
+
+    def test_pictures_show_the_same_as_of_the_world_in_process(self):
+        pictures = []
+        for backend in ("ros", "bullet"):
+            env = self.make(backend, render_mode="rgb_array", width=160, height=80)
+            env.action_space.seed(1)
+            env.reset(seed=1)
+            for _ in range(10):
+                env.step(env.action_space.sample())
+            pictures.append(env.render())
+            env.close()
+        self.assertTrue(np.array_equal(*pictures))
 
     def test_objects_go_with_the_last_environment_that_has_them(self):
         names = {each.name for each in self.task().objects}
@@ -65,13 +83,13 @@ class Scenes:
         self.assertEqual(models(), before)  # the first one's episode goes on
         first.step(first.action_space.sample())
         for env, wanted in ((second, 1), (first, 0), (second, 1)):
-            self.assertTrue(same(rollout(env, 20, seed=2), expected[wanted]))
+            self.assertEqual(differences(rollout(env, 20, seed=2), expected[wanted]), "")
             self.assertEqual("another" in models(), env is second)
         with self.assertRaisesRegex(SimulatorError, "another environment of this process"):
             first.step(first.action_space.sample())
         second.close()
         self.assertNotIn("another", models())
-        self.assertTrue(same(rollout(first, 20, seed=2), expected[0]))
+        self.assertEqual(differences(rollout(first, 20, seed=2), expected[0]), "")
 
     def test_wrong_names_are_told_with_the_nearest(self):
         env = self.make()

@@ -13,14 +13,13 @@ import rostest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
 
-from environment_conformance import rollout
-from gymnasium.utils.env_checker import data_equivalence as same
 from pendulum import MOTOR, PENDULUM, hanging, make_pendulum
 
 from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.backends.ros.session import RosSession
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.scene import Scene
+from robot_envs.testing import differences, rollout
 from robot_envs.world_state import InitialState, LinkQuery, Motion, Pose, StateQuery
 from ros_utils import ros_gazebo
 
@@ -92,7 +91,7 @@ class Lockstep(SecondRobot):
                 runs.append(rollout(env, 500, seed=8))
                 env.close()
             with self.subTest(options):
-                self.assertTrue(all(same(a, b, exact=True) for a, b in zip(*runs, strict=True)))
+                self.assertEqual(differences(*runs), "")
 
     def test_what_is_told_of_the_world_has_the_bits_of_the_robot_in_process(self):
         query = StateQuery(

@@ -3,7 +3,6 @@
 import importlib.util
 import subprocess
 import sys
-from typing import Any, ClassVar
 
 import gymnasium
 import pytest
@@ -120,7 +119,7 @@ def test_a_backend_over_ros_says_that_ros_is_not_there(monkeypatch, backend):
 @pytest.mark.extras("mujoco")
 class TestMujoco(EnvironmentConformance):
     identifier = "cartpole/Classic-v0"
-    options: ClassVar[dict[str, Any]] = {"backend": "mujoco"}
+    backend = "mujoco"
 
 
 def test_the_control_period_is_that_of_the_physics():

@@ -1,15 +1,15 @@
 """Robots in a simulator over ROS that moves in lock-step."""
 
 import contextlib
+from collections.abc import Sequence
 from typing import Any
 
 import genpy
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
 
 from bullet_gazebo.physics.pose import Pose
-from robot_envs.backends.ros.base_pose import base_pose
 from robot_envs.backends.ros.bring_up import STEP_SERVICE, full_name, ready
-from robot_envs.backends.ros.messages import JointReader, ask_for, place, told
+from robot_envs.backends.ros.messages import JointReader, ask_for, place, pose_of, told
 from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.backends.ros.service import ServiceClient
 from robot_envs.backends.ros.turn import Turn
@@ -17,7 +17,14 @@ from robot_envs.backends.ros.variation import RosVariation
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
-from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState, link_keys
+from robot_envs.world_state import (
+    Commands,
+    InitialState,
+    LinkQuery,
+    StateQuery,
+    WorldState,
+    link_keys,
+)
 from ros_utils.step_client import time_of
 
 
@@ -121,14 +128,16 @@ class LockstepWorld:
         """See `RobotBackend.vary`."""
         self._variation(variation)
 
-    def base(self) -> Pose:
-        """See `RobotBackend.base`.
+    def poses(self, links: Sequence[str]) -> list[Pose]:
+        """See `RobotBackend.poses`; one call, however many there are.
 
         Raises:
-            SimulatorError: if the simulator doesn't answer.
+            SimulatorError: if the simulator doesn't answer, or has no such link.
         """
-        with self._simulator:
-            return base_pose(self.scene.robots[0])
+        asked = StateQuery(links=tuple(map(LinkQuery, links)))
+        request = StepWorldRequest()  # no ticks: it only looks
+        ask_for(request, asked)
+        return [pose_of(each) for each in self._call(request).link_poses]
 
     def close(self) -> None:
         """Closes the connection to the simulator; robots and objects are as they were found."""

@@ -133,10 +133,14 @@ def told(
     )
 
 
+def pose_of(message: PoseMsg) -> Pose:
+    """The same as a pose of ours."""
+    place, turn = message.position, message.orientation
+    return Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
+
+
 def _motion(pose: PoseMsg, twist: Twist) -> Motion:
-    place, turn = pose.position, pose.orientation
-    at = Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
-    return Motion(at, (_vector(twist.linear), _vector(twist.angular)))
+    return Motion(pose_of(pose), (_vector(twist.linear), _vector(twist.angular)))
 
 
 def _contact(state: ContactState) -> ContactPair:

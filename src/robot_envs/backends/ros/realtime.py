@@ -3,12 +3,12 @@
 import contextlib
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import rospy
 from gazebo_msgs.msg import ModelState
-from gazebo_msgs.srv import SetModelConfiguration, SetModelState
+from gazebo_msgs.srv import GetLinkState, SetModelConfiguration, SetModelState
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 from sensor_msgs.msg import JointState as JointStateMsg
@@ -16,9 +16,8 @@ from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Empty
 
 from bullet_gazebo.physics.pose import Pose
-from robot_envs.backends.ros.base_pose import base_pose
 from robot_envs.backends.ros.bring_up import full_name, ready
-from robot_envs.backends.ros.messages import JointReader
+from robot_envs.backends.ros.messages import JointReader, pose_of
 from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.backends.ros.service import ServiceClient
 from robot_envs.backends.ros.turn import Turn
@@ -158,6 +157,7 @@ class RealtimeWorld:
         self._read = JointReader(scene)
         self._held: dict[str, Any] = {}
         self._begin = 0.0  # [s] of the episode
+        self._get_link = ServiceClient("/gazebo/get_link_state", GetLinkState)
         self._pause = ServiceClient("/gazebo/pause_physics", Empty)
         self._unpause = ServiceClient("/gazebo/unpause_physics", Empty)
         self._topics = {
@@ -273,14 +273,17 @@ class RealtimeWorld:
         """See `RobotBackend.vary`."""
         self._variation(variation)
 
-    def base(self) -> Pose:
-        """See `RobotBackend.base`.
+    def poses(self, links: Sequence[str]) -> list[Pose]:
+        """See `RobotBackend.poses`; a call for each.
 
         Raises:
-            SimulatorError: if the simulator doesn't answer.
+            SimulatorError: if the simulator doesn't answer, or has no such link.
         """
         with self._simulator:
-            return base_pose(self._robot)
+            answers = [self._get_link(link, "world") for link in links]
+        for link, answer in zip(links, answers, strict=True):
+            _check(answer, f"where '{link}' is isn't told")
+        return [pose_of(answer.link_state.pose) for answer in answers]
 
     def close(self) -> None:
         """Leaves the topics; the world stays as it is, robot and objects as they were found."""

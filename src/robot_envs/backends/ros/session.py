@@ -120,7 +120,11 @@ class RosSession:
 
     def serves(self, scene: Scene, realtime: bool) -> bool:
         """Whether it is these robots', and moves as asked."""
-        return self._scene.robots == scene.robots and self._realtime == realtime
+        return self.moves(scene.robots) and self._realtime == realtime
+
+    def moves(self, robots: Sequence[Robot]) -> bool:
+        """Whether it is these robots'."""
+        return self._scene.robots == tuple(robots)
 
     def connect(self, scene: Scene, control_period: float) -> RobotBackend:
         """A connection of its own to the robots; whoever asks for it closes it.
@@ -239,8 +243,7 @@ def _at_living_simulator(simulator: OwnSimulator, undo: Undo) -> None:
 def running_session(scene: Scene, realtime: bool) -> RosSession:
     """The process's session, started if there is none; that one runs until the process ends.
 
-    Where its simulator has died, another one is started. A session of other robots, or in the other mode,
-    ends for it.
+    Where its simulator has died, another one is started. A session of other robots ends for it.
 
     Raises:
         RobotEnvError: if something can't be started, or what runs doesn't fit, or an environment of other
@@ -252,7 +255,7 @@ def running_session(scene: Scene, realtime: bool) -> RosSession:
             if lives:
                 return session
             break
-        if lives:
+        if lives and not session.moves(scene.robots):
             session.make_room()
     name = f"/{_name(scene)}_env_{os.getpid()}"
     session = RosSession(scene.robots, name, [], realtime=realtime, gui=False, seed=0)
