@@ -8,7 +8,7 @@ import numpy as np
 from cartpole.robot import CART_JOINT, POLE_JOINT, ROBOT
 from cartpole.tasks import CartPoleTask
 from robot_envs.backends.backend import RobotBackend
-from robot_envs.environment.robot_env import RobotEnv
+from robot_envs.environment import RobotEnv
 from robot_envs.pictures.drawn import Viewer
 from robot_envs.pictures.picture import Camera
 

@@ -23,7 +23,7 @@ from rl_workbench.training.environments.checked import told
 from rl_workbench.training.environments.making import make_environment
 from rl_workbench.training.run.interrupt import Interrupt
 from robot_envs.backends.choice import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
-from robot_envs.environment.robot_env import RobotEnv
+from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.task import Task

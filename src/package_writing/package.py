@@ -15,7 +15,8 @@ from package_writing import contents
 from package_writing.errors import CannotWrite
 from package_writing.survey import Survey, look_at
 from package_writing.urdf_files import Copied, copy_urdf
-from robot_envs import Robot, RobotEnvError, controllers, files
+from robot_envs import Robot, RobotEnvError
+from robot_envs.description import controllers, files
 
 TREE = Path(__file__).resolve().parents[2]  # the source tree
 IS_CHECKOUT = (TREE / "ws").is_file()

@@ -6,7 +6,7 @@ A `Robot` (robot.py) says what it is made of, a `Task` (task.py) what is to be l
 (backends/) moves it, and `RobotEnv` (environment.py) puts them together. Knows no robot by name.
 """
 
-from robot_envs.environment.robot_env import RobotEnv
+from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.making import register
 from robot_envs.robot import EMPTY, Robot

@@ -8,8 +8,8 @@ from typing import Any
 import gymnasium
 
 from bullet_gazebo.state.names import did_you_mean
-from robot_envs.environment.robot_env import RobotEnv
-from robot_envs.environment.task_checks import short
+from robot_envs.checks.task_checks import short
+from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.task import Task

@@ -24,9 +24,9 @@ from bullet_gazebo.state.query import NOTHING, StateReader
 from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action
 from robot_envs.backends.in_process_variation import InProcessChanges
 from robot_envs.backends.world_files import fill, spawn
-from robot_envs.controllers import Loaded, load
+from robot_envs.description.controllers import Loaded, load
+from robot_envs.description.files import resources
 from robot_envs.errors import RobotEnvError, SimulatorError
-from robot_envs.files import resources
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation

@@ -7,7 +7,7 @@ from typing import Any
 
 import gymnasium
 
-from robot_envs.environment.robot_env import RobotEnv
+from robot_envs.environment import RobotEnv
 
 Make = Callable[..., gymnasium.Env[Any, Any]]
 

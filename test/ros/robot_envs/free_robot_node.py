@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
 from pendulum import FILES, PENDULUM, Upright
 
 from robot_envs.backends.ros.session import RosSession
-from robot_envs.environment.robot_env import RobotEnv
+from robot_envs.environment import RobotEnv
 
 HULL = """<link name="hull">
   <inertial><mass value="0.3"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>

@@ -13,10 +13,10 @@ from robots import CartPole
 from cartpole.robot import CONTROL_PERIOD, CONTROLLER, ROBOT
 from cartpole.tasks import CartPoleState
 from cartpole.variation import CartPoleVariation, Randomisation
-from robot_envs import files
 from robot_envs.backends.in_process import InProcessWorld
+from robot_envs.description import files
+from robot_envs.description.files import own_file
 from robot_envs.errors import RobotEnvError, TaskError
-from robot_envs.files import own_file
 from robot_envs.scene import Scene
 
 UPRIGHT = CartPoleState(0.0, 0.0, 0.0, 0.0)

@@ -65,7 +65,7 @@ WITHOUT_ROS = (
     "rl_workbench.cli",
     "rl_workbench.training.run.training",
     "robot_envs.backends.in_process",
-    "robot_envs.environment.robot_env",
+    "robot_envs.environment",
 )
 
 

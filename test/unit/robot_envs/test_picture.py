@@ -17,7 +17,7 @@ from robot_envs.robots.hopper import ROBOT as HOPPER
 def where(picture: np.ndarray, channel: int) -> np.ndarray:
     """Mean column and row [pixels] of what has one of the three colours."""
     others = [each for each in range(3) if each != channel]
-    strong = picture[..., channel].astype(int) > 60 + picture[..., others].max(axis=-1).astype(int)
+    strong = picture[..., channel].astype(int) > 40 + picture[..., others].max(axis=-1).astype(int)
     assert strong.any()
     return np.argwhere(strong)[:, ::-1].mean(axis=0) + 0.5
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from bullet_gazebo.control.joint import JointLimits
-from robot_envs.controllers import CommandPort
+from robot_envs.description.controllers import CommandPort
 from robot_envs.robot import Robot
 from robot_envs.world_state import Command, JointState
 

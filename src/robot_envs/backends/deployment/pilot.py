@@ -7,8 +7,8 @@ import numpy as np
 
 from robot_envs.backends.deployment.limits import CommandLimits
 from robot_envs.backends.deployment.links import LinkView
-from robot_envs.environment.goals import with_goals
-from robot_envs.environment.spaces import action_reader, observation_reader
+from robot_envs.checks.goals import with_goals
+from robot_envs.checks.spaces import action_reader, observation_reader
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene

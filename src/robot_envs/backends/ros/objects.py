@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from robot_envs.backends.ros import bring_up
-from robot_envs.files import read_text
+from robot_envs.description.files import read_text
 from robot_envs.task import Object
 from ros_utils import ros_gazebo
 

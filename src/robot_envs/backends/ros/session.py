@@ -25,8 +25,8 @@ from robot_envs.backends.ros.window import (
     tell_open,
     tell_opening,
 )
+from robot_envs.description.files import is_text, locate
 from robot_envs.errors import RobotEnvError
-from robot_envs.files import is_text, locate
 from robot_envs.robot import EMPTY, Robot
 from robot_envs.scene import Scene
 from ros_utils import ros_gazebo

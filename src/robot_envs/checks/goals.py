@@ -6,7 +6,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from robot_envs.environment import task_checks
+from robot_envs.checks import task_checks
 from robot_envs.errors import TaskError
 from robot_envs.task import GoalTask
 from robot_envs.world_state import WorldState

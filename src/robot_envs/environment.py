@@ -11,10 +11,10 @@ from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.state.names import did_you_mean
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.choice import make_backend
-from robot_envs.environment import task_checks
-from robot_envs.environment.goals import aim, goal_space, with_goals
-from robot_envs.environment.spaces import action_reader, observation_reader
-from robot_envs.environment.task_checks import check_steps, check_task
+from robot_envs.checks import task_checks
+from robot_envs.checks.goals import aim, goal_space, with_goals
+from robot_envs.checks.spaces import action_reader, observation_reader
+from robot_envs.checks.task_checks import check_steps, check_task
 from robot_envs.pictures.drawn import DrawnEnv, Viewer
 from robot_envs.pictures.picture import HEIGHT, WIDTH
 from robot_envs.robot import Robot

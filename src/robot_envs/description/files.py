@@ -19,8 +19,8 @@ Source = str | Path
 """A file, as a path or as "package://PACKAGE/PLACE"; or, for what begins with "<", the text itself."""
 
 PACKAGE = "package://"
-TREE = Path(__file__).resolve().parents[2]  # the source tree
-SHARE = Path(__file__).resolve().parent / "share"  # in a wheel (setup.py)
+TREE = Path(__file__).resolve().parents[3]  # the source tree
+SHARE = Path(__file__).resolve().parents[1] / "share"  # in a wheel (setup.py)
 
 
 def own_file(package: str, place: str) -> Path:
