@@ -1,1 +1,1 @@
-"""What an action, an observation and a goal must be, and what a task returns: a line for what does not fit."""
+"""What an action, an observation and a goal must be, and what a task returns: a line for each fault."""
