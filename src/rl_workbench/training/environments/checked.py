@@ -18,7 +18,9 @@ COMPUTE_REWARD = "compute_reward"  # method of an environment with a goal
 # Where code isn't the user's.
 _LIBRARIES = (
     *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
-    str(Path(__file__).resolve().parents[3]),  # all of this project
+    *{
+        str(path.parents[3]) for path in (Path(__file__), Path(__file__).resolve())
+    },  # all of this project
     str(Path(gymnasium.__file__).parent),
     "<frozen",
 )
