@@ -12,6 +12,7 @@ import shlex
 import signal
 import socket
 import subprocess
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -49,7 +50,7 @@ def environment() -> dict[str, str]:
         master = f"http://127.0.0.1:{free.getsockname()[1]}"
     plain = {name: os.environ[name] for name in ("HOME", "CARTPOLE_WS_DIR") if name in os.environ}
     return {**plain, "PATH": "/usr/local/bin:/usr/bin:/bin", "ROS_MASTER_URI": master,
-            "OMP_NUM_THREADS": "1"}  # fmt: skip
+            "OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}  # fmt: skip
 
 
 class Reader:
@@ -72,7 +73,7 @@ class Reader:
             self.write(block)
             return
         for line in block.text.splitlines():
-            if line not in self.done:
+            if line not in self.done or "roslaunch" in line:
                 self.do(shlex.split(line, comments=True))
                 self.done.add(line)
 
@@ -95,6 +96,9 @@ class Reader:
             return
         elif "rostopic" in words:
             assert self.simulation is not None
+        elif "policy_node.py" in words:
+            self.move(words)
+            return
         elif "workbench.py" in words:
             self.end_simulation()
             words += SHORTER.get(words[words.index("workbench.py") + 1], "").split()
@@ -119,6 +123,24 @@ class Reader:
                 "ready(Scene([ROBOT])).wait(180)"
             )
             self.run(["--with", str(self.folder.parent / "my_arm"), "python3", "-c", code])
+
+    def move(self, words: list[str]) -> None:
+        """Has the policy move the simulated robot, and ends it with Ctrl-C."""
+        assert self.simulation is not None
+        with subprocess.Popen(
+            [ROOT / "ws", *words], cwd=self.folder, env=self.environment, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
+        ) as node:  # fmt: skip
+            assert node.stdout is not None
+            bound = threading.Timer(LIMIT, os.killpg, (node.pid, signal.SIGKILL))
+            bound.start()
+            lines = []
+            for line in iter(node.stdout.readline, ""):
+                lines.append(line)
+                if "the policy moves the robot" in line:
+                    os.killpg(node.pid, signal.SIGINT)
+            bound.cancel()
+            assert any("the robot is stopped" in line for line in lines), lines
 
     def end_simulation(self) -> None:
         if self.simulation is not None:
