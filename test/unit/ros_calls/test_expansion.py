@@ -12,7 +12,7 @@ import pytest
 from robot_envs.description import files
 from robot_envs.errors import RobotEnvError
 from ros_calls import expansion, xacro_process
-from ros_calls.expansion import CannotExpand, expand
+from ros_calls.expansion import CannotExpand, expand, included_files
 from ros_utils import ros_gazebo, ros_urdf
 
 XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">{}</robot>'
@@ -82,7 +82,7 @@ def test_a_pipe_that_nobody_writes(tmp_path):
 def test_narrower_limits_of_the_caller_stay(bad):
     script = f"""
 import resource
-from ros_calls.expansion import CannotExpand, expand
+from ros_calls.expansion import CannotExpand, expand, included_files
 resource.setrlimit(resource.RLIMIT_AS, (400 << 20, 400 << 20))
 try:
     expand({bad("${'a' * 5 * 10**8}")!r})
@@ -103,7 +103,18 @@ def test_ros_utils_and_the_environments_are_bounded(bad, short, capsys):
     assert not ros_gazebo.gazebo_spawn_urdf_path(path)
     assert re.fullmatch(r"(\[ERROR\] .*: needs more than .*\n){2}", capsys.readouterr().err)
     with pytest.raises(RobotEnvError, match="can't read .*: needs more than"):
-        files.read_urdf(path)
+        files.read_urdf(path, {})
+
+
+def test_the_files_that_one_includes(bad, tmp_path):
+    (tmp_path / "part.xacro").write_text(XACRO.format("<link name='l'/>"))
+    (tmp_path / "numbers.yaml").write_text("length: 1.0\n")
+    text = '<xacro:arg name="p" default="part"/><xacro:include filename="$(arg p).xacro"/>'
+    path = bad(f"{text}<link name=\"${{xacro.load_yaml('numbers.yaml')['length']}}\"/>")
+    assert included_files(path) == [str(tmp_path / "numbers.yaml"), str(tmp_path / "part.xacro")]
+    assert included_files(bad("<link name='l'/>")) == []
+    with pytest.raises(CannotExpand, match="none.xacro"):
+        included_files(bad('<xacro:include filename="none.xacro"/>'))
 
 
 def test_many_at_once(bad):
