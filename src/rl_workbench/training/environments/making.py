@@ -16,7 +16,6 @@ from rl_workbench.training.environments.checked import (
     told,
 )
 from rl_workbench.training.environments.names import import_module_of, unknown_environment
-from rl_workbench.training.options.training_options import TrainingOptions
 
 FLAT = (spaces.Box, spaces.Discrete, spaces.MultiBinary, spaces.MultiDiscrete)
 CONTINUOUS = "reinforce, or Stable-Baselines3's ppo, a2c, sac, td3 or ddpg"
@@ -61,19 +60,6 @@ def make_environment(
     if keep_dict and is_dict_of_arrays(env.observation_space):
         return CheckedEnvironment(env, env_id)
     return CheckedEnvironment(_flat(env, env_id), env_id)
-
-
-def environment_for(options: TrainingOptions, given: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
-    """An environment as a training's algorithm observes it.
-
-    Args:
-        options: of the training.
-        given: the environment's own options.
-
-    Raises:
-        WorkbenchError: as `make_environment`.
-    """
-    return make_environment(options.run.env_id, given, keep_dict=options.kind.keeps_dict)
 
 
 def is_dict_of_arrays(space: gymnasium.Space[Any]) -> bool:

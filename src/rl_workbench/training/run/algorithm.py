@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.environments.making import environment_for
+from rl_workbench.training.environments.making import make_environment
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.scalar_log import ScalarLog
 
@@ -160,6 +160,19 @@ class Algorithm(ABC):
     def close(self) -> None:
         """Closes the environment."""
         self.env.close()
+
+
+def environment_for(options: TrainingOptions, given: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
+    """An environment as a training's algorithm observes it.
+
+    Args:
+        options: of the training.
+        given: the environment's own options.
+
+    Raises:
+        WorkbenchError: as `make_environment`.
+    """
+    return make_environment(options.run.env_id, given, keep_dict=options.kind.keeps_dict)
 
 
 Made = TypeVar("Made", bound=Algorithm)

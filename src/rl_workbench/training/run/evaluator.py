@@ -10,9 +10,9 @@ import numpy as np
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.environments.answers import as_float32, succeeded
-from rl_workbench.training.environments.making import environment_for, shares_robot
+from rl_workbench.training.environments.making import shares_robot
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.run.algorithm import Algorithm, Say
+from rl_workbench.training.run.algorithm import Algorithm, Say, environment_for
 from rl_workbench.training.run.random_states import random_states, restore_random_states
 
 EVALUATION_SEED = 1_000_000  # added to the training's: other episodes than those learned from

@@ -10,9 +10,10 @@ from gymnasium import spaces
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.environments.checked import COMPUTE_REWARD, CheckedEnvironment
-from rl_workbench.training.environments.making import environment_for, has_goal
+from rl_workbench.training.environments.making import has_goal
 from rl_workbench.training.environments.repeatable import RepeatableEnvironment
 from rl_workbench.training.options.training_options import TrainingOptions
+from rl_workbench.training.run.algorithm import environment_for
 from rl_workbench.training.sb3.options import (
     CLASSES,
     NETWORK,
