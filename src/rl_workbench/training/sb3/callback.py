@@ -58,10 +58,11 @@ class FrameCallback(BaseCallback):
         self._held: int | None = None  # learning_starts, while hindsight has no whole episode
 
     def _on_training_start(self) -> None:
-        self.num_timesteps = self.model.num_timesteps
-        lengths = getattr(getattr(self.model, "replay_buffer", None), "ep_length", None)
+        model: Any = self.model  # off-policy, where it has a replay buffer
+        self.num_timesteps = model.num_timesteps
+        lengths = getattr(getattr(model, "replay_buffer", None), "ep_length", None)
         if lengths is not None and not lengths.any():
-            self._held, self.model.learning_starts = self.model.learning_starts, math.inf  # type: ignore[attr-defined]
+            self._held, model.learning_starts = model.learning_starts, math.inf
 
     def _on_step(self) -> bool:
         for info in self.locals["infos"]:
@@ -82,8 +83,9 @@ class FrameCallback(BaseCallback):
         self._release()
 
     def _release(self) -> None:
+        model: Any = self.model
         if self._held is not None:
-            self._held, self.model.learning_starts = None, self._held  # type: ignore[attr-defined]
+            self._held, model.learning_starts = None, self._held
 
     def _begin_anew(self) -> None:
         """Cuts the episode off at this step, as at a time limit, and begins another one.
@@ -94,7 +96,8 @@ class FrameCallback(BaseCallback):
         if not dones[0]:
             dones[0], info["TimeLimit.truncated"] = True, True
             info["terminal_observation"] = _first(seen)
-        begun, _ = self.training_env.envs[0].reset()  # type: ignore[attr-defined]
+        envs: Any = self.training_env
+        begun, _ = envs.envs[0].reset()
         parts = [(seen, begun)]
         if isinstance(seen, dict):
             parts = [(seen[name], begun[name]) for name in seen]
