@@ -101,25 +101,25 @@ def names_text(survey: Survey) -> str:
     return "".join(f'    "{each.joint}": "{controller(each)}",\n' for each in survey.motors)
 
 
-def control_text(package: str, urdf: str, survey: Survey, fix: bool) -> str:
+def control_text(package: str, urdf: str, survey: Survey | None, loose: str) -> str:
     """A xacro file that includes the user's and adds what it lacks.
 
     Args:
         package: its name.
         urdf: the user's file, beside it.
-        survey: of that file.
-        fix: whether the robot has to be fixed to the world.
+        survey: of that file; None: there is none yet, and it gets no motors.
+        loose: the link that has to be fixed to the world, if any.
     """
     parts = []
-    if fix:
-        parts.append(_part("fixed.xml.in", {"root": escape(survey.root, QUOTE)}))
-    if survey.added:
+    if loose:
+        parts.append(_part("fixed.xml.in", {"root": escape(loose, QUOTE)}))
+    if survey is not None and survey.added:
         motors = "\n".join(
             f'  <xacro:motor joint={quoteattr(each.joint)} interface="{each.interface}"/>'
             for each in survey.motors
         )
         parts.append(_part("motors.xml.in", {"motors": motors}))
-    if not survey.has_plugin:
+    if survey is not None and not survey.has_plugin:
         parts.append(_part("plugin.xml.in", {}))
     values = {"name": package, "urdf": escape(urdf, QUOTE), "parts": "".join(parts)}
     return _part("control.urdf.xacro.in", values)

@@ -14,7 +14,8 @@ FREQUENCY = (
 )
 HIGHEST = 250.0  # [rad/s], of what a joint moves in itself: steps of 1 ms can't follow more
 MOST = 25.0  # times that, which it may carry
-SAG = 0.1  # [rad, m], below its weight on p alone
+SAG = 0.1  # [rad, m], at most, by its weight on p alone
+SHARE = 0.05  # of its range, at most as well
 GRAVITY = 9.81  # [m/s²]
 VELOCITY = 5.0  # [1/s], where the output is a velocity
 
@@ -35,7 +36,9 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
         ratio = min(inertia / own[name], MOST) if own[name] > 0.0 else 1.0
         moved = own[name] * ratio or inertia
         weight = GRAVITY * math.sqrt(below[name] * inertia)  # no less than it can weigh [N m, N]
-        frequency = min(max(FREQUENCY, math.sqrt(weight / SAG / moved)), HIGHEST / ratio)
+        joint = model.joints[name]
+        sag = min(SAG, SHARE * (joint.upper - joint.lower)) if joint.bounded else SAG
+        frequency = min(max(FREQUENCY, math.sqrt(weight / sag / moved)), HIGHEST / ratio)
         p = moved * frequency**2
         found[name] = _rounded(
             {"p": p, "i": 2.0 * p, "d": 2.0 * moved * frequency, "i_clamp": weight}

@@ -13,8 +13,8 @@ import yaml
 from bullet_gazebo.physics.meshes.mesh_files import Resources
 from package_writing import contents
 from package_writing.errors import CannotWrite
-from package_writing.survey import Survey, look_at
-from package_writing.urdf_files import Copied, copy_urdf
+from package_writing.survey import Survey, look_at, root_link
+from package_writing.urdf_files import Copied, copy_urdf, expanded
 from robot_envs import Robot, RobotEnvError
 from robot_envs.description import controllers, files
 
@@ -25,6 +25,7 @@ PARENT = TREE.parent if IS_CHECKOUT else Path()
 
 INTERFACES = ("effort", "position", "velocity")
 ARM = contents.TEMPLATE / "urdf/two_link_arm.urdf.xacro"
+NOTES = 3  # that are told
 OURS = ("cartpole", "controller_manager", "gazebo_ros", "xacro")  # the template depends on them
 
 
@@ -81,16 +82,23 @@ def write(wanted: Wanted, made: Path) -> list[str]:
     copied = copy_urdf(source, wanted.arguments, wanted.name, made)
     _check_packages(copied)
     resources = _resources(wanted.name, made)
-    survey = look_at(copied.xml, f"{wanted.interface.capitalize()}JointInterface", resources)
-    fix = _has_to_be_fixed(wanted, survey, source)
+    interface = f"{wanted.interface.capitalize()}JointInterface"
+    loose = _loose_link(wanted, root_link(copied.xml), source)
     urdf, xml = copied.place, copied.xml
-    lacks = list(_lacks(survey, fix))
-    if lacks:
-        urdf = f"{wanted.name}_control.urdf.xacro"
-        text = contents.control_text(wanted.name, copied.place, survey, fix)
-        (made / "urdf" / urdf).write_text(text, encoding="utf-8")
-        xml = files.read_urdf(made / "urdf" / urdf, wanted.arguments)
-        survey = look_at(xml, "", resources)
+    control = f"{wanted.name}_control.urdf.xacro"
+
+    def with_more(survey: Survey | None) -> str:
+        text = contents.control_text(wanted.name, copied.place, survey, loose)
+        (made / "urdf" / control).write_text(text, encoding="utf-8")
+        return expanded(made / "urdf" / control, wanted.arguments)
+
+    if loose:  # a base without mass can't be simulated before it is fixed
+        urdf, xml = control, with_more(None)
+    survey = look_at(xml, interface, resources)
+    lacks = list(_lacks(survey, loose))
+    if survey.added or not survey.has_plugin:
+        urdf, xml = control, with_more(survey)
+        survey = look_at(xml, interface, resources)
     values = _values(wanted, survey, urdf, copied)
     contents.fill(made, wanted.name, values)
     parameters = yaml.safe_load((made / "config/controllers.yaml").read_text(encoding="utf-8"))
@@ -105,14 +113,15 @@ def write(wanted: Wanted, made: Path) -> list[str]:
     return list(_told(wanted, copied, survey, added))
 
 
-def _has_to_be_fixed(wanted: Wanted, survey: Survey, source: Path) -> bool:
-    if survey.model.fixed_base or wanted.base == "free":
-        return False
+def _loose_link(wanted: Wanted, root: str, source: Path) -> str:
+    """The link that has to be fixed to the world, if any."""
+    if root == "world" or wanted.base == "free":
+        return ""
     if wanted.base == "fixed":
-        return True
+        return root
     raise CannotWrite(
-        f"{source}: nothing fixes its link '{survey.root}' to the world: --base fixed does (an arm), --base "
-        "free lets it stand or fall (a vehicle, a walker; --height says from where)"
+        f"{source}: nothing fixes its link '{root}' to the world: --base fixed does (an arm), --base free "
+        "lets it stand or fall (a vehicle, a walker; --height says from where)"
     )
 
 
@@ -162,10 +171,10 @@ def _values(wanted: Wanted, survey: Survey, urdf: str, copied: Copied) -> dict[s
     }
 
 
-def _lacks(survey: Survey, fix: bool) -> Iterator[str]:
+def _lacks(survey: Survey, loose: str) -> Iterator[str]:
     """What has to be added to the robot's file."""
-    if fix:
-        yield f"a joint that fixes '{survey.root}' to the world"
+    if loose:
+        yield f"a joint that fixes '{loose}' to the world"
     if survey.added:
         yield f"transmissions ({survey.motors[0].interface})"
     if not survey.has_plugin:
@@ -188,8 +197,11 @@ def _told(wanted: Wanted, copied: Copied, survey: Survey, added: str) -> Iterato
         )
     for path in copied.outside:
         yield f"not copied, and read from where it is: {path}"
-    for warning in survey.model.warnings:
+    warnings = survey.model.warnings
+    for warning in warnings[:NOTES]:
         yield f"note: {warning}"
+    if len(warnings) > NOTES:
+        yield f"note: {len(warnings) - NOTES} more of such"
     yield f"in {TREE}, to go on:" if IS_CHECKOUT else "to go on:"
     yield from (f"  {each}" for each in _commands(wanted, copied))
 
@@ -205,7 +217,7 @@ def _commands(wanted: Wanted, copied: Copied) -> list[str]:
     runs = f"runs/{wanted.name}"
     return [
         f"{ws} roslaunch {wanted.name} simulation.launch    # look at it; Ctrl-C ends it",
-        f"{ws} test {shlex.quote(str(wanted.folder))}",
+        f"{ws} test {here}",
         "./ws extras true    # once: Stable-Baselines3",
         f"{run} train --algo ppo --env-id {wanted.name}.environment:{wanted.name}/Reach-v0 "
         f"--config {here}/config/ppo.yaml --run-dir {runs}",

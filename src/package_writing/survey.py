@@ -45,7 +45,6 @@ class Survey:
     added: bool  # the motors are none of the URDF's: it needs transmissions
     has_plugin: bool
     namespace: str  # of the plugin
-    root: str  # the link that all hangs from
 
 
 def look_at(xml: str, interface: str, resources: Resources) -> Survey:
@@ -84,8 +83,24 @@ def look_at(xml: str, interface: str, resources: Resources) -> Survey:
         added=added,
         has_plugin=plugin is not None,
         namespace=namespace.strip().strip("/"),
-        root=_root(robot),
     )
+
+
+def root_link(xml: str) -> str:
+    """The link that all others hang from; that of a robot that is fixed to the world is called so.
+
+    Raises:
+        CannotWrite: if the text is no URDF.
+    """
+    try:
+        robot = parse(xml)
+    except FileError as error:
+        raise CannotWrite(str(error)) from error
+    if robot.tag != "robot":
+        raise CannotWrite(f"the file is no URDF: it begins with <{robot.tag}>, not <robot>")
+    children = {e.get("link") for e in robot.findall("joint/child")}
+    links = (link.get("name", "") for link in robot.findall("link"))
+    return next((name for name in links if name not in children), "")
 
 
 def _motors(
@@ -126,9 +141,3 @@ def _plugins(robot: Element) -> Iterator[Element]:
         for plugin in block.findall("plugin"):
             if plugin.get("filename", "").endswith(PLUGIN):
                 yield plugin
-
-
-def _root(robot: Element) -> str:
-    children = {e.get("link") for e in robot.findall("joint/child")}
-    links = (link.get("name", "") for link in robot.findall("link"))
-    return next(name for name in links if name not in children)

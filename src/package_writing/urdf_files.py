@@ -1,18 +1,21 @@
 """Copies a URDF or xacro file with what it includes, and with meshes that it names by a relative path."""
 
+import glob
 import os
 import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from package_writing.errors import CannotWrite
+from robot_envs.description.files import PACKAGE, locate
+from robot_envs.errors import RobotEnvError
 from ros_calls.expansion import CannotExpand, expand, included_files
 
 FOUND = re.compile(r"\$\(find\s+([\w.-]+)\s*\)([^\"'<>]*)")  # $(find PACKAGE)/PLACE
 NAMED = re.compile(r"package://([\w.-]+)/")
-MESH = re.compile(r"""(<mesh\s[^>]*?filename\s*=\s*)(["'])([^"'$:]+)\2""")  # by a plain path
+MESH = re.compile(r"""(<mesh\s[^>]*?filename\s*=\s*)(["'])([^"'$]+)\2""")
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,18 @@ def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Pa
     )
 
 
+def expanded(path: Path, arguments: Mapping[str, str]) -> str:
+    """The URDF in a file, which may be xacro.
+
+    Raises:
+        CannotWrite: if it can't be read.
+    """
+    try:
+        return expand(path, arguments)
+    except CannotExpand as error:
+        raise CannotWrite(f"can't read {error}") from error
+
+
 def _own(files: list[Path], texts: list[str]) -> list[Path]:
     """Those that are included by a relative path: the others are found where they are."""
     found = {Path(each[2]).name for text in texts for each in FOUND.finditer(text)}
@@ -94,13 +109,37 @@ def _copy(source: Path, target: Path, package: str, folder: Path) -> None:
     text = target.read_text(encoding="utf-8", errors="surrogateescape")
 
     def moved(match: re.Match[str]) -> str:
-        mesh = source.parent / match[3]
-        if not mesh.is_file():
+        mesh = _mesh(source, match[3])
+        if mesh is None:
             return match[0]
-        (folder / "meshes").mkdir(exist_ok=True)
-        shutil.copyfile(mesh, folder / "meshes" / mesh.name)
-        return f"{match[1]}{match[2]}package://{package}/meshes/{mesh.name}{match[2]}"
+        place = PurePath(match[3].removeprefix(PACKAGE))
+        parts = [part for part in place.parts if part not in ("..", "meshes")]
+        copy = Path("meshes", *parts)
+        (folder / copy).parent.mkdir(parents=True, exist_ok=True)
+        for each in mesh.parent.glob(f"{glob.escape(mesh.stem)}.*"):  # its colours, too
+            shutil.copyfile(each, (folder / copy).with_name(each.name))
+        return f"{match[1]}{match[2]}{PACKAGE}{package}/{copy}{match[2]}"
 
     changed = MESH.sub(moved, text)
     if changed != text:
         target.write_text(changed, encoding="utf-8", errors="surrogateescape")
+
+
+def _mesh(source: Path, name: str) -> Path | None:
+    """A mesh that nobody finds by its name but who looks around its file; None for what isn't there."""
+    if not name.startswith(PACKAGE):
+        found = [] if ":" in name else [source.parent / name]
+    elif _is_found(name):
+        found = []
+    else:  # downloaded without its package.xml
+        package, _, place = name.removeprefix(PACKAGE).partition("/")
+        found = [parent / package / place for parent in source.parents]
+        found += [parent / place for parent in source.parents if parent.name == package]
+    return next((each for each in found if each.is_file()), None)
+
+
+def _is_found(name: str) -> bool:
+    try:
+        return locate(name).is_file()
+    except RobotEnvError:
+        return False

@@ -136,6 +136,13 @@ def test_transmissions_plugin_and_base_that_lack_are_added_beside(new, interface
     assert reaches(made, task)
 
 
+def test_a_base_without_mass_can_be_fixed(new):
+    """As of most arms, which Gazebo would drop."""
+    _, made, task, _ = new("my_light", robot('<link name="base"/>', *BARE[1:]), "--base", "fixed")
+    assert made.links.fixed_base
+    assert reaches(made, task)
+
+
 def test_a_robot_whose_base_is_free(new):
     folder, made, _, told = new("my_rover", robot(*BARE), "--base", "free", "--height", "0.5")
     assert not made.links.fixed_base
@@ -218,6 +225,24 @@ def test_meshes_by_a_plain_path_come_along(new, tmp_path):
     folder, made, *_ = new("my_meshes", robot(BARE[0], rod, SWING, FIXED))
     assert (folder / "meshes/rod.stl").is_file()
     assert made.links.links["rod"].collisions[0].mesh == str(folder / "meshes/rod.stl")
+
+
+def test_meshes_of_a_package_that_was_downloaded_without_its_package_xml_come_along(new, tmp_path):
+    for kind in ("visual", "collision"):  # of one name
+        (tmp_path / "arm_files/meshes" / kind).mkdir(parents=True)
+        (tmp_path / "arm_files/meshes" / kind / "rod.stl").write_bytes(binary_stl(len(kind)))
+    shapes = "".join(
+        f'<{kind}><geometry><mesh filename="package://arm_files/meshes/{kind}/rod.stl"/></geometry></{kind}>'
+        for kind in ("visual", "collision")
+    )
+    (tmp_path / "arm_files/urdf").mkdir()
+    urdf = tmp_path / "arm_files/urdf/arm.urdf"
+    urdf.write_text(robot(BARE[0], LINK.format("rod", shapes), SWING, FIXED))
+    folder, made, *_ = new("my_download", urdf)
+    for kind in ("visual", "collision"):
+        copy = folder / "meshes/arm_files" / kind / "rod.stl"
+        assert copy.read_bytes() == binary_stl(len(kind))
+    assert made.links.links["rod"].collisions[0].mesh == str(copy)
 
 
 def test_a_package_that_it_needs_is_depended_on(new, tmp_path, monkeypatch):
@@ -313,8 +338,16 @@ def test_places_that_can_not_be(tmp_path, capsys):
     assert f"{tmp_path}/no.urdf" in capsys.readouterr().err
 
 
-def test_it_is_written_beside_the_checkout(root):
+def test_it_is_written_beside_the_checkout(root, tmp_path, monkeypatch, capsys):
     assert root.parent == package.PARENT
+    monkeypatch.setattr(package, "PARENT", tmp_path)
+    monkeypatch.setattr(package, "TREE", tmp_path / "cartpole")
+    assert main(["my_arm"]) == 0
+    told = capsys.readouterr().out
+    page = (root / "docs/tutorial_robot.md").read_text()
+    commands = re.findall(r"^  (\./ws .*?)(?:    #.*)?$", told, re.MULTILINE)
+    assert len(commands) == 7
+    assert [each for each in commands if each not in page] == [], "those of the tutorial"
 
 
 @pytest.mark.extras("stable_baselines3")
