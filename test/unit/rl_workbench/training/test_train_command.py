@@ -194,7 +194,6 @@ def test_help_shows_the_flags_of_a_command_around_it(capsys) -> None:
     ("arguments", "words"),
     [
         (["--env-id=CartPol-v1"], "unknown environment 'CartPol-v1'; did you mean CartPole-v1?"),
-        (["--env-id=Pendulum-v1"], "needs a choice of single actions, Discrete(n); Pendulum-v1 has Box"),
         (["--env-kwargs=wheels=4"], "can't make CartPole-v1"),
         (["--train-env-kwargs=wheels=4"], "can't make CartPole-v1"),
         (["--eval-env-kwargs=wheels=4"], "can't make CartPole-v1"),
@@ -205,6 +204,18 @@ def test_an_environment_that_does_not_do_leaves_no_folder(
     capsys, tmp_path: Path, algorithm: list[str], arguments: list[str], words: str
 ) -> None:
     assert words in failed(capsys, *algorithm, *arguments, "--run-dir=run")
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("algorithm", [DQN, ["--algo=reinforce-document"]])
+def test_continuous_actions_are_refused_with_what_takes_them(
+    capsys, tmp_path: Path, algorithm: list[str]
+) -> None:
+    line = failed(capsys, *algorithm, "--env-id=Pendulum-v1", "--run-dir=run")
+    assert "needs a choice of single actions, Discrete(n); Pendulum-v1 has Box" in line
+    assert (
+        "--algo reinforce, or Stable-Baselines3's ppo, a2c, sac, td3 or ddpg: these fit it" in line
+    )
     assert not (tmp_path / "run").exists()
 
 
