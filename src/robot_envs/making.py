@@ -26,7 +26,7 @@ def register(
     reward_threshold: float | None = None,
     **options: Any,
 ) -> None:
-    """Registers an environment with Gymnasium; again does no harm.
+    """Registers an environment with Gymnasium; again does no harm, and with other options replaces it.
 
         register("my_arm/Reach-v0", "my_arm.robot:ARM", "my_arm.tasks:Reach")
         env = gymnasium.make("my_arm/Reach-v0", backend="ros")
@@ -40,12 +40,14 @@ def register(
         reward_threshold: the return from which on the task counts as solved.
         options: of `RobotEnv` or of the task; `gymnasium.make` may override them.
     """
-    if identifier not in gymnasium.registry:
+    kwargs = {"robot": robot, "task": task, **options}
+    known = gymnasium.registry.get(identifier)
+    if known is None or (known.kwargs, known.reward_threshold) != (kwargs, reward_threshold):
         gymnasium.register(
             identifier,
             entry_point=ENTRY_POINT,
             reward_threshold=reward_threshold,
-            kwargs={"robot": robot, "task": task, **options},
+            kwargs=kwargs,
         )
 
 

@@ -23,6 +23,7 @@ from robot_envs.errors import RobotEnvError
 logger = logging.getLogger(__name__)
 
 CONTROL_PERIOD = 0.01  # [s]
+DRIVES = "libgazebo_ros_control.so"  # the plugin that runs controllers over ROS
 EMPTY = "empty"
 """The world with a ground plane and nothing else, that of gazebo_ros's empty_world.launch."""
 
@@ -172,6 +173,7 @@ class Robot:
         wrong = unfit_pose(self.pose)
         if wrong:
             yield f"its pose {wrong}"
+        yield from self._faults_of_its_world()
         given: tuple[tuple[str, Any], ...] = (("run", self.run), ("commanded", self.commanded))
         for what, names in given:
             if isinstance(names, str):
@@ -192,6 +194,25 @@ class Robot:
             yield from controllers.faults(
                 self.run, self.commanded, self.parameters, hardware, passive
             )
+
+    def _faults_of_its_world(self) -> Iterator[str]:
+        """What is wrong of engine, period, world and namespace."""
+        if self.engine not in ("bullet", "mujoco"):
+            yield f"there is no engine '{self.engine}'; there are bullet and mujoco"
+        if not 0.0 < self.control_period < math.inf:
+            yield f"control_period must be a time above 0 [s], not {self.control_period}"
+        if self.world is not None and self.world != EMPTY and not files.is_text(self.world):
+            try:
+                files.check_there(files.locate(self.world))
+            except RobotEnvError as error:
+                yield f"its world: {error}"
+        for plugin in self.links.plugins:
+            told = (plugin.element.findtext("robotNamespace") or "").strip()
+            if plugin.filename == DRIVES and told and told.strip("/") != self.namespace.strip("/"):
+                yield (
+                    f"its URDF puts its controllers into the namespace '{told}' (<robotNamespace>), the "
+                    f"description into '/{self.namespace.strip('/')}': give both the same"
+                )
 
     def _warn_of_strangers(self) -> None:
         """A file may be for several robots, so that they are no faults."""

@@ -35,7 +35,7 @@ class RobotBackend(Protocol):
         ...
 
     def vary(self, variation: Variation) -> None:
-        """Gives the first robot other masses, lengths and friction; to be called before a reset."""
+        """Gives robots and world other figures, see `Variation`; to be called before a reset."""
         ...
 
     def poses(self, links: Sequence[str]) -> list[Pose]:

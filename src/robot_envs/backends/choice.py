@@ -5,6 +5,7 @@ from importlib.util import find_spec
 from bullet_gazebo.state.names import did_you_mean
 from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action
 from robot_envs.errors import RobotEnvError
+from robot_envs.robot import EMPTY
 from robot_envs.scene import Scene
 
 IN_PROCESS, MUJOCO, LOCKSTEP, REALTIME = "bullet", "mujoco", "ros", "ros-realtime"
@@ -44,7 +45,8 @@ def make_backend(scene: Scene, backend: str | None, control_period: float) -> Ro
     if name not in BACKENDS:
         near = did_you_mean(str(name), BACKENDS) or f"; there are {', '.join(BACKENDS)}"
         raise ValueError(f"there is no backend {name!r}{near}")
-    if control_period != 0.0 or name != REALTIME:
+    plain = scene.robots[0].world in (None, EMPTY)  # other worlds may have another physics step
+    if plain and (control_period != 0.0 or name != REALTIME):
         ticks_per_action(control_period, PHYSICS_STEP)  # before a simulator is started for it
     if name in (IN_PROCESS, MUJOCO):
         from robot_envs.backends.in_process import InProcessWorld

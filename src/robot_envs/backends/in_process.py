@@ -27,7 +27,7 @@ from robot_envs.backends.world_files import fill, spawn
 from robot_envs.description.controllers import Loaded, load
 from robot_envs.description.files import resources
 from robot_envs.errors import RobotEnvError, SimulatorError
-from robot_envs.robot import Robot
+from robot_envs.robot import DRIVES, Robot
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.variation.applying import Applier
@@ -44,7 +44,6 @@ from robot_envs.world_state import (
     link_keys,
 )
 
-PLUGIN = "libgazebo_ros_control.so"
 _numbers = attrgetter("position", "velocity", "effort")
 _make = tuple.__new__  # as a NamedTuple's own, and twice as fast
 
@@ -81,7 +80,6 @@ class InProcessWorld:
         except BaseException:
             self.close()
             raise
-        self._model = self._robots[scene.robots[0].model][0]  # that varies
         self._joints = self._found_joints()
         self._receivers = self._found_receivers()
         self._apply = Applier(scene, InProcessChanges(self._sim))
@@ -236,7 +234,7 @@ def _motion(state: tuple[Pose, Twist]) -> Motion:
 def control_tick(description: ModelDescription) -> float:
     """How often the URDF has its controllers updated [s]; 0: with each step."""
     for plugin in description.plugins:
-        if plugin.filename == PLUGIN:
+        if plugin.filename == DRIVES:
             with contextlib.suppress(ValueError):
                 return max(0.0, float(plugin.element.findtext("controlPeriod") or 0.0))
     return 0.0

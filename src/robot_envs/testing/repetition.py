@@ -95,7 +95,8 @@ def _vectors(subject: Subject) -> list[tuple[VectorEnv, str]]:
 
         return [(SyncVectorEnv([one] * WORLDS), "SyncVectorEnv")]
     kinds = ["sync"]
-    if gymnasium.spec(subject.identifier).vector_entry_point is not None:
+    plain = subject.identifier.rpartition(":")[2]  # its module has been imported to make it
+    if gymnasium.spec(plain).vector_entry_point is not None:
         kinds.append("vector_entry_point")
     return [
         (

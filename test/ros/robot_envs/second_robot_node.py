@@ -144,6 +144,24 @@ class Lockstep(SecondRobot):
             robot.reset(InitialState(models={"ball": Pose()}))
         robot.reset(InitialState())
 
+    def test_what_one_environment_varies_is_taken_back_for_another_one(self):
+        """Also where the first one is closed while the other one's episode is under way."""
+        robot, action = self.scene.robots[0], np.zeros(1, np.float32)
+        alone = make_pendulum("bullet", robot)
+        expected = [alone.reset(seed=3)[0], *(alone.step(action)[0] for _ in range(6))]
+        alone.close()
+        varied, plain = make_pendulum("ros", robot, varied=True), make_pendulum("ros", robot)
+        self.addCleanup(plain.close)
+        varied.reset(seed=1)
+        told = varied.reset(seed=2)[1]["variation"]
+        seen = [plain.reset(seed=3)[0], *(plain.step(action)[0] for _ in range(3))]
+        varied.close()
+        seen += [plain.step(action)[0] for _ in range(3)]
+        self.assertTrue(np.array_equal(seen, expected), (seen, expected))
+        again = make_pendulum("ros", robot, varied=True)
+        self.addCleanup(again.close)
+        self.assertTrue(np.array_equal(again.reset(seed=2)[1]["variation"], told))
+
     def test_it_is_given_back_with_its_own_friction(self):
         def spun_down():
             robot = self.session.connect(self.scene, 0.01)

@@ -26,12 +26,19 @@ class Objects:
         if list(wanted) == self._wanted:
             return
         self._clear()
+        try:
+            self._fill(wanted)
+        except BaseException:  # what came before what failed
+            self._clear()
+            raise
+        self._wanted = list(wanted)
+
+    def _fill(self, wanted: Sequence[Object]) -> None:
         there = bring_up.models() if wanted else []
         for each in wanted:
             if each.name not in there:
                 bring_up.spawn(each.name, read_text(each.file), each.pose)
                 self._spawned.append(each.name)
-        self._wanted = list(wanted)
 
     def _clear(self) -> None:
         self._wanted = []

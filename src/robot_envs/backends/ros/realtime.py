@@ -271,7 +271,13 @@ class RealtimeWorld:
 
     def vary(self, variation: Variation) -> None:
         """See `RobotBackend.vary`."""
+        with self._simulator:
+            self._turn.take(self)  # what others have varied isn't this one's to start from
         self._variation(variation)
+
+    def give_back(self) -> None:
+        """See `Player.give_back`."""
+        self._variation.undo()
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
         """See `RobotBackend.poses`; a call for each.
