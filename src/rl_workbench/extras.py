@@ -68,6 +68,6 @@ def replaying(folder: Path) -> str:
 
 
 def _with_folders() -> list[str]:
-    """The flags for the reader's own folders, with which `ws` found modules for this process."""
+    """The flags by which `ws` finds the reader's folders, each where it really is: ws may name a link."""
     folders = filter(None, os.environ.get("CARTPOLE_WITH", "").split(":"))
-    return [word for folder in folders for word in ("--with", os.path.abspath(folder))]
+    return [word for folder in folders for word in ("--with", os.path.realpath(folder))]
