@@ -59,9 +59,15 @@ def replaying(folder: Path) -> str:
     workspace = os.environ.get("CARTPOLE_WS")
     beside = Path(sys.executable).with_name("rl-workbench")
     if workspace:
-        command = [workspace, "rosrun", "cartpole", "workbench.py"]
+        command = [workspace, *_with_folders(), "rosrun", "cartpole", "workbench.py"]
     elif shutil.which(beside.name) == str(beside):
         command = [beside.name]
     else:
         command = [sys.executable, "-m", "rl_workbench"]
     return shlex.join([*command, "view", str(folder)])
+
+
+def _with_folders() -> list[str]:
+    """The flags by which `ws` finds the reader's folders, each where it really is: ws may name a link."""
+    folders = filter(None, os.environ.get("CARTPOLE_WITH", "").split(":"))
+    return [word for folder in folders for word in ("--with", os.path.realpath(folder))]

@@ -12,6 +12,7 @@ import rospy
 import rostest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
+from std_srvs.srv import Empty
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
 
@@ -160,6 +161,22 @@ class PolicyNode(unittest.TestCase):
         self.assertEqual(node.output.count(MOVES), 2)
         node.send(signal.SIGTERM)
         self.ends_with_a_stop(143)
+
+    def test_waiting_for_a_simulator_in_lockstep_is_told(self):
+        """Joint states that don't come, and the service that tells why."""
+        service = rospy.Service("/gazebo/step_world", Empty, lambda _: None)
+        self.addCleanup(service.shutdown)
+        controller = ["joint_state_controller"]
+        self.assertTrue(ros_controllers.stop_controllers_srv(controller))
+        self.addCleanup(ros_controllers.start_controllers_srv, controller)
+        node = self.place.start("rosrun", "cartpole", "policy_node.py", str(self.exported))
+        node.wait_for("lockstep:=false", BOUND)
+        line = next(each for each in node.output.splitlines() if "lockstep:=false" in each)
+        self.assertRegex(
+            line, "waiting for the state of .* on /joint_states; the simulator is in lock-step"
+        )
+        node.interrupt()
+        self.assertEqual(node.end(BOUND), 130, node.output)
 
 
 if __name__ == "__main__":

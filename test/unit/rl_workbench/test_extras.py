@@ -17,6 +17,7 @@ from rl_workbench.extras import installing, replaying, watching
 def place(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, root: Path) -> str:
     """In the workspace; in an environment that is on PATH; with one that isn't."""
     monkeypatch.setenv("CARTPOLE_WS", str(root / "ws"))
+    monkeypatch.delenv("CARTPOLE_WITH", raising=False)
     if request.param != "ws":
         monkeypatch.delenv("CARTPOLE_WS")
         folder = str(Path(sys.executable).parent)
@@ -55,6 +56,20 @@ def test_how_to_replay_a_run(place: str, root: Path, tmp_path: Path) -> None:
     words = [*shlex.split(command)[:-1], "--help"]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert "--checkpoint" in done.stdout
+
+
+def test_a_run_of_a_module_of_ones_own_is_replayed_with_its_folder(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As ws starts a process with --with; it names a folder with a space by a link."""
+    for name in ("mine", "other arm"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "other arm")
+    monkeypatch.setenv("CARTPOLE_WS", str(root / "ws"))
+    monkeypatch.setenv("CARTPOLE_WITH", f"{tmp_path}/mine:{tmp_path}/link")
+    command = replaying(tmp_path / "run")
+    folders = f"--with {tmp_path}/mine --with '{tmp_path}/other arm'"
+    assert command == f"{root}/ws {folders} rosrun cartpole workbench.py view {tmp_path}/run"
 
 
 def test_how_to_install_an_extra(place: str, root: Path) -> None:

@@ -8,22 +8,25 @@ from matplotlib.figure import Figure
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.figure import as_png
-from rl_workbench.tools.runs.policies import WHICH
+from rl_workbench.tools.runs.policies import RANDOM, WHICH
 from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.run_options import RunOptions
 from rl_workbench.training.run.files import write_file
 
 
-def add_policy_flags(parser: argparse.ArgumentParser, several: tuple[str, ...] = ()) -> None:
-    """Which policy of which run, and where it acts; or which of `several`."""
+def add_policy_flags(
+    parser: argparse.ArgumentParser, choices: tuple[str, ...] = WHICH, several: bool = False
+) -> None:
+    """Which policy of which run, and where it acts; or which several."""
     parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
+    which = "by evaluation, the newest, or random actions" if RANDOM in choices else ""
+    which = which or "by evaluation, or the newest"
     if several:
-        parser.add_argument("--checkpoint", choices=several, nargs="+", default=["best"],
-                            help="by evaluation, the newest, or random actions; several: side by "
-                            "side (default best)")  # fmt: skip
+        parser.add_argument("--checkpoint", choices=choices, nargs="+", default=["best"],
+                            help=f"{which}; several: side by side (default best)")  # fmt: skip
     else:
-        parser.add_argument("--checkpoint", choices=WHICH, default="best",
-                            help="by evaluation, or the newest (default best)")  # fmt: skip
+        parser.add_argument("--checkpoint", choices=choices, default="best",
+                            help=f"{which} (default best)")  # fmt: skip
     add_environment_flags(parser)
 
 

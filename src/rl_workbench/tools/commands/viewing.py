@@ -13,6 +13,7 @@ from rl_workbench.tools.pictures.filming import draw_without_display
 from rl_workbench.tools.runs.runs import open_run
 from rl_workbench.tools.viewing.page import Place, Wanted, show_run
 from rl_workbench.tools.viewing.recorder import POLICIES
+from rl_workbench.training.environments.names import import_module_of
 from rl_workbench.training.run.interrupt import Interrupt
 from web_page.flags import add_flags as add_page_flags
 
@@ -40,8 +41,6 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     beside: bool = arguments.beside_training
     if beside:
         os.nice(KINDNESS)
-    else:
-        open_run(arguments.run)
     wanted = Wanted(
         arguments.run, tuple(arguments.checkpoint), arguments.seed, 1, env_options(arguments)
     )
@@ -56,9 +55,12 @@ def show(wanted: Wanted, place: Place, interrupt: Interrupt, beside: bool = Fals
         beside: a training has started this; it is told the address, and its end is this one's.
 
     Raises:
-        WorkbenchError: if the page can't be served.
+        WorkbenchError: if there is no such run or no module of its environment, or the page can't be served.
     """
+    run = None if beside else open_run(wanted.folder)
     draw_without_display()
+    if run is not None:
+        import_module_of(run.env_id)
     torch.set_num_threads(1)  # networks this small only lose by more
     interrupt.defer()
     if not beside:

@@ -25,7 +25,14 @@ from rl_workbench.tools.pictures.filming import (
 )
 from rl_workbench.tools.pictures.scenes import is_scene, record_scene
 from rl_workbench.tools.runs import episodes
-from rl_workbench.tools.runs.policies import WHICH, LearnedPolicy, environment_of, load_learned
+from rl_workbench.tools.runs.policies import (
+    RANDOM,
+    WHICH,
+    LearnedPolicy,
+    RandomPolicy,
+    load_learned,
+    random_policy,
+)
 from rl_workbench.tools.runs.runs import Run, open_run
 from rl_workbench.tools.viewing.page import Place, Wanted
 from rl_workbench.training.environments.names import threshold
@@ -34,13 +41,13 @@ from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell
 from web_page.address import LOOPBACK
 
-RANDOM = "random"  # a policy that every environment has
 WINDOWS = (*DISPLAYS, "SDL_VIDEODRIVER")  # where any of them is given, a window may be opened
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
     """Flags of one of the three."""
-    add_policy_flags(parser, (*WHICH, RANDOM) if command == "record" else ())
+    choices = WHICH if command == "enjoy" else (*WHICH, RANDOM)
+    add_policy_flags(parser, choices, several=command == "record")
     add = parser.add_argument
     if command == "eval":
         add("--episodes", type=number(1), default=100, metavar="N", help="default 100")
@@ -91,9 +98,11 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
 
 def _policy(
     arguments: argparse.Namespace, run: Run, which: str | None = None, **options: Any
-) -> LearnedPolicy:
-    chosen = which or arguments.checkpoint
-    return load_learned(run, chosen, {**env_options(arguments), **options})
+) -> LearnedPolicy | RandomPolicy:
+    chosen, given = which or arguments.checkpoint, {**env_options(arguments), **options}
+    if chosen == RANDOM:
+        return random_policy(run, given, arguments.seed)
+    return load_learned(run, chosen, given)
 
 
 def _eval(arguments: argparse.Namespace, run: Run) -> None:
@@ -106,7 +115,8 @@ def _eval(arguments: argparse.Namespace, run: Run) -> None:
     finally:
         policy.env.close()
     line = threshold(run.env_id)
-    found = {"run": str(run.folder), **episodes.statistics(result, policy.checkpoint, line)}
+    checkpoint = str(policy.checkpoint) if isinstance(policy, LearnedPolicy) else RANDOM
+    found = {"run": str(run.folder), **episodes.statistics(result, checkpoint, line)}
     # With the figures on standard output, what people read goes beside it.
     stream = sys.stderr if to_stdout else sys.stdout
     tell(episodes.lines(result), stream)
@@ -182,12 +192,8 @@ def _player_of(
 ) -> Player:
     options = {"render_mode": "rgb_array", **sized}
     title = which if len(arguments.checkpoint) > 1 else ""
-    if which != RANDOM:
-        policy = _policy(arguments, run, which, **options)
-        return Player(title, policy.env, policy.act)
-    env = environment_of(run, {**env_options(arguments), **options})
-    env.action_space.seed(arguments.seed)
-    return Player(title, env, lambda _: env.action_space.sample())
+    policy = _policy(arguments, run, which, **options)
+    return Player(title, policy.env, policy.act)
 
 
 def _write_film(

@@ -1,23 +1,22 @@
-"""Greedy episodes of a run's policy, and their figures."""
+"""Greedy episodes of a run's policy, or random ones, and their figures."""
 
 from collections.abc import Callable, Iterator
 from itertools import count
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.tools.runs.policies import LearnedPolicy
+from rl_workbench.tools.runs.policies import RANDOM, LearnedPolicy, RandomPolicy
 from rl_workbench.training.environments.answers import as_float32, succeeded
 from rl_workbench.training.run.evaluator import Evaluation, run_greedily
 
 TEST_SEED = 5_000_000  # other episodes than those of any training or of its evaluations
 
 
-def play(policy: LearnedPolicy, episodes: int, seed: int) -> Evaluation:
-    """Runs greedy episodes, seeded once.
+def play(policy: LearnedPolicy | RandomPolicy, episodes: int, seed: int) -> Evaluation:
+    """Runs a policy's episodes, seeded once.
 
     Raises:
         WorkbenchError: if the environment fails.
@@ -61,11 +60,16 @@ def episode_steps(
             return
 
 
-def statistics(result: Evaluation, checkpoint: Path, threshold: float | None) -> dict[str, Any]:
-    """Plain numbers, for JSON."""
+def statistics(result: Evaluation, checkpoint: str, threshold: float | None) -> dict[str, Any]:
+    """Plain numbers, for JSON.
+
+    Args:
+        checkpoint: the file of the policy, or `random`.
+        threshold: from which on it is solved, if there is one.
+    """
     returns = np.array(result.returns)
     return {
-        "checkpoint": str(checkpoint),
+        "checkpoint": checkpoint,
         "episodes": len(returns),
         "mean": float(returns.mean()),
         "std": float(returns.std()),
@@ -94,7 +98,8 @@ def lines(result: Evaluation) -> str:
 
 def summary(found: dict[str, Any], threshold: float | None) -> str:
     """The line that sums it up."""
-    line = f"mean {found['mean']:.2f} ± {found['std']:.2f} over {found['episodes']} greedy episodes"
+    kind = "random" if found["checkpoint"] == RANDOM else "greedy"
+    line = f"mean {found['mean']:.2f} ± {found['std']:.2f} over {found['episodes']} {kind} episodes"
     line += f" (min {found['min']:.2f}, max {found['max']:.2f})"
     if found["success_rate"] is not None:
         line += f"; success {found['success_rate']:.0%}"

@@ -20,6 +20,14 @@ from rl_workbench.training.run.policy import load_policy
 from rl_workbench.training.run.progress import warn
 
 WHICH = ("best", "last")
+RANDOM = "random"  # a policy that every environment has
+
+
+class RandomPolicy(NamedTuple):
+    """Random actions in a run's environment, which the caller closes."""
+
+    act: Callable[[Any], Any]
+    env: gymnasium.Env[Any, Any]
 
 
 class LearnedPolicy(NamedTuple):
@@ -45,6 +53,17 @@ def environment_of(run: Run, given: Mapping[str, Any]) -> gymnasium.Env[Any, Any
     """
     keeps_dict = algorithm(run.algorithm).keeps_dict
     return make_environment(run.env_id, {**run.env_kwargs, **given}, keep_dict=keeps_dict)
+
+
+def random_policy(run: Run, env_options: Mapping[str, Any], seed: int) -> RandomPolicy:
+    """Actions that the environment's space draws.
+
+    Raises:
+        WorkbenchError: if the environment can't be made.
+    """
+    env = environment_of(run, env_options)
+    env.action_space.seed(seed)
+    return RandomPolicy(lambda _: env.action_space.sample(), env)
 
 
 def load_learned(

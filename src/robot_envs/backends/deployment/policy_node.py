@@ -14,7 +14,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from robot_envs.backends.deployment.joint_listener import JointListener
 from robot_envs.backends.deployment.pilot import Pilot
 from robot_envs.backends.ros import node
-from robot_envs.backends.ros.bring_up import full_name
+from robot_envs.backends.ros.bring_up import full_name, lockstep_hint
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.task import GoalTask, Task
@@ -137,7 +137,7 @@ class PolicyNode:
         beginning = time.monotonic()
         while (missing := self._missing()) and not self._is_over():
             if time.monotonic() - beginning > PATIENCE:
-                self._tell(f"waiting for {missing}")
+                self._tell(f"waiting for {missing}", lockstep_hint)
             rospy.rostime.wallsleep(POLL)
         if not missing:
             self._tell("")
@@ -163,7 +163,7 @@ class PolicyNode:
             if now > seen:
                 seen, since = now, time.monotonic()
             elif time.monotonic() - since > PATIENCE:
-                self._tell("the time on /clock stands still")
+                self._tell("the time on /clock stands still", lockstep_hint)
             with clock:
                 clock.wait(POLL)
 
@@ -193,10 +193,10 @@ class PolicyNode:
         except ValueError as error:
             rospy.logwarn(f"{error}; it keeps the one it has")
 
-    def _tell(self, reason: str) -> None:
-        """Says once why the robot stands still, and once that it doesn't any more."""
+    def _tell(self, reason: str, hint: Callable[[], str] = str) -> None:
+        """Says once why the robot stands still, with a hint, and once that it doesn't any more."""
         if reason != self._told:
-            (rospy.logwarn if reason else rospy.loginfo)(reason or "going on")
+            (rospy.logwarn if reason else rospy.loginfo)(f"{reason}{hint()}" or "going on")
         self._told = reason
 
     def _publish(self, commands: Mapping[str, Command]) -> None:

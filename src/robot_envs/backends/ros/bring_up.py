@@ -32,6 +32,17 @@ Say = Callable[[str], None]
 Undo = Callable[[], object]
 
 
+def lockstep_hint() -> str:
+    """For who waits in vain for a simulation to go on by itself; empty where that isn't the reason."""
+    with contextlib.suppress(RobotEnvError):  # without its master nobody knows
+        if node.service_is_registered(STEP_SERVICE):
+            return (
+                f"; the simulator is in lock-step (it offers {STEP_SERVICE}) and moves by its steps alone: "
+                "start it with lockstep:=false paused:=false"
+            )
+    return ""
+
+
 def simulator_answers() -> bool:
     """Whether a living simulator offers Gazebo's services.
 

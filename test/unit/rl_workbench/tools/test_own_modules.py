@@ -216,8 +216,15 @@ def test_a_run_whose_module_is_gone_is_plotted_all_the_same(
         check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    done = subprocess.run(
-        [*command, "eval", str(trained)], env=found, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 1
-    assert "there is no module 'own_arm'" in done.stderr and done.stderr.count("\n") == 1
+    for needs_it in (
+        ["eval"],
+        ["eval", "--checkpoint=random"],
+        ["view", "--no-browser"],
+        ["enjoy", "--gui"],
+    ):
+        done = subprocess.run(
+            [*command, *needs_it, str(trained)], env=found, capture_output=True, text=True, check=False,
+            timeout=300,
+        )  # fmt: skip
+        assert done.returncode == 1 and done.stdout == ""
+        assert "there is no module 'own_arm'" in done.stderr and done.stderr.count("\n") == 1

@@ -72,6 +72,22 @@ def test_eval_repeats_itself_and_its_seed_counts(runs: Path, capsys) -> None:
     assert figures[0] == figures[1] != figures[2]
 
 
+def test_eval_of_random_actions_is_a_baseline(runs: Path, capsys) -> None:
+    found = []
+    for seed in (0, 0, 1):
+        wanted = ["--checkpoint", "random", "--episodes", 5, "--seed", seed, "--json", "-"]
+        assert work("eval", runs / "dqn_0", *wanted) == 0
+        told = capsys.readouterr()
+        found.append(json.loads(told.out))
+        assert "over 5 random episodes" in told.err
+    assert {each["checkpoint"] for each in found} == {"random"}
+    assert found[0] == found[1] and found[0]["returns"] != found[2]["returns"]
+    assert len(set(found[0]["returns"])) > 1
+    with pytest.raises(SystemExit, match="0"):
+        work("eval", "--help")
+    assert "or random actions" in " ".join(capsys.readouterr().out.split())
+
+
 def test_eval_says_whether_it_is_solved(runs: Path, capsys) -> None:
     work("eval", runs / "dqn_0", "--episodes", 2)
     assert "not solved: the line is 475" in capsys.readouterr().out

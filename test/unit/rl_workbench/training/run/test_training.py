@@ -126,6 +126,7 @@ def test_hyper_parameters_stand_beside_the_result(whole, name: str) -> None:
 
 def test_the_user_is_told_of_begin_and_end(tmp_path: Path, capsys, monkeypatch) -> None:
     monkeypatch.setenv("CARTPOLE_WS", "/a place/ws")
+    monkeypatch.setenv("CARTPOLE_WITH", "/my robots")
     result = summary(train(tmp_path, "reinforce", eval_episodes=20))
     told = capsys.readouterr().out
     assert f"training reinforce in CartPole-v1 with seed 3: {tmp_path}\n" in told
@@ -134,7 +135,10 @@ def test_the_user_is_told_of_begin_and_end(tmp_path: Path, capsys, monkeypatch) 
     assert f"; best evaluation {mean:.1f} at step {step}" in told
     assert "; the last one over 20 greedy episodes: length " in told
     assert f"everything lies in {tmp_path}\n" in told and "--resume" not in told
-    assert f"watch: '/a place/ws' rosrun cartpole workbench.py view {tmp_path}\n" in told
+    assert (
+        f"watch: '/a place/ws' --with '/my robots' rosrun cartpole workbench.py view {tmp_path}\n"
+        in told
+    )
     assert f"curves: '/a place/ws' tensorboard --logdir {tmp_path}\n" in told
 
 
