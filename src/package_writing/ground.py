@@ -22,6 +22,16 @@ def standing_height(model: ModelDescription) -> float | None:
     return max(0.0, math.ceil(round(-min(lows) * 1000.0, 6)) / 1000.0)  # 0.1 stays 0.1
 
 
+def height_told(height: float, stands: float | None) -> str:
+    """What is told of the height [m] at which a robot is spawned, that stands on the ground at another."""
+    if stands is None:
+        return "note: it has no <collision>, so that it falls through the ground"
+    told = f"spawned at a height of {height:g} m"
+    if height < stands:
+        return f"note: {told} its lowest collision lies below the ground; --height {stands:g} is enough"
+    return f"{told}; its lowest collision touches the ground at {stands:g} m"
+
+
 def _low(shape: Shape, pose: Pose) -> float:
     """The height of a shape's lowest point [m]."""
     up = np.array(rotate(conjugate(pose.orientation), (0.0, 0.0, 1.0)))  # as the shape sees it

@@ -13,7 +13,7 @@ import yaml
 from bullet_gazebo.physics.meshes.mesh_files import Resources
 from package_writing import contents
 from package_writing.errors import CannotWrite
-from package_writing.ground import standing_height
+from package_writing.ground import height_told, standing_height
 from package_writing.survey import Survey, look_at, root_link
 from package_writing.urdf_files import Copied, copy_urdf, expanded
 from robot_envs import Robot, RobotEnvError
@@ -203,7 +203,7 @@ def _told(
     if wheels:
         yield f"continuous joints of a free base get a velocity controller, as wheels: {', '.join(wheels)}"
     if not survey.model.fixed_base:
-        yield _height_told(wanted, stands)
+        yield height_told(wanted.height or 0.0, stands)
     if survey.passive:
         yield f"joints that move without a motor, and that tasks don't see: {', '.join(survey.passive)}"
     held = [each.joint for each in survey.motors if not each.limited]
@@ -221,15 +221,6 @@ def _told(
         yield f"note: {len(warnings) - NOTES} more of such"
     yield f"in {TREE}, to go on:" if IS_CHECKOUT else "to go on:"
     yield from (f"  {each}" for each in _commands(wanted, copied))
-
-
-def _height_told(wanted: Wanted, stands: float | None) -> str:
-    if stands is None:
-        return "note: it has no <collision>, so that it falls through the ground"
-    told = f"spawned at a height of {wanted.height:g} m"
-    if wanted.height is not None and wanted.height < stands:
-        return f"note: {told} its lowest collision lies below the ground; --height {stands:g} is enough"
-    return f"{told}; its lowest collision touches the ground at {stands:g} m"
 
 
 def _commands(wanted: Wanted, copied: Copied) -> list[str]:
