@@ -57,13 +57,17 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--height",
         type=float,
-        default=0.0,
         metavar="Z",
-        help="where it is spawned [m] (default: 0)",
+        help="where it is spawned [m] (default: 0; with a free base: where it stands on the ground)",
     )
     parser.add_argument(
-        "--interface", choices=package.INTERFACES, default="effort",
-        help="of the joints, if the file has no transmissions (default: effort)",
+        "--interface", choices=package.INTERFACES,
+        help="of the joints, if the file has no transmissions (default: effort; velocity of the continuous "
+        "joints of a free base, which are wheels)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--passive", action="append", default=[], metavar="JOINT",
+        help="a joint without a motor, if the file has no transmissions; may be repeated",
     )  # fmt: skip
     return parser
 
@@ -82,7 +86,7 @@ def _write(args: argparse.Namespace, parent: Path) -> list[str]:
         )
     wanted = package.Wanted(
         args.name, folder, args.urdf, package.read_arguments(args.arguments), args.base, args.height,
-        args.interface,
+        args.interface, tuple(args.passive),
     )  # fmt: skip
     try:
         made = Path(tempfile.mkdtemp(prefix=f".{args.name}.", dir=parent))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
-from package_writing.gains import Gains, effort_gains, velocity_gains
+from package_writing.gains import Gains, effort_gains, velocity_gains, wheel_gains
 from package_writing.survey import EFFORT, POSITION, Motor, Survey
 
 TEMPLATE = Path(__file__).resolve().parent / "template"
@@ -46,18 +46,19 @@ def controller(motor: Motor) -> str:
 
 def controllers_text(survey: Survey) -> str:
     """The controllers, as YAML."""
-    by_joint = effort_gains(survey.model)
+    by_joint, of_wheels = effort_gains(survey.model), wheel_gains(survey.model)
     lines = []
     for motor in survey.motors:
         kind = motor.interface.removesuffix("JointInterface").lower()
         lines += [
             f"{controller(motor)}:",
-            f"  type: {kind}_controllers/JointPositionController",
+            f"  type: {kind}_controllers/Joint{'Velocity' if motor.wheel else 'Position'}Controller",
             f"  joint: {motor.joint}",
         ]
         if motor.interface == EFFORT:
-            lines.append(f"  pid: {_inline(by_joint[motor.joint])}  # {_units(motor)}")
-        elif motor.interface != POSITION:
+            gains = of_wheels if motor.wheel else by_joint
+            lines.append(f"  pid: {_inline(gains[motor.joint])}  # {_units(motor)}")
+        elif motor.interface != POSITION and not motor.wheel:
             lines.append(f"  pid: {_inline(velocity_gains())}  # [1/s]")
         lines.append("")
     unlimited = [motor.joint for motor in survey.motors if not motor.limited]
@@ -79,6 +80,8 @@ def _inline(gains: Gains) -> str:
 
 
 def _units(motor: Motor) -> str:
+    if motor.wheel:
+        return "[N m s/rad, N m/rad, N m s²/rad, N m]"
     effort, way = ("N", "m") if motor.linear else ("N m", "rad")
     return f"[{effort}/{way}, {effort}/({way} s), {effort} s/{way}, {effort}]"
 
@@ -94,6 +97,26 @@ def ranges_text(survey: Survey) -> str:
 def _inwards(bound: float, rounded: Callable[[float], int]) -> float:
     """A bound with three decimals, within the range that it bounds."""
     return rounded(bound * 1000.0) / 1000.0
+
+
+def wheels_text(survey: Survey) -> dict[str, str]:
+    """What a task says of wheels, by the template's names for it; nothing, where there are none."""
+    listed = "".join(f'    "{each.joint}",\n' for each in survey.motors if each.wheel)
+    where = (
+        '        """Where the joints are{}."""\n        return np.array([{} for joint in RANGES])'
+    )
+    if not listed:
+        return {"wheels": "", "where": where.format("", "state.joints[joint].position")}
+    told = (
+        '        told = {joint: "velocity" if joint in WHEELS else "position" for joint in RANGES}'
+    )
+    text = where.format(
+        "; of wheels, how fast they turn", "getattr(state.joints[joint], told[joint])"
+    )
+    return {
+        "wheels": f"WHEELS = {{  # they are told a velocity, and reach one\n{listed}}}\n",
+        "where": text.replace("\n", f"\n{told}\n"),
+    }
 
 
 def names_text(survey: Survey) -> str:

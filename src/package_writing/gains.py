@@ -19,6 +19,8 @@ SHARE = 0.05  # of its range, at most as well
 GRAVITY = 9.81  # [m/s²]
 VELOCITY = 5.0  # [1/s], where the output is a velocity
 
+CLAMP = 5.0  # [rad/s], of a wheel: i does no more than p where it is that much too slow
+
 Gains = dict[str, float]
 
 
@@ -49,6 +51,18 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
 def velocity_gains() -> Gains:
     """Those of one whose output is a velocity."""
     return {"p": VELOCITY}
+
+
+def wheel_gains(model: ModelDescription) -> dict[str, Gains]:
+    """Gains of velocity controllers whose output is an effort, by joint.
+
+    p is as stiff as steps of 1 ms can follow with the wheel in the air; i holds against slopes, friction.
+    """
+    found = {}
+    for name, inertia in effective_inertias(model, poses_at_zero(model)).items():
+        p = HIGHEST * inertia
+        found[name] = _rounded({"p": p, "i": VELOCITY * p, "d": 0.0, "i_clamp": CLAMP * p})
+    return found
 
 
 def _masses(model: ModelDescription) -> dict[str, float]:

@@ -5,7 +5,7 @@ import os
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import yaml
@@ -13,6 +13,7 @@ import yaml
 from bullet_gazebo.physics.meshes.mesh_files import Resources
 from package_writing import contents
 from package_writing.errors import CannotWrite
+from package_writing.ground import height_told, standing_height
 from package_writing.survey import Survey, look_at, root_link
 from package_writing.urdf_files import Copied, copy_urdf, expanded
 from robot_envs import Robot, RobotEnvError
@@ -39,8 +40,9 @@ class Wanted:
         urdf: the robot's file; None: a two-link arm.
         arguments: of xacro.
         base: "fixed" or "free", of a robot that isn't fixed to the world; None: nothing is said.
-        height: where it is spawned [m].
-        interface: of its joints, if they have no transmissions.
+        height: where it is spawned [m]; None: at 0, or where a free base stands on the ground.
+        interface: of its joints, if they have no transmissions; None: of wheels velocity, of others effort.
+        passive: joints that are left without a motor, if none has a transmission.
     """
 
     name: str
@@ -48,8 +50,9 @@ class Wanted:
     urdf: Path | None
     arguments: Mapping[str, str]
     base: str | None
-    height: float
-    interface: str
+    height: float | None
+    interface: str | None
+    passive: tuple[str, ...] = ()
 
 
 def read_arguments(texts: Sequence[str]) -> dict[str, str]:
@@ -76,13 +79,14 @@ def write(wanted: Wanted, made: Path) -> list[str]:
     Raises:
         CannotWrite: if the robot can't be read, simulated or moved.
     """
-    if not math.isfinite(wanted.height):
+    if wanted.height is not None and not math.isfinite(wanted.height):
         raise CannotWrite(f"--height is a number of metres, not {wanted.height}")
     source = wanted.urdf or ARM
     copied = copy_urdf(source, wanted.arguments, wanted.name, made)
     _check_packages(copied)
     resources = _resources(wanted.name, made)
-    interface = f"{wanted.interface.capitalize()}JointInterface"
+    interface = f"{wanted.interface.capitalize()}JointInterface" if wanted.interface else None
+    free = wanted.base == "free"
     loose = _loose_link(wanted, root_link(copied.xml), source)
     urdf, xml = copied.place, copied.xml
     control = f"{wanted.name}_control.urdf.xacro"
@@ -94,11 +98,14 @@ def write(wanted: Wanted, made: Path) -> list[str]:
 
     if loose:  # a base without mass can't be simulated before it is fixed
         urdf, xml = control, with_more(None)
-    survey = look_at(xml, interface, resources)
-    lacks = list(_lacks(survey, loose))
-    if survey.added or not survey.has_plugin:
+    survey = look_at(xml, interface, resources, free=free, passive=wanted.passive)
+    lacks, added = list(_lacks(survey, loose)), survey.added
+    if added or not survey.has_plugin:
         urdf, xml = control, with_more(survey)
-        survey = look_at(xml, interface, resources)
+        survey = look_at(xml, interface, resources, free=free)
+    stands = None if survey.model.fixed_base else standing_height(survey.model)
+    if wanted.height is None:
+        wanted = replace(wanted, height=stands or 0.0)
     values = _values(wanted, survey, urdf, copied)
     contents.fill(made, wanted.name, values)
     parameters = yaml.safe_load((made / "config/controllers.yaml").read_text(encoding="utf-8"))
@@ -109,8 +116,8 @@ def write(wanted: Wanted, made: Path) -> list[str]:
     wrong = list(controllers.faults(robot.run, None, parameters, robot.hardware(), movable))
     if wrong:
         raise CannotWrite("; ".join(wrong))
-    added = f"urdf/{urdf}, which includes it, adds {' and '.join(lacks)}" if lacks else ""
-    return list(_told(wanted, copied, survey, added))
+    more = f"urdf/{urdf}, which includes it, adds {' and '.join(lacks)}" if lacks else ""
+    return list(_told(wanted, copied, replace(survey, added=added), more, stands))
 
 
 def _loose_link(wanted: Wanted, root: str, source: Path) -> str:
@@ -149,7 +156,7 @@ def _resources(name: str, folder: Path) -> Resources:
 def _values(wanted: Wanted, survey: Survey, urdf: str, copied: Copied) -> dict[str, str]:
     needed = [each for each in copied.packages if each not in OURS]
     pairs = [f"{name}:={value}" for name, value in wanted.arguments.items()]
-    linear = {each.linear for each in survey.motors}
+    units = {"rad/s" if each.wheel else "m" if each.linear else "rad" for each in survey.motors}
     namespace = f'\n    namespace="{survey.namespace}",' if survey.namespace else ""
     arguments = f"\n    arguments={dict(wanted.arguments)!r}," if pairs else ""
     return {
@@ -159,7 +166,8 @@ def _values(wanted: Wanted, survey: Survey, urdf: str, copied: Copied) -> dict[s
         "controllers": contents.names_text(survey),
         "controllers_yaml": contents.controllers_text(survey),
         "ranges": contents.ranges_text(survey),
-        "units": "m" if linear == {True} else "rad, m" if True in linear else "rad",
+        "units": ", ".join(each for each in ("rad", "m", "rad/s") if each in units),
+        **contents.wheels_text(survey),
         "run": " ".join(map(contents.controller, survey.motors)),
         "arguments": arguments.replace("'", '"'),
         "launch_arguments": "".join(f" {shlex.quote(each)}" for each in pairs),
@@ -176,17 +184,26 @@ def _lacks(survey: Survey, loose: str) -> Iterator[str]:
     if loose:
         yield f"a joint that fixes '{loose}' to the world"
     if survey.added:
-        yield f"transmissions ({survey.motors[0].interface})"
+        interfaces = dict.fromkeys(each.interface for each in survey.motors)
+        yield f"transmissions ({', '.join(interfaces)})"
     if not survey.has_plugin:
         yield "ros_control's plugin"
 
 
-def _told(wanted: Wanted, copied: Copied, survey: Survey, added: str) -> Iterator[str]:
+def _told(
+    wanted: Wanted, copied: Copied, survey: Survey, more: str, stands: float | None
+) -> Iterator[str]:
     yield f"written: {wanted.folder}"
     joints = ", ".join(each.joint for each in survey.motors)
-    if added:
-        yield f"what the file lacks: {added}"
-    yield f"joints with a motor and a controller: {joints}"
+    if more:
+        yield f"what the file lacks: {more}"
+    hint = " (--passive JOINT leaves one without)" if survey.added else ""
+    yield f"joints with a motor and a controller: {joints}{hint}"
+    wheels = [each.joint for each in survey.motors if each.wheel]
+    if wheels:
+        yield f"continuous joints of a free base get a velocity controller, as wheels: {', '.join(wheels)}"
+    if not survey.model.fixed_base:
+        yield height_told(wanted.height or 0.0, stands)
     if survey.passive:
         yield f"joints that move without a motor, and that tasks don't see: {', '.join(survey.passive)}"
     held = [each.joint for each in survey.motors if not each.limited]

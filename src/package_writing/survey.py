@@ -1,7 +1,7 @@
 """What a URDF is made of, as far as a package for it has to know."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
@@ -11,6 +11,7 @@ from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.state.names import did_you_mean
 from file_reading.errors import FileError
 from file_reading.xml_parser import parse
 from package_writing.errors import CannotWrite
@@ -21,6 +22,7 @@ EFFORT, POSITION, VELOCITY = (
 )
 SHARE = 0.6  # of a joint's range, about its middle, that postures to reach are drawn from
 WIDEST = 1.8  # [rad, m], half of what they are drawn from
+FASTEST = 5.0  # [rad/s], of wheels
 
 
 @dataclass(frozen=True)
@@ -29,10 +31,11 @@ class Motor:
 
     joint: str
     interface: str
-    low: float  # of the postures to reach [rad, m]
+    low: float  # of the postures to reach [rad, m], or of a wheel's speeds [rad/s]
     high: float
     linear: bool
     limited: bool  # whether the URDF's limits of effort and velocity leave it able to move
+    wheel: bool  # it turns without end, of a robot whose base is free: it is told a velocity
 
 
 @dataclass(frozen=True)
@@ -47,13 +50,23 @@ class Survey:
     namespace: str  # of the plugin
 
 
-def look_at(xml: str, interface: str, resources: Resources) -> Survey:
+def look_at(
+    xml: str,
+    interface: str | None,
+    resources: Resources,
+    *,
+    free: bool = False,
+    passive: Sequence[str] = (),
+) -> Survey:
     """Reads a URDF.
 
     Args:
         xml: the text.
-        interface: of joints that have no transmission, where none has.
+        interface: of joints that have no transmission, where none has; None: the velocity of wheels, the
+            effort of others.
         resources: where meshes lie.
+        free: whether a robot that nothing fixes to the world stays so.
+        passive: joints that are left without a motor, where none has a transmission.
 
     Raises:
         CannotWrite: if it can't be read or simulated, or nothing in it can be moved.
@@ -67,12 +80,19 @@ def look_at(xml: str, interface: str, resources: Resources) -> Survey:
     mimics = {e.get("name") for e in robot.findall("joint") if e.find("mimic") is not None}
     driven = {each.joint: each.interface for each in control.transmissions}
     added = not driven
+    _check_passive(passive, movable, driven)
+    endless = {each.name for each in model.movable_joints if each.kind == "continuous"}
+    wheels = endless if free and not model.fixed_base else set()
     if added:
-        driven = {name: interface for name in movable if name not in mimics}
-    motors = tuple(_motors(control, driven, movable))
+        driven = {
+            name: interface or (VELOCITY if name in wheels else EFFORT)
+            for name in movable
+            if name not in mimics and name not in passive
+        }
+    motors = tuple(_motors(control, driven, movable, wheels))
     if not motors:
         raise CannotWrite(
-            "nothing in it moves: it needs a joint that is revolute, continuous or prismatic"
+            "nothing in it moves by a motor: it needs a joint that is revolute, continuous or prismatic"
         )
     plugin = next(_plugins(robot), None)
     namespace = "" if plugin is None else (plugin.findtext("robotNamespace") or "")
@@ -103,8 +123,20 @@ def root_link(xml: str) -> str:
     return next((name for name in links if name not in children), "")
 
 
+def _check_passive(passive: Sequence[str], movable: list[str], driven: dict[str, str]) -> None:
+    for name in passive:
+        if name not in movable:
+            near = did_you_mean(name, movable)
+            raise CannotWrite(f"--passive: it has no joint '{name}' that moves{near}")
+        if driven:
+            raise CannotWrite(
+                "--passive is for files without transmissions; this one has some: remove the transmission "
+                "of a joint that is to have no motor"
+            )
+
+
 def _motors(
-    control: RobotDescription, driven: dict[str, str], movable: list[str]
+    control: RobotDescription, driven: dict[str, str], movable: list[str], wheels: set[str]
 ) -> Iterator[Motor]:
     for name, interface in driven.items():
         if name not in movable:
@@ -114,13 +146,20 @@ def _motors(
             )
         joint = control.joints[name]
         limits = joint.limits
+        wheel = name in wheels and interface != POSITION
         yield Motor(
             name,
             interface,
-            *_range(joint),
+            *(_speeds(joint) if wheel else _range(joint)),
             linear=joint.kind == "prismatic",
             limited=limits.effort != 0.0 and limits.velocity != 0.0,
+            wheel=wheel,
         )
+
+
+def _speeds(joint: JointHandle) -> tuple[float, float]:
+    fastest = min(SHARE * (joint.limits.velocity or math.inf), FASTEST)
+    return -fastest, fastest
 
 
 def _range(joint: JointHandle) -> tuple[float, float]:

@@ -25,7 +25,7 @@ BLOCK = re.compile(r"^```(\S+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL
 LIMIT = 300.0  # [s] for one command
 SHORT = "--total-timesteps 300 --eval-frequency 300 --eval-episodes 1 --confirm-episodes 1"
 SHORTER = {
-    "train": f"{SHORT} --n-envs 1 --n-steps 150 --n-epochs 1",
+    "train": f"{SHORT} --n-steps 150 --n-epochs 1",
     "eval": "--episodes 1",
     "record": "--max-steps 10 --size 160x120",
     "train.launch": f"'more:={SHORT} --learning-starts 100'",
