@@ -1,5 +1,6 @@
 """One package: what is wanted, how it comes about, and what is told of it."""
 
+import json
 import math
 import os
 import re
@@ -158,7 +159,7 @@ def _values(wanted: Wanted, survey: Survey, urdf: str, copied: Copied) -> dict[s
     pairs = [f"{name}:={value}" for name, value in wanted.arguments.items()]
     units = {"rad/s" if each.wheel else "m" if each.linear else "rad" for each in survey.motors}
     namespace = f'\n    namespace="{survey.namespace}",' if survey.namespace else ""
-    arguments = f"\n    arguments={dict(wanted.arguments)!r}," if pairs else ""
+    arguments = f"\n    arguments={json.dumps(wanted.arguments)}," if pairs else ""
     return {
         "name": wanted.name,
         "urdf": urdf,
@@ -169,7 +170,7 @@ def _values(wanted: Wanted, survey: Survey, urdf: str, copied: Copied) -> dict[s
         "units": ", ".join(each for each in ("rad", "m", "rad/s") if each in units),
         **contents.wheels_text(survey),
         "run": " ".join(map(contents.controller, survey.motors)),
-        "arguments": arguments.replace("'", '"'),
+        "arguments": arguments,
         "launch_arguments": "".join(f" {shlex.quote(each)}" for each in pairs),
         "namespace": namespace,
         "ns": survey.namespace,

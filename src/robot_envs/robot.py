@@ -196,14 +196,12 @@ class Robot:
             )
 
     def _faults_of_its_world(self) -> Iterator[str]:
-        """What is wrong of engine, period, world and namespace."""
-        if self.engine not in ("bullet", "mujoco"):
-            yield f"there is no engine '{self.engine}'; there are bullet and mujoco"
+        """What is wrong of period, world and namespace; the engine is a backend's name."""
         if not 0.0 < self.control_period < math.inf:
             yield f"control_period must be a time above 0 [s], not {self.control_period}"
         if self.world is not None and self.world != EMPTY and not files.is_text(self.world):
             try:
-                files.check_there(files.locate(self.world))
+                files.need_file(files.locate(self.world))
             except RobotEnvError as error:
                 yield f"its world: {error}"
         for plugin in self.links.plugins:

@@ -11,6 +11,8 @@ from robot_envs import Pose, RobotEnvError
 
 XACRO = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">${nothing}</robot>'
 GROUP = LEFT_CONTROLLERS["pair"]
+DRIVES = """<gazebo><plugin name="drives" filename="libgazebo_ros_control.so">
+  <robotNamespace>/right</robotNamespace></plugin></gazebo></robot>"""
 
 
 def with_pair(**changes):
@@ -19,6 +21,12 @@ def with_pair(**changes):
 
 ELBOW = {"type": "position_controllers/JointPositionController", "joint": "elbow"}
 ROBOTS = {
+    "no time": ({"control_period": 0.0}, "control_period must be a time above 0"),
+    "a world that isn't there": ({"world": "/nowhere/a.world"}, "its world: there is no file"),
+    "another namespace than the URDF's": (
+        {"namespace": "left", "urdf": SOLO.xml.replace("</robot>", DRIVES)},
+        r"into the namespace '/right' \(<robotNamespace>\), the description into '/left'",
+    ),
     "no transmissions": (
         {"urdf": SOLO.xml.replace("transmission", "nothing")},
         "the robot 'arm': its URDF has no <transmission>: each joint that is to be",
