@@ -4,6 +4,7 @@ import contextlib
 import os
 import sys
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import rospy
 from controller_manager_msgs.srv import ListControllers
@@ -18,7 +19,9 @@ from robot_envs.backends.world_files import world_models
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorHangs
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
+from ros_calls import master
 from ros_calls.waiting import wait_until
+from ros_calls.xmlrpc import NoAnswer, Refused
 from ros_utils import ros_controllers, ros_gazebo
 from ros_utils.readiness import NotReady, Ready
 
@@ -127,8 +130,8 @@ def _bring_model(robot: Robot, say: Say) -> list[Undo]:
     say(f"spawning the robot '{robot.model}'")
     # Before it comes: its drives read them. As text: packages of the user's may have the names of ours.
     for name, value in robot.parameters.items():
-        rospy.set_param(full_name(robot, name), value)
-    rospy.set_param(full_name(robot, robot.description), robot.xml)
+        _set_parameter(full_name(robot, name), value)
+    _set_parameter(full_name(robot, robot.description), robot.xml)
     return [spawn(robot.model, robot.xml, robot.pose, f"/{robot.namespace.strip('/')}")]
 
 
@@ -179,6 +182,18 @@ def _bring_controllers(robot: Robot, say: Say) -> list[Undo]:
     return undo
 
 
+def _set_parameter(name: str, value: Any) -> None:
+    """At the master that is asked now: rospy keeps to the one that it began with.
+
+    Raises:
+        RobotEnvError: if the master doesn't answer, or takes no such value.
+    """
+    try:
+        master.call("setParam", name, value)
+    except (NoAnswer, Refused) as error:
+        raise RobotEnvError(f"the parameter {name} can't be set: {error}") from error
+
+
 def _describe(robot: Robot, names: Sequence[str]) -> None:
     """Puts the parameters of controllers where they are looked for."""
     for name in names:
@@ -186,7 +201,7 @@ def _describe(robot: Robot, names: Sequence[str]) -> None:
         if described is None and name == robot.publisher:
             described = PUBLISHER
         if described is not None:
-            rospy.set_param(full_name(robot, name), described)
+            _set_parameter(full_name(robot, name), described)
 
 
 def _controller_states(robot: Robot) -> dict[str, str]:
