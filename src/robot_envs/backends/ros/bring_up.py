@@ -190,7 +190,7 @@ def _set_parameter(name: str, value: Any) -> None:
     """
     try:
         master.call("setParam", name, value)
-    except (NoAnswer, Refused) as error:
+    except (NoAnswer, Refused, OverflowError) as error:  # a whole number that XML-RPC can't carry
         raise RobotEnvError(f"the parameter {name} can't be set: {error}") from error
 
 
