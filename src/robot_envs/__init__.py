@@ -6,6 +6,7 @@ A `Robot` (robot.py) says what it is made of, a `Task` (task.py) what is to be l
 (backends/) moves it, and `RobotEnv` (environment.py) puts them together. Knows no robot by name.
 """
 
+from bullet_gazebo.pictures.camera import Camera
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.making import register
@@ -24,6 +25,7 @@ from robot_envs.world_state import (
 
 __all__ = [
     "EMPTY",
+    "Camera",
     "Commands",
     "GoalTask",
     "InitialState",

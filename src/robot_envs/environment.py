@@ -61,7 +61,7 @@ class RobotEnv(DrawnEnv):
         actuator_lag: time constant of what follows commands [s]; see `Actuator`.
         randomisation: what differs from episode to episode: options of `UniformRandomisation` by name, or a
             `Randomisation` of one's own. What was drawn stands in the reset's `info["variation"]`.
-        camera: where pictures are taken from, see `robot_envs.pictures.picture`.
+        camera: where pictures are taken from, a `robot_envs.Camera`; None: so that the robots are seen.
         width: of the pictures [pixels].
         height: of the pictures [pixels].
         window: opens a window that shows joints every so many [s], for the render mode "human".
