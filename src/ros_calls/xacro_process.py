@@ -174,6 +174,10 @@ def _what_went_wrong(xacro: Any, path: str, fault: Exception, memory: int) -> st
     elif any(isinstance(each, MemoryError) for each in chain):
         reason = f"needs more than {memory >> 20} MiB of memory"
     else:
+        missing = getattr(fault, "exc", None)  # of xacro's own exception, which tells it twice
+        if isinstance(missing, OSError) and missing.filename and missing.strerror:
+            own = missing.filename == files[0]
+            fault = Exception(missing.strerror + ("" if own else f": {missing.filename}"))
         text = " ".join(str(fault.args[0] if isinstance(fault, KeyError) else fault).split())
         reason = text[:TEXT] or type(fault).__name__
     return f"{', '.join([*files[:1], *through])}: {reason}"

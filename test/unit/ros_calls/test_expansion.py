@@ -65,6 +65,12 @@ def test_a_file_without_bounds(bad, text, reason):
     assert re.search(reason, refused(bad(text), processor_time=1))
 
 
+def test_a_file_that_is_missing_is_told_once(bad, tmp_path):
+    assert refused(str(tmp_path / "none")) == f"{tmp_path}/none: No such file or directory"
+    path = bad('<xacro:include filename="none.xacro"/>')
+    assert refused(path) == f"{path}: No such file or directory: {tmp_path}/none.xacro"
+
+
 def test_a_bomb_of_macros(bad):
     """Each macro calls the one before ten times."""
     macros = '<xacro:macro name="m0"><link/></xacro:macro>' + "".join(

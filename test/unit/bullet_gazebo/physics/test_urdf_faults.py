@@ -149,6 +149,29 @@ def test_a_colour_that_cannot_be_read_leaves_the_shape():
     assert "material 'odd': <color rgba> must hold 4 numbers" in named.warnings[0]
 
 
+def test_a_material_has_the_colour_that_another_link_gives_it():
+    """In either order of the links; the robot's own materials, and a visual's own colour, go before."""
+    ball = '<geometry><sphere radius="1"/></geometry>'
+    red, black = "1.0 0.0 0.0 1.0", "0.0 0.0 0.0 1.0"
+
+    def visual(name: str, colour: str = "") -> str:
+        inside = f'<color rgba="{colour}"/>' if colour else ""
+        return f'<visual>{ball}<material name="{name}">{inside}</material></visual>'
+
+    def colours(body: str, arm: str, more: str = "") -> list[tuple[float, ...] | None]:
+        model = parse_urdf(robot(body, INERTIAL + arm, more=more))
+        assert not model.warnings
+        return [model.links[each].visuals[0].rgba for each in ("body", "arm")]
+
+    assert colours(body=visual("m", black), arm=visual("m")) == [(0.0, 0.0, 0.0, 1.0)] * 2
+    assert colours(body=visual("m"), arm=visual("m", black)) == [(0.0, 0.0, 0.0, 1.0)] * 2
+    both = [(0.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 1.0)]
+    assert colours(body=visual("m", black), arm=visual("m", red)) == both
+    more = f'<material name="m"><color rgba="{red}"/></material>'
+    assert colours(body=visual("m", black), arm=visual("m"), more=more) == both
+    assert colours(body=visual("", black), arm=visual("")) == [(0.0, 0.0, 0.0, 1.0), None]
+
+
 def test_crossed_limits_are_swapped():
     model = parse_urdf(robot(joint='<limit lower="2" upper="-1" effort="1" velocity="1"/>'))
     assert (model.joints["hinge"].lower, model.joints["hinge"].upper) == (-1.0, 2.0)

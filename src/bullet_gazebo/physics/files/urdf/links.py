@@ -1,6 +1,7 @@
 """Links of a URDF. A part of one that can't be read is left out of it, with a warning; the link stays."""
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 from xml.etree.ElementTree import Element
@@ -37,6 +38,15 @@ class LinkReader:
         for material in robot.findall("material"):
             name = material.get("name", "")
             self._materials[name] = self._or_none(_rgba, material, f"material '{shown(name)}'")
+        for material in robot.iterfind(
+            "link/visual/material"
+        ):  # the first link that gives a colour
+            name = material.get("name", "")
+            if name and name not in self._materials:
+                with suppress(DescriptionError):  # its link's reading tells
+                    color = _rgba(material, name)
+                    if color is not None:
+                        self._materials[name] = color
 
     def read(self, element: Element) -> Link:
         """Reads one link.
