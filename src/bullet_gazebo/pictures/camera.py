@@ -21,6 +21,7 @@ class Camera:
         yaw: [degrees]; at 0 it looks along +y, with x to the right, at 90 along -x.
         pitch: [degrees]; negative looks down.
         view: height of what it sees, as an angle [degrees].
+        follows: whether it goes with a robot that drives, in pictures of an environment.
     """
 
     target: Vector = (0.0, 0.0, 0.0)
@@ -28,6 +29,7 @@ class Camera:
     yaw: float = 20.0
     pitch: float = -15.0
     view: float = 40.0
+    follows: bool = True
 
     def at(self, target: Vector) -> "Camera":
         """The same camera looking at another point [m]: one that follows something."""

@@ -101,5 +101,7 @@ class _DrawnRobot:
         base = self._placement.base()
         for name, poses in self._placement.poses(positions, base).items():
             self.scene.place(name, poses)
-        target = add(self._camera.target, self._placement.strayed(positions, base))
-        return self.scene.picture(self._camera.at(target), *self._size)
+        camera = self._camera
+        if camera.follows:
+            camera = camera.at(add(camera.target, self._placement.strayed(positions, base)))
+        return self.scene.picture(camera, *self._size)

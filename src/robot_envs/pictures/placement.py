@@ -1,6 +1,7 @@
 """Where a robot's links are in a state, and from where all of them are seen."""
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -13,6 +14,7 @@ from bullet_gazebo.pictures.solids import box_around, moved, solid_of, visible_s
 from robot_envs.pictures.surroundings import Shapes, Surroundings
 from robot_envs.robot import Robot
 
+ROOM = 2.5  # for the way that a robot without a fixed base goes, as a factor of the camera's distance
 QUARTERS = (0.0, pi / 2.0, pi, -pi / 2.0)  # [rad] of a joint without stops
 
 
@@ -78,13 +80,18 @@ class Placement:
         return np.concatenate([np.zeros((0, 3)), *corners])
 
     def camera(self, camera: Camera | None, aspect: float) -> Camera:
-        """A camera that sees all that the joints can reach; or `camera`, if there is one.
+        """A camera that sees all that the joints can reach, and more of the ground of one that drives; or `camera`.
 
         Args:
             camera: for the robot as it is spawned.
             aspect: of the pictures, width to height.
         """
-        return overview(self.reach(), aspect) if camera is None else camera
+        if camera is not None:
+            return camera
+        seen = overview(self.reach(), aspect)
+        if self.description.fixed_base:
+            return seen
+        return replace(seen, distance=ROOM * seen.distance)
 
     def strayed(self, positions: Mapping[str, float], base: Pose) -> Vector:
         """How far it has come from where it starts [m]: its root link, and along slides without near ends."""

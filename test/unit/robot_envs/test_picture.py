@@ -73,6 +73,17 @@ def test_a_camera_of_ones_own_looks_where_it_should():
     high.close()
 
 
+def test_a_camera_that_stays_sees_the_robot_drive():
+    place = [Pose((-0.3, 0.0, 0.1))]
+    camera = Camera(distance=3.0, yaw=0.0, follows=False)
+    picture = RobotPicture(ROVER_ROBOT, 160, 120, camera=camera, base=lambda: place[0])
+    left = where(picture({"neck": 0.0}), 0)
+    place[0] = Pose((0.3, 0.0, 0.1))
+    right = where(picture({"neck": 0.0}), 0)
+    picture.close()
+    assert right[0] > left[0] + 20
+
+
 @pytest.mark.parametrize("size", [(0, 10), (10, 5000), (10.5, 10), (-1, 10)])
 def test_sizes_that_no_picture_has_are_refused_at_once(size):
     with pytest.raises(ValueError, match="width and height lie in"):
