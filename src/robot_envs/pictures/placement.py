@@ -14,7 +14,9 @@ from bullet_gazebo.pictures.solids import box_around, moved, solid_of, visible_s
 from robot_envs.pictures.surroundings import Shapes, Surroundings
 from robot_envs.robot import Robot
 
-ROOM = 2.5  # for the way that a robot without a fixed base goes, as a factor of the camera's distance
+ROOM = (
+    2.5  # for the way that a robot without a fixed base goes, as a factor of the camera's distance
+)
 QUARTERS = (0.0, pi / 2.0, pi, -pi / 2.0)  # [rad] of a joint without stops
 
 
@@ -80,7 +82,7 @@ class Placement:
         return np.concatenate([np.zeros((0, 3)), *corners])
 
     def camera(self, camera: Camera | None, aspect: float) -> Camera:
-        """A camera that sees all that the joints can reach, and more of the ground of one that drives; or `camera`.
+        """A camera that sees all that joints can reach, and more of the ground of what drives; or `camera`.
 
         Args:
             camera: for the robot as it is spawned.
