@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import data_equivalence
 
 from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.state.names import did_you_mean
@@ -27,6 +28,22 @@ from robot_envs.variation.sensing import Noise, Sensor
 from robot_envs.world_state import Commands, InitialState, WorldState
 
 RESET_OPTIONS = ("initial_state", "goal")
+
+
+class _Step(NamedTuple):
+    """A step that is under way.
+
+    Args:
+        number: of the episode's steps, from 1.
+        action: as it was read.
+        arriving: the commands that controllers get.
+        sent: those that the state is to tell, whatever arrived of them; None: the same.
+    """
+
+    number: int
+    action: Any
+    arriving: Commands
+    sent: Commands | None
 
 
 class RobotEnv(DrawnEnv):
@@ -131,6 +148,7 @@ class RobotEnv(DrawnEnv):
         self._first: dict[str, Any] = {}  # to be commanded with an episode's first action
         self._initial = InitialState()
         self._steps: int | None = None  # None: no episode is under way
+        self._begun: _Step | None = None
         made = backend is None or isinstance(backend, str)
         self.backend: RobotBackend = (
             make_backend(self.scene, backend, period) if made else backend  # type: ignore[assignment,arg-type]
@@ -185,7 +203,7 @@ class RobotEnv(DrawnEnv):
         self._check_open()
         options = self._known_options(options or {})
         super().reset(seed=seed)
-        self._steps = None
+        self._steps = self._begun = None
         info = self._vary()
         drawn = self.task.initial_state(self.np_random)
         self._initial = initial = options.get("initial_state", drawn)
@@ -225,26 +243,56 @@ class RobotEnv(DrawnEnv):
         self.backend.vary(variation)
         return {"variation": told}
 
+    def begin_step(self, action: Any) -> None:
+        """Sends a step's commands and returns at once, so that several simulators move at the same time.
+
+        `step` with the same action takes the result; a reset or close drops it. Nobody has to call this.
+
+        Raises:
+            Exception: as `step`; and a ValueError if a step is under way.
+        """
+        if self._begun is not None:
+            raise ValueError("begin_step() was called twice; step() with its action comes next")
+        begun = self._prepared(action)
+        self.backend.begin(begun.arriving)
+        self._begun = begun
+
+    def _prepared(self, action: Any) -> _Step:
+        if self._steps is None or self._state is None:
+            self._check_open()
+            raise gymnasium.error.ResetNeeded("call reset() before step()")
+        action = self._read_action(action)
+        commands = self._commands(self.task.apply(action, self._state))
+        if self._first:  # what the controllers held until now goes along
+            commands = {**self._first, **commands}
+            self._first = {}
+        if self._actuator is None:
+            return _Step(self._steps + 1, action, commands, None)
+        sent = {**self._state.commands, **commands}
+        return _Step(self._steps + 1, action, self._actuator(sent), sent)
+
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Carries out one action.
 
         Raises:
             gymnasium.error.ResetNeeded: if no episode is under way.
             gymnasium.error.ClosedEnvironmentError: after `close()`.
-            ValueError: if the action isn't one of the task's, or the task commands or returns what it can't.
+            ValueError: if the action isn't one of the task's, or isn't the one that was begun, or the task
+                commands or returns what it can't.
             SimulatorError: if the backend doesn't answer.
         """
-        if self._steps is None or self._state is None:
-            self._check_open()
-            raise gymnasium.error.ResetNeeded("call reset() before step()")
-        task = self.task
-        action = self._read_action(action)
-        commands = self._commands(task.apply(action, self._state))
-        if self._first:  # what the controllers held until now goes along
-            commands = {**self._first, **commands}
-            self._first = {}
-        self._state = state = self._act(commands)
-        self._steps += 1
+        begun, task = self._begun, self.task
+        if begun is None:
+            begun = self._prepared(action)
+        elif not data_equivalence(begun.action, self._read_action(action), exact=True):
+            raise ValueError("step() was begun with another action")
+        self._begun = None
+        action = begun.action
+        state = self.backend.act(begun.arriving)
+        if begun.sent is not None:
+            state = state._replace(commands=begun.sent)
+        self._state = state
+        self._steps = begun.number
         terminated: Any = task.is_terminal(state)
         if type(terminated) is not bool:
             terminated = task_checks.flag(task, "is_terminal", terminated)
@@ -264,17 +312,10 @@ class RobotEnv(DrawnEnv):
             info = task_checks.told(task, info)
         return seen, reward, terminated, truncated, info
 
-    def _act(self, commands: Commands) -> WorldState:
-        """The state after a control period; it tells commands as they were sent, whatever arrived of them."""
-        if self._actuator is None or self._state is None:
-            return self.backend.act(commands)
-        sent = {**self._state.commands, **commands}
-        return self.backend.act(self._actuator(sent))._replace(commands=sent)
-
     def close(self) -> None:
         """Closes the backend and the window; may be called twice."""
         self._closed = True
-        self._steps = None
+        self._steps = self._begun = None
         self._end_drawing()
         self.backend.close()
 

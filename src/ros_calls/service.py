@@ -33,6 +33,9 @@ class ServiceHangs(ServiceFailed):
 class ServiceClient:
     """Calls one service. Not thread-safe.
 
+    A call is `begin` and `end`: several services do their work at the same time if all are begun before
+    the first one is ended.
+
     rospy's ServiceProxy waits for ever on a node that hangs, and a persistent one keeps a connection to
     a node that has ended. This one does neither: after a failure the next call connects anew.
 
@@ -52,6 +55,7 @@ class ServiceClient:
         self._persistent = persistent
         self.timeout = timeout
         self._connection: tcpros.Connection | None = None
+        self._begun = False  # whether an answer is still to be taken
 
     def __call__(self, *request: Any) -> Any:
         """Calls the service with a request, or with its fields in order, and returns the response.
@@ -62,24 +66,57 @@ class ServiceClient:
             ServiceHangs: no answer in time.
             ServiceFailed: the service refused, or the request can't be sent.
         """
-        kept = False
+        self.begin(*request)
+        return self.end()
+
+    def begin(self, *request: Any) -> None:
+        """Sends a request and returns at once; `end` takes the response, and must come next.
+
+        Raises:
+            ServiceFailed: as for a call.
+            RuntimeError: if a call was begun, and not ended.
+        """
+        if self._begun:
+            raise RuntimeError(f"{self.name}: begin() once more before end()")
         try:
             message = tcpros.request_message(self._kind, request)
-            response = self._connected().call(message, self.timeout)
+            self._connected().send(message, self.timeout)
+            self._begun = True
+        except (TimeoutError, tcpros.CallFailed) as fault:
+            raise self._failure(fault) from fault
+        finally:
+            if not self._begun:
+                self.close()
+
+    def end(self) -> Any:
+        """Waits for the response to what was begun; the time limit begins anew.
+
+        Raises:
+            ServiceFailed: as for a call.
+            RuntimeError: if no call was begun, or `close` was called since.
+        """
+        if not self._begun or self._connection is None:
+            raise RuntimeError(f"{self.name}: end() without begin()")
+        self._begun = kept = False
+        try:
+            response = self._connection.receive(self.timeout)
             kept = self._persistent
             return response
-        except TimeoutError as fault:
-            limit = "before the shutdown"
-            if self.timeout < math.inf:
-                limit = f"within {self.timeout:g} s"
-            raise ServiceHangs(f"{self.name}: no answer {limit}") from fault
-        except tcpros.ConnectionEnded as fault:
-            raise ServiceGone(f"{self.name}: the connection broke; its node has ended") from fault
-        except tcpros.CallFailed as fault:
-            raise ServiceFailed(f"{self.name}: {fault}") from fault
+        except (TimeoutError, tcpros.CallFailed) as fault:
+            raise self._failure(fault) from fault
         finally:
             if not kept:
                 self.close()
+
+    def _failure(self, fault: Exception) -> ServiceFailed:
+        if isinstance(fault, TimeoutError):
+            limit = "before the shutdown"
+            if self.timeout < math.inf:
+                limit = f"within {self.timeout:g} s"
+            return ServiceHangs(f"{self.name}: no answer {limit}")
+        if isinstance(fault, tcpros.ConnectionEnded):
+            return ServiceGone(f"{self.name}: the connection broke; its node has ended")
+        return ServiceFailed(f"{self.name}: {fault}")
 
     def call_idempotent(self, *request: Any) -> Any:
         """As a call, and calls once more if the kept connection was to a node that has ended.
@@ -113,7 +150,8 @@ class ServiceClient:
             ) from fault
 
     def close(self) -> None:
-        """Gives the connection up; the next call makes a new one."""
+        """Gives the connection up, and what was begun; the next call makes a new one."""
+        self._begun = False
         if self._connection is not None:
             self._connection.close()
             self._connection = None

@@ -84,11 +84,37 @@ class Connection:
             CallFailed: the service failed; ConnectionEnded: there is no connection any more.
             TimeoutError: no answer in time; the connection is of no use afterwards.
         """
+        self.send(message, timeout)
+        return self.receive(timeout)
+
+    def send(self, message: genpy.Message, timeout: float) -> None:
+        """Sends a request, whose answer `receive` must take before another one is sent.
+
+        Raises:
+            CallFailed: it can't be sent; ConnectionEnded: there is no connection any more.
+            TimeoutError: it isn't taken in time; the connection is of no use afterwards.
+        """
         payload = _serialized(message)
-        deadline = time.monotonic() + timeout
         try:
             self._set_timeout(_finite(timeout))
             self._socket.sendall(payload)
+        except BlockingIOError as fault:
+            raise TimeoutError from fault
+        except TimeoutError:
+            raise
+        except OSError as fault:
+            raise ConnectionEnded(str(fault)) from fault
+
+    def receive(self, timeout: float) -> Any:
+        """Returns the response to the request that was sent; its time limit begins now.
+
+        Raises:
+            CallFailed: the service failed; ConnectionEnded: there is no connection any more.
+            TimeoutError: no answer in time; the connection is of no use afterwards.
+        """
+        deadline = time.monotonic() + timeout
+        try:
+            self._set_timeout(_finite(timeout))
             if timeout == math.inf:
                 self._await_data(deadline)
             ok, answer = self._receive(deadline)

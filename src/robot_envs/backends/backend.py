@@ -30,6 +30,14 @@ class RobotBackend(Protocol):
         """
         ...
 
+    def begin(self, commands: Commands) -> None:
+        """Sends what `act` with the same commands is to wait for, and returns at once.
+
+        `act` alone does the same; one in this process, or in real time, begins nothing. Whatever else is
+        called before `act` takes the answer first; a reset drops it.
+        """
+        ...
+
     def act(self, commands: Commands) -> WorldState:
         """Commands controllers, with plain numbers; returns the state one control period later."""
         ...

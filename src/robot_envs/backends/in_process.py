@@ -166,6 +166,9 @@ class InProcessWorld:
         self._held = self.scene.starting_commands(state.joints)
         return state._replace(commands=self._held)
 
+    def begin(self, commands: Commands) -> None:
+        """See `RobotBackend.begin`; there is nothing to begin."""
+
     def act(self, commands: Commands) -> WorldState:
         """See `RobotBackend.act`.
 

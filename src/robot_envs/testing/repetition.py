@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from collections.abc import Iterator
 from typing import Any
 
 import gymnasium
@@ -9,9 +10,10 @@ import numpy as np
 from gymnasium.vector import SyncVectorEnv, VectorEnv
 
 from robot_envs.testing.rollouts import differences, rollout, same
-from robot_envs.testing.subject import Subject, expect
+from robot_envs.testing.subject import Subject, expect, expect_error
 
 WORLDS, SEED = 3, 11
+TRIES = 20  # actions, to find another one
 
 
 def seeding(subject: Subject) -> None:
@@ -32,6 +34,31 @@ def seeding(subject: Subject) -> None:
     with subject.made() as other:
         told = differences(first, rollout(other, subject.steps, SEED))
         expect(not told, f"the same seed and actions give other bits in another instance: {told}")
+
+
+def two_phases(subject: Subject) -> None:
+    """A step that is begun first gives the same bits; a reset drops it, and no other action takes it."""
+    with subject.made() as env:
+        first = rollout(env, subject.steps, SEED)
+        env.reset(seed=SEED)
+        action = env.action_space.sample()
+        env.begin_step(action)
+        expect_error(
+            lambda: env.begin_step(action), "begin_step() once more before step()", ValueError
+        )
+        other = next((each for each in _samples(env) if not same(each, action)), None)
+        if other is not None:
+            expect_error(
+                lambda: env.step(other), "step() with another action than was begun", ValueError
+            )
+        again = rollout(env, subject.steps, SEED, two_phases=True)
+        env.begin_step(action)  # dropped by close()
+        told = differences(first, again) if env.backend.deterministic else ""
+        expect(not told, f"steps that are begun first give other bits: {told}")
+
+
+def _samples(env: gymnasium.Env[Any, Any]) -> Iterator[Any]:
+    return (env.action_space.sample() for _ in range(TRIES))
 
 
 def backends(subject: Subject, other: Subject) -> None:

@@ -16,18 +16,22 @@ PARTS = {
 }
 
 
-def rollout(env: gymnasium.Env[Any, Any], steps: int, seed: int) -> Given:
+def rollout(env: gymnasium.Env[Any, Any], steps: int, seed: int, two_phases: bool = False) -> Given:
     """All that an environment gives for seeded random actions; episodes follow one another.
 
     Args:
         env: the environment.
         steps: number of actions.
         seed: of the first episode, and of the actions.
+        two_phases: begin each step before it is taken.
     """
     env.action_space.seed(seed)
     given: Given = [env.reset(seed=seed)]
     for _ in range(steps):
-        given.append(env.step(env.action_space.sample()))
+        action = env.action_space.sample()
+        if two_phases:
+            env.get_wrapper_attr("begin_step")(action)
+        given.append(env.step(action))
         if given[-1][2] or given[-1][3]:
             given.append(env.reset())
     return given

@@ -27,11 +27,12 @@ def check_robot_env(
     """Checks that an environment keeps what environments of robots promise.
 
     Over each backend: observations lie in their space and are finite, flags are plain, the same seed and
-    actions give the same bits (again, after other episodes, in another instance, over every backend but
-    real time), wrong actions and options are refused and move nothing, an episode is cut off apart from
-    its end, reset knows its options, spec can be copied and sent, pictures show what moves, a closed
-    environment says so, goals have rewards that agree, and Gymnasium's own checker has nothing to say. In
-    this process also: vectors give what each gives alone.
+    actions give the same bits (again, after other episodes, in another instance, with steps that are begun
+    before they are taken, over every backend but real time), wrong actions and options are refused and
+    move nothing, an episode is cut off apart from its end, reset knows its options, spec can be copied and
+    sent, pictures show what moves, a closed environment says so, goals have rewards that agree, and
+    Gymnasium's own checker has nothing to say. In this process also: vectors give what each gives
+    alone.
 
     Args:
         env: an id, "my_arm/Reach-v0" or "my_module:my_arm/Reach-v0"; or a function that makes an
@@ -102,6 +103,7 @@ CHECKS: tuple[Callable[[Subject], None], ...] = (
     episodes.pictures,
     goals.goals,
     repetition.seeding,
+    repetition.two_phases,
     repetition.specification,
     gymnasiums_checker,
 )

@@ -103,6 +103,17 @@ class Lockstep(unittest.TestCase):
         env.close()
         self.compare("cartpole/Classic-v0", 50)
 
+    def test_a_step_that_was_begun_is_over_before_another_environments_reset(self):
+        first, second = (gymnasium.make("cartpole/Classic-v0", backend="ros") for _ in range(2))
+        first.reset(seed=1)
+        first.unwrapped.begin_step(1)
+        with gymnasium.make("cartpole/Classic-v0") as alone:
+            self.assertEqual(differences(rollout(alone, 50, 2), rollout(second, 50, 2)), "")
+        with self.assertRaisesRegex(SimulatorError, "another environment of this process"):
+            first.step(1)
+        first.close()
+        second.close()
+
     def test_the_control_period_counts_the_simulators_own_steps(self):
         env = gymnasium.make("cartpole/Balance-v0", backend="ros")
         ros_gazebo.gazebo_set_time_step(0.004)

@@ -216,3 +216,51 @@ def test_a_failure_because_of_a_shutdown_is_an_interrupt(offer, monkeypatch):
     monkeypatch.setattr(rospy, "is_shutdown", down.is_set)
     with pytest.raises(rospy.ROSInterruptException, match="shut down while calling /fake/set"):
         wait_and_call(NAME, SetBool, True, timeout=BOUND)
+
+
+def test_services_that_are_begun_work_at_the_same_time(master, client):
+    both = threading.Barrier(2, timeout=BOUND)
+    services = [FakeService(lambda request: both.wait() and None or [ok(True)]) for _ in range(2)]
+    calls = []
+    for index, service in enumerate(services):
+        master.services[f"{NAME}{index}"] = service.address
+        calls.append(ServiceClient(f"{NAME}{index}", SetBool, persistent=True, timeout=BOUND))
+    for call in calls:
+        call.begin(True)
+    assert [call.end().success for call in calls] == [True, True]
+    for each in calls + services:
+        each.close()
+
+
+def test_begin_and_end_come_in_turn(offer, client):
+    offer()
+    call = client(persistent=True)
+    with pytest.raises(RuntimeError, match=r"/fake/set: end\(\) without begin\(\)"):
+        call.end()
+    call.begin(True)
+    for again in (call.begin, call):
+        with pytest.raises(RuntimeError, match=r"begin\(\) once more before end\(\)"):
+            again(True)
+    call.close()  # which gives up what was begun
+    call.begin(False)
+    assert not call.end().success
+
+
+@pytest.mark.parametrize("persistent", [True, False])
+def test_a_service_that_fails_after_the_begin(offer, client, persistent):
+    asked = threading.Event()
+    service = offer(lambda request: asked.set() or service.over.wait() and None)
+    call = client(persistent=persistent)
+    call.begin(True)
+    assert asked.wait(BOUND)
+    service.break_off()
+    with pytest.raises(ServiceGone, match="the connection broke"):
+        call.end()
+    call.timeout = LIMIT
+    call.begin(True)  # connects anew
+    with pytest.raises(ServiceHangs, match=r"within 0.3 s"):
+        call.end()
+    service.close()
+    offer()
+    call.timeout = BOUND
+    assert call(True).success

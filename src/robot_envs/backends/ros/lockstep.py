@@ -31,6 +31,8 @@ from ros_utils.step_client import time_of
 class LockstepWorld:
     """One service call for each action: command, advance, read; time stands still between.
 
+    `begin` sends the request, `act` takes the answer; so several simulators move at the same time.
+
     Args:
         scene: the robots and objects; they are there, and the controllers run.
         ticks: physics steps of one action.
@@ -55,6 +57,8 @@ class LockstepWorld:
         self._query = StateQuery()
         self._begun = StepWorldResponse()
         self._held: dict[str, Any] = {}
+        self._pending: Commands | None = None  # of a step that was begun
+        self._answer: StepWorldResponse | None = None  # to it, if it was taken before `act`
         self._variation = RosVariation(scene)
         turn.join(self)
 
@@ -83,6 +87,7 @@ class LockstepWorld:
             SimulatorError: if it is refused or the simulator doesn't answer.
         """
         joints = self.scene.placed_joints(initial).values()
+        self._drop()
         self._begin.positions = [position for position, _ in joints]
         self._begin.velocities = [velocity for _, velocity in joints]
         place(self._begin, self.scene.placed_models(initial))
@@ -93,13 +98,18 @@ class LockstepWorld:
         self._held = self.scene.starting_commands(state.joints)
         return state._replace(commands=self._held)
 
-    def act(self, commands: Commands) -> WorldState:
-        """See `RobotBackend.act`.
+    def begin(self, commands: Commands) -> None:
+        """See `RobotBackend.begin`.
 
         Raises:
-            SimulatorError: if the step is refused or the simulator doesn't answer, or another environment
-                has moved the robots since the reset.
+            SimulatorError: if the simulator doesn't answer, or another environment has moved the robots
+                since the reset.
+            ValueError: if a step is under way.
         """
+        if self._pending is not None:
+            raise ValueError(
+                "a step was begun and not taken: act() with the same commands comes next"
+            )
         self._turn.check(self)
         numbers: list[float] = []
         for command in commands.values():
@@ -109,29 +119,74 @@ class LockstepWorld:
                 numbers += command
         self._advance.controllers = [self._full[name] for name in commands]
         self._advance.commands = numbers
+        with self._simulator:
+            self._step.begin(self._advance)
+        self._pending = commands
+
+    def act(self, commands: Commands) -> WorldState:
+        """See `RobotBackend.act`.
+
+        Raises:
+            SimulatorError: if the step is refused or the simulator doesn't answer, or another environment
+                has moved the robots since the reset.
+            ValueError: if a step was begun with other commands.
+        """
+        if self._pending is None:
+            self.begin(commands)
+        elif self._pending != commands:
+            raise ValueError("the step was begun with other commands")
+        answer = self._end() if self._answer is None else self._answer
+        self._pending = self._answer = None
         self._held = {**self._held, **commands}
-        return self._state(self._call(self._advance))
+        return self._state(self._checked(answer))
 
     def _state(self, answer: StepWorldResponse) -> WorldState:
         joints = self._read(answer.joint_states)
         return told(answer, self._begun, self._query, joints, self._held)
 
+    def _end(self) -> StepWorldResponse:
+        """Waits for the answer to the step that was begun."""
+        try:
+            with self._simulator:
+                return self._step.end()
+        except BaseException:
+            self._pending = None
+            raise
+
+    def _take(self) -> None:
+        """Does so if there is one, so that the connection is free for others; `act` finds the answer."""
+        if self._pending is not None and self._answer is None:
+            self._answer = self._end()
+
+    def _drop(self) -> None:
+        """The same, for who won't hear it any more."""
+        with contextlib.suppress(SimulatorError):
+            self._take()
+        self._pending = self._answer = None
+
     def _call(self, request: genpy.Message) -> StepWorldResponse:
+        self._take()
         with self._simulator:
             answer = self._step(request)
-            if not answer.success:
+        return self._checked(answer)
+
+    def _checked(self, answer: StepWorldResponse) -> StepWorldResponse:
+        if not answer.success:
+            with self._simulator:
                 missing = ready(self.scene).missing()
                 raise SimulatorError(f"{STEP_SERVICE}: {missing or answer.status_message}")
-            return answer
+        return answer
 
     def vary(self, variation: Variation) -> None:
         """See `RobotBackend.vary`."""
+        self._drop()
         with self._simulator:
             self._turn.take(self)  # what others have varied isn't this one's to start from
         self._variation(variation)
 
     def give_back(self) -> None:
         """See `Player.give_back`."""
+        self._drop()  # before the next one's reset: the simulator takes requests as they come
         self._variation.undo()
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
@@ -147,6 +202,7 @@ class LockstepWorld:
 
     def close(self) -> None:
         """Closes the connection to the simulator; robots and objects are as they were found."""
+        self._drop()
         self._step.close()
         self._variation.undo()
         with contextlib.suppress(SimulatorError):  # one that is gone has no objects any more

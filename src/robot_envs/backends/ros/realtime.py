@@ -216,6 +216,9 @@ class RealtimeWorld:
         found = self._read(self._newest[0])
         return all(abs(joint.position - positions[name]) < _SAME for name, joint in found.items())
 
+    def begin(self, commands: Commands) -> None:
+        """See `RobotBackend.begin`; there is nothing to begin."""
+
     def act(self, commands: Commands) -> WorldState:
         """See `RobotBackend.act`.
 

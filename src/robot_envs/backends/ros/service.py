@@ -9,15 +9,29 @@ from ros_calls import service
 class ServiceClient(service.ServiceClient):
     """As ros_calls' client, for the simulator's services."""
 
-    def __call__(self, *request: Any) -> Any:
-        """Calls the service with a request, or with its fields in order, and returns the response.
+    def begin(self, *request: Any) -> None:
+        """Sends a request; `end` takes its response. A call is both.
 
         Raises:
-            SimulatorError: if it isn't offered, fails, breaks off or takes too long.
+            SimulatorError: if it isn't offered, the connection breaks or it takes too long.
         """
         try:
-            return super().__call__(*request)
-        except service.ServiceHangs as error:
-            raise SimulatorHangs(str(error)) from error
+            super().begin(*request)
         except service.ServiceFailed as error:
-            raise SimulatorError(str(error)) from error
+            raise _told(error) from error
+
+    def end(self) -> Any:
+        """Returns the response to what was begun.
+
+        Raises:
+            SimulatorError: if it fails, breaks off or takes too long.
+        """
+        try:
+            return super().end()
+        except service.ServiceFailed as error:
+            raise _told(error) from error
+
+
+def _told(error: service.ServiceFailed) -> SimulatorError:
+    hangs = isinstance(error, service.ServiceHangs)
+    return SimulatorHangs(str(error)) if hangs else SimulatorError(str(error))
