@@ -64,9 +64,11 @@ class CartPoleEnv(RobotEnv):
     | `backend`        | `"bullet"` | the robot: in this process, ...                          |
     |                  | `"mujoco"` | ... on MuJoCo instead of PyBullet (`./ws extras`), ...     |
     |                  | `"ros"`    | ... over ROS in lock-step, with the bits of `"bullet"`, ... |
+    |                  | `"ros-own"` | ... the same in a simulator of its own, ...               |
     |                  | `"ros-realtime"` | ... or over ROS in real time, by Gazebo's own services alone |
     | `control_period` | 0.008      | simulated time of an action [s], whole physics steps;    |
     |                  |            | 0 in real time: the newest joint state, without waiting  |
+    | `deadline`       | 5, 30      | wall time of a simulator's answer over ROS in lock-step [s] |
     | `noise`          | the task's | of the starting state                                    |
     | `max_steps`      | the task's | length at which an episode is cut off                    |
     | `sensor_noise`   | 0          | standard deviation; one or four numbers, in the state's units |

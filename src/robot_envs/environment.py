@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import data_equivalence
 from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.state.names import did_you_mean
 from robot_envs.backends.backend import RobotBackend
-from robot_envs.backends.choice import make_backend
+from robot_envs.backends.choice import OWN, make_backend
 from robot_envs.checks import task_checks
 from robot_envs.checks.goals import aim, goal_space, with_goals
 from robot_envs.checks.spaces import action_reader, observation_reader
@@ -57,6 +57,8 @@ class RobotEnv(DrawnEnv):
     |                        | use them one after the other, and begin with a reset                |
     | `spec.nondeterministic` | the same seed and actions give other bits each time, as in real time |
 
+    Where the robot is shared, copies that are made with `own_robot_options` have their own.
+
     With a `GoalTask` it is a goal environment: observations are dicts, and it has `compute_reward`.
     `reset(options={...})` knows "initial_state", an `InitialState` in place of the task's, and for a
     `GoalTask` "goal".
@@ -65,10 +67,13 @@ class RobotEnv(DrawnEnv):
         robot: the robot, or several that share a world.
         task: what is to be learned.
         backend: "bullet" or "mujoco": in this process; "ros": over ROS in lock-step, with the bits of
-            "bullet"; "ros-realtime": over ROS, by Gazebo's own services; None: in this process, with the
-            robot's engine. Or one that is made already; the environment closes it.
+            "bullet"; "ros-own": the same in a simulator that is started for this environment alone, and
+            replaced if it fails; "ros-realtime": over ROS, by Gazebo's own services; None: in this process,
+            with the robot's engine. Or one that is made already; the environment closes it.
         control_period: simulated time of an action [s]; None: the robot's. In real time 0 takes the
             newest joint state, without waiting for another one.
+        deadline: wall time [s] that a simulator over ROS in lock-step may take for an answer, beside 10 ms
+            for each physics step; None: 5 s, and 30 s for "ros-own", of which there may be many.
         max_steps: after how many steps an episode is cut off; None: the task's.
         sensor_noise: standard deviation of noise on joints' positions and velocities; see `Sensor`.
         sensor_delay: how many control steps old an observation is.
@@ -97,6 +102,7 @@ class RobotEnv(DrawnEnv):
         backend: str | RobotBackend | None = None,
         *,
         control_period: float | None = None,
+        deadline: float | None = None,
         max_steps: int | None = None,
         sensor_noise: Noise = 0.0,
         sensor_delay: int = 0,
@@ -151,7 +157,7 @@ class RobotEnv(DrawnEnv):
         self._begun: _Step | None = None
         made = backend is None or isinstance(backend, str)
         self.backend: RobotBackend = (
-            make_backend(self.scene, backend, period) if made else backend  # type: ignore[assignment,arg-type]
+            make_backend(self.scene, backend, period, deadline) if made else backend  # type: ignore[assignment,arg-type]
         )
         self._closed = False
         try:
@@ -164,6 +170,13 @@ class RobotEnv(DrawnEnv):
     def shares_robot(self) -> bool:
         """Whether other environments of this process move the same robot."""
         return self.backend.shared
+
+    @property
+    def own_robot_options(self) -> dict[str, Any]:
+        """Options by which a copy gets a robot of its own, the same to the bit, where this one shares it."""
+        if self.backend.shared and self.backend.deterministic:
+            return {"backend": OWN}
+        return {}
 
     @property
     def state(self) -> WorldState | None:

@@ -15,5 +15,9 @@ class SimulatorError(RobotEnvError):
     """The simulator doesn't answer, or answers something that can't be used."""
 
 
-class SimulatorHangs(SimulatorError):
+class SimulatorFault(SimulatorError):
+    """The simulator has died, or answers what can't be: another one may do better."""
+
+
+class SimulatorHangs(SimulatorFault):
     """The simulator is there but doesn't answer in time."""

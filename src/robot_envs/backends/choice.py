@@ -9,7 +9,8 @@ from robot_envs.robot import EMPTY
 from robot_envs.scene import Scene
 
 IN_PROCESS, MUJOCO, LOCKSTEP, REALTIME = "bullet", "mujoco", "ros", "ros-realtime"
-BACKENDS = (IN_PROCESS, MUJOCO, LOCKSTEP, REALTIME)
+OWN = "ros-own"  # lock-step in a simulator that nobody else has
+BACKENDS = (IN_PROCESS, MUJOCO, LOCKSTEP, OWN, REALTIME)
 
 
 def has_ros() -> bool:
@@ -27,7 +28,9 @@ def need_ros(what: str) -> None:
         raise RobotEnvError(f"{what} needs ROS, and there is no rospy: ./ws installs and finds it")
 
 
-def make_backend(scene: Scene, backend: str | None, control_period: float) -> RobotBackend:
+def make_backend(
+    scene: Scene, backend: str | None, control_period: float, deadline: float | None = None
+) -> RobotBackend:
     """Makes what moves a scene's robots; over ROS it brings up what isn't running.
 
     Args:
@@ -35,6 +38,8 @@ def make_backend(scene: Scene, backend: str | None, control_period: float) -> Ro
         backend: one of `BACKENDS`; None: in this process, with the first robot's engine.
         control_period: simulated time [s] of one action; in real time 0 takes the newest joint
             state without waiting for another one.
+        deadline: wall time [s] that an answer may take, beside 10 ms for each tick, of a simulator over ROS
+            in lock-step; None: as the backend has it.
 
     Raises:
         ValueError: if there is no such backend, or the control period is no whole number of physics
@@ -45,6 +50,8 @@ def make_backend(scene: Scene, backend: str | None, control_period: float) -> Ro
     if name not in BACKENDS:
         near = did_you_mean(str(name), BACKENDS) or f"; there are {', '.join(BACKENDS)}"
         raise ValueError(f"there is no backend {name!r}{near}")
+    if deadline is not None and not deadline > 0.0:
+        raise ValueError(f"deadline is a time above 0 [s], not {deadline!r}")
     plain = scene.robots[0].world in (None, EMPTY)  # other worlds may have another physics step
     if plain and (control_period != 0.0 or name != REALTIME):
         ticks_per_action(control_period, PHYSICS_STEP)  # before a simulator is started for it
@@ -53,6 +60,10 @@ def make_backend(scene: Scene, backend: str | None, control_period: float) -> Ro
 
         return InProcessWorld(scene, control_period, name)
     need_ros(f"the backend {name}")
+    if name == OWN:
+        from robot_envs.backends.ros.own_world.world import RestartingWorld
+
+        return RestartingWorld(scene, control_period, deadline)
     from robot_envs.backends.ros.session import running_session
 
-    return running_session(scene, name == REALTIME).connect(scene, control_period)
+    return running_session(scene, name == REALTIME).connect(scene, control_period, deadline)

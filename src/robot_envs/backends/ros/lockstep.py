@@ -25,6 +25,7 @@ from robot_envs.world_state import (
     WorldState,
     link_keys,
 )
+from ros_calls.service import TIMEOUT
 from ros_utils.step_client import time_of
 
 
@@ -37,14 +38,15 @@ class LockstepWorld:
         scene: the robots and objects; they are there, and the controllers run.
         ticks: physics steps of one action.
         turn: whose episode is under way, among those that move these robots.
+        timeout: wall time [s] that an answer may take, beside 10 ms for each tick.
     """
 
     deterministic = shared = True
 
-    def __init__(self, scene: Scene, ticks: int, turn: Turn) -> None:
+    def __init__(self, scene: Scene, ticks: int, turn: Turn, timeout: float = TIMEOUT) -> None:
         self.scene, self._turn = scene, turn
         self._simulator = OwnSimulator()
-        self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True)
+        self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True, timeout=timeout)
         moved = [f"{robot.model}::{name}" for robot, name in scene.moved.values()]
         self._begin = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=moved)
         self._advance = StepWorldRequest(ticks=ticks)
@@ -59,7 +61,7 @@ class LockstepWorld:
         self._held: dict[str, Any] = {}
         self._pending: Commands | None = None  # of a step that was begun
         self._answer: StepWorldResponse | None = None  # to it, if it was taken before `act`
-        self._variation = RosVariation(scene)
+        self._variation = RosVariation(scene, timeout)
         turn.join(self)
 
     def look(self, query: StateQuery) -> None:
@@ -207,3 +209,8 @@ class LockstepWorld:
         self._variation.undo()
         with contextlib.suppress(SimulatorError):  # one that is gone has no objects any more
             self._turn.release(self)
+
+    def disconnect(self) -> None:
+        """Closes connections alone, where the simulator has ended, or will, with all that is in it."""
+        self._step.close()
+        self._variation.disconnect()

@@ -11,7 +11,7 @@ from geometry_msgs.msg import Pose as PoseMsg
 from sensor_msgs.msg import JointState as JointStateMsg
 
 from bullet_gazebo.physics.pose import Pose, Vector
-from robot_envs.errors import SimulatorError
+from robot_envs.errors import SimulatorFault
 from robot_envs.scene import Scene
 from robot_envs.world_state import (
     Commands,
@@ -51,7 +51,7 @@ class JointReader:
         """The joints by the names that they have in a state.
 
         Raises:
-            SimulatorError: if a joint is missing or a value isn't finite.
+            SimulatorFault: if a joint is missing or a value isn't finite.
         """
         if message.name != self._names:
             self._places = self._found(message.name)
@@ -65,9 +65,9 @@ class JointReader:
                 joints[name] = JointState(position, velocity, effort)
                 total += position + velocity
         except IndexError:
-            raise SimulatorError(f"a joint state has fewer numbers than names: {message}") from None
+            raise SimulatorFault(f"a joint state has fewer numbers than names: {message}") from None
         if not math.isfinite(total):
-            raise SimulatorError(f"the joint state isn't finite: {joints}")
+            raise SimulatorFault(f"the joint state isn't finite: {joints}")
         return joints
 
     def _found(self, names: list[str]) -> list[tuple[str, int]]:
@@ -80,7 +80,7 @@ class JointReader:
             else:
                 missing.append(key)
         if missing:
-            raise SimulatorError(
+            raise SimulatorFault(
                 f"the joint state lacks {' and '.join(missing)}; it has: {list(names)}"
             )
         return places

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from robot_envs.errors import SimulatorError, SimulatorHangs
+from robot_envs.errors import SimulatorFault, SimulatorHangs
 from ros_calls import service
 
 
@@ -13,7 +13,7 @@ class ServiceClient(service.ServiceClient):
         """Sends a request; `end` takes its response. A call is both.
 
         Raises:
-            SimulatorError: if it isn't offered, the connection breaks or it takes too long.
+            SimulatorFault: if it isn't offered, the connection breaks or it takes too long.
         """
         try:
             super().begin(*request)
@@ -24,7 +24,7 @@ class ServiceClient(service.ServiceClient):
         """Returns the response to what was begun.
 
         Raises:
-            SimulatorError: if it fails, breaks off or takes too long.
+            SimulatorFault: if it fails, breaks off or takes too long.
         """
         try:
             return super().end()
@@ -32,6 +32,6 @@ class ServiceClient(service.ServiceClient):
             raise _told(error) from error
 
 
-def _told(error: service.ServiceFailed) -> SimulatorError:
+def _told(error: service.ServiceFailed) -> SimulatorFault:
     hangs = isinstance(error, service.ServiceHangs)
-    return SimulatorHangs(str(error)) if hangs else SimulatorError(str(error))
+    return SimulatorHangs(str(error)) if hangs else SimulatorFault(str(error))

@@ -7,7 +7,6 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 
 import rospy
 
@@ -17,6 +16,7 @@ from robot_envs.backends.ros.bring_up import STEP_SERVICE, Say, Undo
 from robot_envs.backends.ros.objects import Objects
 from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.backends.ros.rviz import check_rviz, open_rviz
+from robot_envs.backends.ros.simulator_world import physics_step, world_path
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.backends.ros.window import (
     is_open,
@@ -25,10 +25,10 @@ from robot_envs.backends.ros.window import (
     tell_open,
     tell_opening,
 )
-from robot_envs.description.files import is_text, locate
 from robot_envs.errors import RobotEnvError
-from robot_envs.robot import EMPTY, Robot
+from robot_envs.robot import Robot
 from robot_envs.scene import Scene
+from ros_calls.service import TIMEOUT
 from ros_utils import ros_gazebo
 
 START_TIMEOUT = 60.0  # [s] for the simulator to come up
@@ -126,26 +126,29 @@ class RosSession:
         """Whether it is these robots'."""
         return self._scene.robots == tuple(robots)
 
-    def connect(self, scene: Scene, control_period: float) -> RobotBackend:
+    def connect(
+        self, scene: Scene, control_period: float, deadline: float | None = None
+    ) -> RobotBackend:
         """A connection of its own to the robots; whoever asks for it closes it.
 
         Args:
             scene: the session's robots, and objects, which are in the world while it is this one's turn.
             control_period: simulated time [s] of one action; in real time 0 takes the newest
                 joint state without waiting for another one.
+            deadline: wall time [s] that an answer in lock-step may take, beside 10 ms for each tick.
 
         Raises:
             ValueError: if the period isn't a whole number of physics steps.
             RobotEnvError: if the simulator doesn't answer, or an object can't be spawned.
         """
-        ticks = ticks_per_action(control_period, _physics_step()) if control_period else 0
+        ticks = ticks_per_action(control_period, physics_step()) if control_period else 0
         if self._realtime:
             from robot_envs.backends.ros.realtime import RealtimeWorld
 
             return RealtimeWorld(scene, control_period, self._turn)
         from robot_envs.backends.ros.lockstep import LockstepWorld
 
-        return LockstepWorld(scene, ticks, self._turn)
+        return LockstepWorld(scene, ticks, self._turn, deadline or TIMEOUT)
 
     def _undo_at_living_simulator(self, changes: list[Undo]) -> None:
         if self._own_simulator:  # it ends with all that is in it
@@ -160,7 +163,7 @@ class RosSession:
             gui=self._gui,
             output="log",
             launch_new_term=False,
-            custom_world_path=self._world_path(),
+            custom_world_path=world_path(self._scene, self._undo),
             lockstep=not self._realtime,
             seed=self._seed,
             timeout=START_TIMEOUT,
@@ -177,18 +180,6 @@ class RosSession:
                 started.close()
 
         self._undo.callback(end)
-
-    def _world_path(self) -> str | None:
-        """The world file for a simulator of ours; None: its own, with a ground plane."""
-        world = self._scene.robots[0].world
-        if world is None or world == EMPTY:
-            return None
-        if not is_text(world):
-            return str(locate(world))
-        with NamedTemporaryFile("w", suffix=".world", delete=False) as file:
-            file.write(str(world))
-        self._undo.callback(os.unlink, file.name)
-        return file.name
 
     def _join(self) -> None:
         """Becomes a node, unless the process is one; the training handles signals itself."""
@@ -277,15 +268,3 @@ def _name(scene: Scene) -> str:
 def _started() -> list[RosSession]:
     """The process's sessions, oldest first: a process can become a ROS node only once."""
     return []
-
-
-def _physics_step() -> float:
-    """The simulator's [s].
-
-    Raises:
-        RobotEnvError: if it doesn't tell.
-    """
-    step = ros_gazebo.gazebo_get_time_step()
-    if not step > 0.0:
-        raise RobotEnvError("the simulator doesn't tell its time step; see the messages above")
-    return step

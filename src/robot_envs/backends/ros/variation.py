@@ -4,7 +4,6 @@ import contextlib
 from collections.abc import Mapping
 from typing import Any
 
-import rospy
 from bullet_gazebo_msgs.srv import SetLinkFriction
 from dynamic_reconfigure.msg import Config, DoubleParameter
 from dynamic_reconfigure.srv import Reconfigure
@@ -33,6 +32,9 @@ from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.variation.applying import Applier, JointFigures, PidFigures
 from robot_envs.variation.parts import Part, gains_of
+from ros_calls import master
+from ros_calls.service import TIMEOUT
+from ros_calls.xmlrpc import NoAnswer, Refused
 
 GET_LINK, SET_LINK = "/gazebo/get_link_properties", "/gazebo/set_link_properties"
 GET_PHYSICS, SET_PHYSICS = "/gazebo/get_physics_properties", "/gazebo/set_physics_properties"
@@ -41,16 +43,23 @@ TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 class RosChanges:
-    """What can be changed of robots; see `robot_envs.variation.applying.Changeable`."""
+    """What can be changed of robots; see `robot_envs.variation.applying.Changeable`.
 
-    def __init__(self) -> None:
+    Args:
+        timeout: of a call [s].
+    """
+
+    def __init__(self, timeout: float) -> None:
+        self._timeout = timeout
         self._clients: dict[str, ServiceClient] = {}
         self._weightless: set[str] = set()
 
     def _call(self, name: str, kind: Any, *request: Any) -> Any:
         """Calls a service by a connection that is kept: several times as fast."""
         if name not in self._clients:
-            self._clients[name] = ServiceClient(name, kind, persistent=True)
+            self._clients[name] = ServiceClient(
+                name, kind, persistent=True, timeout=self._timeout
+            )
         return self._clients[name](*request)
 
     def close(self) -> None:
@@ -127,10 +136,11 @@ class RosVariation:
 
     Args:
         scene: the robots.
+        timeout: of a call [s].
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self._changes = RosChanges()
+    def __init__(self, scene: Scene, timeout: float = TIMEOUT) -> None:
+        self._changes = RosChanges(timeout)
         self._apply = Applier(scene, self._changes)
 
     def __call__(self, variation: Variation) -> None:
@@ -145,6 +155,10 @@ class RosVariation:
         """Gives the robots their own figures back, if they were changed and there still are any."""
         with contextlib.suppress(SimulatorError):
             self._apply.undo()
+        self.disconnect()
+
+    def disconnect(self) -> None:
+        """Gives the connections up."""
         self._changes.close()
 
 
@@ -154,8 +168,8 @@ def _scoped(part: Part) -> str:
 
 def _gains(namespace: str) -> PidFigures:
     try:
-        gains = Gains.from_params(rospy.get_param(namespace), namespace)
-    except (KeyError, OSError, rospy.ROSException, ControlError) as error:
+        gains = Gains.from_params(master.call("getParam", namespace), namespace)
+    except (NoAnswer, Refused, ControlError) as error:
         raise SimulatorError(f"the gains {namespace} can't be read: {error}") from error
     return PidFigures(gains.p, gains.i, gains.d)
 

@@ -1,0 +1,231 @@
+"""A simulator under a master of its own, for one client alone."""
+
+import atexit
+import contextlib
+import os
+import secrets
+import select
+import signal
+import subprocess
+import sys
+import time
+import weakref
+from functools import lru_cache
+from pathlib import Path
+
+import rospkg
+
+import bullet_gazebo
+from robot_envs.backends.side_by_side import Place
+from robot_envs.errors import RobotEnvError, SimulatorFault, SimulatorHangs
+from ros_calls import master
+from ros_calls.waiting import POLL, service_answers
+
+KEEPER = Path(__file__).with_name("keeper.py")
+OURS = Path(bullet_gazebo.__file__).parents[1]
+LOOPBACK = "127.0.0.1"
+ANSWERING = "/gazebo/pause_physics"  # the last thing that a client needs before it can begin
+FALLING = 2.0  # [s] for a keeper to notice that its simulator has died
+ENDING = 10.0  # [s] for all processes to end that were asked to
+STARTING = 60.0  # [s] for one simulator to come up
+ONE_MORE = 15.0  # [s] for each that starts beside it
+# Of the client, which would have processes of ours look for it elsewhere, or be another name.
+NOT_OURS = ("ROS_HOSTNAME", "ROS_IPV6", "ROS_NAMESPACE")
+
+
+class PrivateSimulator:
+    """Master and simulator on loopback, moving in lock-step; they end with this process in any case.
+
+    It only begins to start; `wait` waits until it can be used.
+
+    Args:
+        place: which one it is of those that start together.
+        world: its world file; None: a ground plane.
+        seed: of random numbers that plugins draw.
+
+    Raises:
+        RobotEnvError: if no process can be started.
+    """
+
+    def __init__(self, place: Place, world: str | None, seed: int) -> None:
+        self.place = place
+        self.uri = ""  # the master's address, once it is known
+        self.pid: int | None = None  # the simulator's process
+        self._owner = os.getpid()
+        folder = _log_folder()
+        self.log = folder / "simulator.log"
+        arguments = ["-u", "--lockstep", "--seed", str(seed), *([world] if world else [])]
+        named = ["__name:=gazebo", f"__log:={folder / 'node.log'}", "_pub_clock_frequency:=100"]
+        reading, telling = os.pipe()
+        self._report = os.fdopen(reading, "rb", 0)
+        try:
+            with self.log.open("wb") as log:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-P", str(KEEPER), str(self._owner), str(telling),
+                     *arguments, *named],
+                    stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=_environment(folder),
+                    pass_fds=(telling,), start_new_session=True,
+                )  # fmt: skip
+        except OSError as error:
+            self._report.close()
+            raise RobotEnvError(f"{place} can't be started: {error.strerror}") from error
+        finally:
+            os.close(telling)
+        self._begun = time.monotonic()
+        self._dropped = weakref.finalize(self, _end_dropped, self._process, self._owner)
+        self._dropped.atexit = False  # then all end together
+        _living().add(self)
+
+    def __str__(self) -> str:
+        at = f" (master {self.uri})" if self.uri else ""
+        return f"{self.place}{at}"
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether its processes run."""
+        return self._process.poll() is None
+
+    def wait(self) -> None:
+        """Returns once it answers.
+
+        Raises:
+            SimulatorFault: if it ends instead, or doesn't come in time.
+        """
+        patience = STARTING + ONE_MORE * (self.place.of - 1)
+        deadline = self._begun + patience
+        if not self.uri:
+            self._hear(deadline)
+        with master.using(self.uri):
+            while not service_answers(ANSWERING):
+                if not self.is_alive:
+                    raise SimulatorFault("it ended before it was ready")
+                if time.monotonic() > deadline:
+                    raise SimulatorHangs(f"it wasn't ready within {patience:g} s")
+                time.sleep(POLL)
+
+    def _hear(self, deadline: float) -> None:
+        """Waits for the address."""
+        poll = select.poll()
+        poll.register(self._report, select.POLLIN)
+        poll.poll(1000.0 * max(0.0, deadline - time.monotonic()))
+        told = self._report.readline().decode().split() if poll.poll(0) else []
+        if len(told) != 2:
+            raise SimulatorFault("its master didn't start")
+        self.uri, self.pid = told[0], int(told[1])
+
+    def begin_end(self) -> None:
+        """Asks it to end, if it hasn't."""
+        if os.getpid() == self._owner and self.is_alive:
+            self._process.terminate()
+
+    def end(self) -> None:
+        """Waits for the end that was asked for, and insists on it; may be called twice."""
+        if os.getpid() != self._owner:  # a forked child has inherited the object, not the duty
+            return
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(ENDING)
+        self._bury()
+
+    def post_mortem(self) -> str:
+        """Ends one that has failed, and says how it ended, and what it has said last."""
+        try:
+            self._process.wait(FALLING)
+            how = f"{_told(self._process.returncode)}, "
+        except subprocess.TimeoutExpired:
+            how = ""
+        self._bury()
+        return f"{how}{self._last_line()}"
+
+    def _bury(self) -> None:
+        _kill(self._process)
+        self._dropped.detach()
+        _living().discard(self)
+        self._report.close()
+
+    def close(self) -> None:
+        """Asks it to end, and waits for it."""
+        self.begin_end()
+        self.end()
+
+    def _last_line(self) -> str:
+        """What it has said last, and where the rest stands."""
+        try:
+            lines = self.log.read_text(encoding="utf-8", errors="replace").split("\n")
+        except OSError as error:
+            lines = [str(error.strerror)]
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+        said = f"it said last '{last}'" if last else "it said nothing"
+        return f"{said} (log: {self.log})"
+
+
+def _told(code: int) -> str:
+    """How a keeper's end is to be read."""
+    number = code - 128 if code > 128 else -code
+    if number <= 0:
+        return f"it ended with exit code {code}"
+    with contextlib.suppress(ValueError):
+        name = signal.Signals(number).name
+        more = ", as the kernel does where memory runs out" if name == "SIGKILL" else ""
+        return f"it was ended by {name}{more}"
+    return f"it ended with exit code {code}"
+
+
+def _kill(process: "subprocess.Popen[bytes]") -> None:
+    """Ends a keeper and all of its session."""
+    if process.poll() is None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def _end_dropped(process: "subprocess.Popen[bytes]", owner: int) -> None:
+    """Ends one that nobody has any more, and that wasn't closed."""
+    if os.getpid() == owner:
+        _kill(process)
+
+
+@lru_cache(maxsize=1)
+def _living() -> "weakref.WeakSet[PrivateSimulator]":
+    """Those that this process has started and not ended; they end with it."""
+    living: weakref.WeakSet[PrivateSimulator] = weakref.WeakSet()
+    atexit.register(_end_all, living)
+    return living
+
+
+def _end_all(living: "weakref.WeakSet[PrivateSimulator]") -> None:
+    those = list(living)
+    for each in those:
+        each.begin_end()
+    for each in those:
+        each.end()
+
+
+def _log_folder() -> Path:
+    """A new folder for the logs of one simulator.
+
+    Raises:
+        RobotEnvError: if there can't be one.
+    """
+    folder = Path(rospkg.get_log_dir(), "robot_envs", f"{os.getpid()}-{secrets.token_hex(4)}")
+    try:
+        folder.mkdir(parents=True)
+    except OSError as error:
+        raise RobotEnvError(
+            f"{folder}: {error.strerror}: set ROS_LOG_DIR to a folder that can be written"
+        ) from error
+    return folder
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    """Ours, with our Python and this library, for a master and a node on loopback.
+
+    What else this process imports from isn't theirs: catkin's packages add to it as they are imported.
+    """
+    kept = {name: value for name, value in os.environ.items() if name not in NOT_OURS}
+    return kept | {
+        "PATH": os.pathsep.join([os.path.dirname(sys.executable), kept.get("PATH", os.defpath)]),
+        "PYTHONPATH": os.pathsep.join(filter(None, [kept.get("PYTHONPATH"), str(OURS)])),
+        "PYTHONUNBUFFERED": "1",
+        "ROS_IP": LOOPBACK,
+        "ROS_LOG_DIR": str(folder),
+    }
