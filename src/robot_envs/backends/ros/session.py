@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import rospy
 
@@ -163,7 +164,7 @@ class RosSession:
             gui=self._gui,
             output="log",
             launch_new_term=False,
-            custom_world_path=world_path(self._scene, self._undo),
+            custom_world_path=world_path(self._scene.robots[0].world, self._write),
             lockstep=not self._realtime,
             seed=self._seed,
             timeout=START_TIMEOUT,
@@ -180,6 +181,12 @@ class RosSession:
                 started.close()
 
         self._undo.callback(end)
+
+    def _write(self, world: str) -> str:
+        with NamedTemporaryFile("w", suffix=".world", delete=False) as file:
+            file.write(world)
+        self._undo.callback(os.unlink, file.name)
+        return file.name
 
     def _join(self) -> None:
         """Becomes a node, unless the process is one; the training handles signals itself."""

@@ -1,32 +1,23 @@
 """The world of a simulator: the file that one is started with, and the step of one that runs."""
 
-import contextlib
-import os
-from tempfile import NamedTemporaryFile
+from collections.abc import Callable
 
-from robot_envs.description.files import is_text, locate
+from robot_envs.description.files import Source, is_text, locate
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import EMPTY
-from robot_envs.scene import Scene
 from ros_utils import ros_gazebo
 
 
-def world_path(scene: Scene, undo: contextlib.ExitStack) -> str | None:
+def world_path(source: Source | None, write: Callable[[str], str]) -> str | None:
     """The world file for a simulator of ours; None: its own, with a ground plane.
 
     Args:
-        scene: the robots; the first one says which world.
-        undo: removes a file that had to be written.
+        source: the robot's world.
+        write: puts a world that was given as text into a file; returns its path.
     """
-    world = scene.robots[0].world
-    if world is None or world == EMPTY:
+    if source is None or source == EMPTY:
         return None
-    if not is_text(world):
-        return str(locate(world))
-    with NamedTemporaryFile("w", suffix=".world", delete=False) as file:
-        file.write(str(world))
-    undo.callback(os.unlink, file.name)
-    return file.name
+    return write(str(source)) if is_text(source) else str(locate(source))
 
 
 def physics_step() -> float:

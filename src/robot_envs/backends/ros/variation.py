@@ -57,9 +57,7 @@ class RosChanges:
     def _call(self, name: str, kind: Any, *request: Any) -> Any:
         """Calls a service by a connection that is kept: several times as fast."""
         if name not in self._clients:
-            self._clients[name] = ServiceClient(
-                name, kind, persistent=True, timeout=self._timeout
-            )
+            self._clients[name] = ServiceClient(name, kind, persistent=True, timeout=self._timeout)
         return self._clients[name](*request)
 
     def close(self) -> None:

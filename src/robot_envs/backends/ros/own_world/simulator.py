@@ -2,6 +2,7 @@
 
 import atexit
 import contextlib
+import io
 import os
 import secrets
 import select
@@ -16,7 +17,9 @@ from pathlib import Path
 import rospkg
 
 import bullet_gazebo
+from robot_envs.backends.ros.simulator_world import world_path
 from robot_envs.backends.side_by_side import Place
+from robot_envs.description.files import Source
 from robot_envs.errors import RobotEnvError, SimulatorFault, SimulatorHangs
 from ros_calls import master
 from ros_calls.waiting import POLL, service_answers
@@ -40,37 +43,33 @@ class PrivateSimulator:
 
     Args:
         place: which one it is of those that start together.
-        world: its world file; None: a ground plane.
+        world: what its world file is, as a robot has it; a text goes to a file beside the log.
         seed: of random numbers that plugins draw.
 
     Raises:
         RobotEnvError: if no process can be started.
     """
 
-    def __init__(self, place: Place, world: str | None, seed: int) -> None:
+    def __init__(self, place: Place, world: Source | None, seed: int) -> None:
         self.place = place
         self.uri = ""  # the master's address, once it is known
         self.pid: int | None = None  # the simulator's process
         self._owner = os.getpid()
         folder = _log_folder()
         self.log = folder / "simulator.log"
-        arguments = ["-u", "--lockstep", "--seed", str(seed), *([world] if world else [])]
-        named = ["__name:=gazebo", f"__log:={folder / 'node.log'}", "_pub_clock_frequency:=100"]
-        reading, telling = os.pipe()
-        self._report = os.fdopen(reading, "rb", 0)
+        arguments = ["-u", "--lockstep", "--seed", str(seed), "__name:=gazebo",
+                     f"__log:={folder / 'node.log'}", "_pub_clock_frequency:=100"]  # fmt: skip
+
+        def write(text: str) -> str:
+            file = folder / "given.world"
+            file.write_text(text, encoding="utf-8")
+            return str(file)
+
         try:
-            with self.log.open("wb") as log:
-                self._process = subprocess.Popen(
-                    [sys.executable, "-P", str(KEEPER), str(self._owner), str(telling),
-                     *arguments, *named],
-                    stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=_environment(folder),
-                    pass_fds=(telling,), start_new_session=True,
-                )  # fmt: skip
+            path = world_path(world, write)
+            self._process, self._report = _spawned([*arguments, *filter(None, [path])], self.log)
         except OSError as error:
-            self._report.close()
             raise RobotEnvError(f"{place} can't be started: {error.strerror}") from error
-        finally:
-            os.close(telling)
         self._begun = time.monotonic()
         self._dropped = weakref.finalize(self, _end_dropped, self._process, self._owner)
         self._dropped.atexit = False  # then all end together
@@ -156,6 +155,25 @@ class PrivateSimulator:
         last = next((line.strip() for line in reversed(lines) if line.strip()), "")
         said = f"it said last '{last}'" if last else "it said nothing"
         return f"{said} (log: {self.log})"
+
+
+def _spawned(arguments: list[str], path: Path) -> "tuple[subprocess.Popen[bytes], io.FileIO]":
+    """Starts a keeper, whose output goes to a file; returns what it reports to, too."""
+    with contextlib.ExitStack() as stack:
+        log = stack.enter_context(path.open("wb"))
+        reading, telling = os.pipe()
+        stack.callback(os.close, telling)
+        report = io.FileIO(reading)
+        try:
+            process = subprocess.Popen(
+                [sys.executable, "-P", str(KEEPER), str(os.getpid()), str(telling), *arguments],
+                stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=_environment(path.parent),
+                pass_fds=(telling,), start_new_session=True,
+            )  # fmt: skip
+        except BaseException:
+            report.close()
+            raise
+        return process, report
 
 
 def _told(code: int) -> str:

@@ -1,6 +1,5 @@
 """Robots in a simulator of one's own, which is replaced where it dies, hangs or answers what can't be."""
 
-import contextlib
 import logging
 from collections.abc import Callable, Sequence
 from typing import TypeVar
@@ -8,6 +7,7 @@ from typing import TypeVar
 import rospy
 
 from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.simulator import NANOSECONDS
 from robot_envs.backends import side_by_side
 from robot_envs.backends.backend import ticks_per_action
 from robot_envs.backends.ros.bring_up import bring_up
@@ -17,7 +17,7 @@ from robot_envs.backends.ros.own_world import memory
 from robot_envs.backends.ros.own_world.health import check
 from robot_envs.backends.ros.own_world.journal import Journal, merged
 from robot_envs.backends.ros.own_world.simulator import PrivateSimulator
-from robot_envs.backends.ros.simulator_world import physics_step, world_path
+from robot_envs.backends.ros.simulator_world import physics_step
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault
 from robot_envs.scene import Scene
@@ -60,8 +60,6 @@ class RestartingWorld:
         self._place = side_by_side.next_place()
         if self._place.number == 1:
             memory.check(self._place.of)
-        self._files = contextlib.ExitStack()  # that the simulator reads
-        self._file = world_path(scene, self._files)
         self._query = StateQuery()
         self._variation = Variation()  # all that were asked for, as one
         self._journal = Journal()
@@ -78,7 +76,7 @@ class RestartingWorld:
         """Nothing yet."""
 
     def _started(self) -> PrivateSimulator:
-        return PrivateSimulator(self._place, self._file, SEED)
+        return PrivateSimulator(self._place, self.scene.robots[0].world, SEED)
 
     def connect(self) -> None:
         """Waits for the simulator, brings the robots up, and has it tell what was asked for.
@@ -89,7 +87,9 @@ class RestartingWorld:
         """
         try:
             self._connect()
-        except SimulatorFault as error:
+        except RobotEnvError as error:
+            if self._simulator.is_alive and not isinstance(error, SimulatorFault):
+                raise
             raise SimulatorError(self._ended(error)) from error
 
     def _connect(self) -> None:
@@ -97,7 +97,7 @@ class RestartingWorld:
         with master.using(self._simulator.uri):
             step = physics_step()
             ticks = ticks_per_action(self._period, step)
-            self._step = ticks * step  # [s] that passes with each action
+            self._step = ticks * round(step * NANOSECONDS)  # [ns] that pass with each action
             bring_up(self.scene, logger.debug)
             self._world = LockstepWorld(self.scene, ticks, Turn(Objects()), self._deadline)
             self._world.look(self._query)
@@ -137,7 +137,7 @@ class RestartingWorld:
             SimulatorError: if it is refused, or two simulators fail.
         """
         self._journal.clear()
-        state = self._carry_out(lambda world: _checked(world.reset(initial), 0.0))
+        state = self._carry_out(lambda world: _checked(world.reset(initial), 0))
         self._journal.begin(initial, state)
         return state
 
@@ -147,6 +147,8 @@ class RestartingWorld:
         Raises:
             SimulatorError: if the step is refused, or two simulators fail.
         """
+        if self._journal.initial is None:
+            raise SimulatorError(f"{self._simulator} has no episode; begin one with reset()")
         then = (self._journal.steps + 1) * self._step
         state = self._carry_out(lambda world: _checked(world.act(commands), then))
         self._journal.add(commands, state)
@@ -214,7 +216,6 @@ class RestartingWorld:
                 self._asked(self._repeat)
         except BaseException:  # Ctrl-C, too
             self._disconnect()
-            self._simulator.begin_end()
             raise
 
     def _repeat(self, world: LockstepWorld) -> None:
@@ -225,7 +226,7 @@ class RestartingWorld:
         """
         journal = self._journal
         assert journal.initial is not None
-        state = _checked(world.reset(journal.initial), 0.0)
+        state = _checked(world.reset(journal.initial), 0)
         for count, commands in enumerate(journal.commands(), 1):
             state = _checked(world.act(commands), count * self._step)
         if repr(state) != repr(journal.last):  # tells all bits of a number, and -0.0 from 0.0
@@ -242,14 +243,10 @@ class RestartingWorld:
         self._disconnect()
         self._journal.clear()
         self._simulator.begin_end()
-        side_by_side.wait_for_end(self._finish)
-
-    def _finish(self) -> None:
-        self._simulator.end()
-        self._files.close()
+        side_by_side.wait_for_end(self._simulator.end)
 
 
-def _checked(state: WorldState, expected: float) -> WorldState:
+def _checked(state: WorldState, expected: int) -> WorldState:
     check(state, expected)
     return state
 
