@@ -1,5 +1,6 @@
 """Robots in a simulator of one's own, which is replaced where it dies, hangs or answers what can't be."""
 
+import contextlib
 import logging
 from collections.abc import Callable, Sequence
 from typing import TypeVar
@@ -72,9 +73,6 @@ class RestartingWorld:
             self.close()
             raise
 
-    def begin(self, commands: Commands) -> None:
-        """Nothing yet."""
-
     def _started(self) -> PrivateSimulator:
         return PrivateSimulator(self._place, self.scene.robots[0].world, SEED)
 
@@ -141,14 +139,25 @@ class RestartingWorld:
         self._journal.begin(initial, state)
         return state
 
+    def begin(self, commands: Commands) -> None:
+        """See `RobotBackend.begin`; a simulator that fails meanwhile is replaced by `act`.
+
+        Raises:
+            SimulatorError: if there is no episode.
+            ValueError: if a step is under way.
+        """
+        self._need_episode()
+        if self._world is not None:
+            with contextlib.suppress(SimulatorFault):
+                self._asked(lambda world: world.begin(commands))
+
     def act(self, commands: Commands) -> WorldState:
         """See `RobotBackend.act`.
 
         Raises:
             SimulatorError: if the step is refused, or two simulators fail.
         """
-        if self._journal.initial is None:
-            raise SimulatorError(f"{self._simulator} has no episode; begin one with reset()")
+        self._need_episode()
         then = (self._journal.steps + 1) * self._step
         state = self._carry_out(lambda world: _checked(world.act(commands), then))
         self._journal.add(commands, state)
@@ -161,6 +170,10 @@ class RestartingWorld:
             SimulatorError: if there is no such link, or two simulators fail.
         """
         return self._carry_out(lambda world: world.poses(links))
+
+    def _need_episode(self) -> None:
+        if self._journal.initial is None:
+            raise SimulatorError(f"{self._simulator} has no episode; begin one with reset()")
 
     def _carry_out(self, do: Callable[[LockstepWorld], Result]) -> Result:
         """Has the simulator do something, or else the one that takes its place."""

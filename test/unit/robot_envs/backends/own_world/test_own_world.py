@@ -57,7 +57,7 @@ def end(env: RobotEnv, number: signal.Signals) -> None:
 
 
 class Interrupted:
-    """An episode, in which something happens before certain steps."""
+    """Steps, before some of which something happens; that of odd ones comes between begin and end."""
 
     def __init__(self, env: gymnasium.Env) -> None:
         self._env, self._happens = env, {}
@@ -67,6 +67,8 @@ class Interrupted:
         self._happens[step] = what
 
     def step(self, action):
+        if self._steps % 2:
+            self._env.begin_step(action)
         self._happens.pop(self._steps, lambda: None)()
         self._steps += 1
         return self._env.step(action)
@@ -114,7 +116,7 @@ def test_one_that_dies_or_hangs_is_replaced_and_no_bit_differs(env, truth, caplo
     episode = Interrupted(env)
     pids, before = [env.backend.simulator.pid], env.backend.restarts
     episode.before(0, lambda: end(env, signal.SIGKILL))
-    episode.before(20, lambda: end(env, signal.SIGSTOP))
+    episode.before(21, lambda: end(env, signal.SIGSTOP))
     assert differences(rollout(episode, 60, seed=8), truth) == ""
     assert env.backend.restarts == before + 2
     died, hung = (
@@ -132,7 +134,7 @@ def test_one_that_dies_or_hangs_is_replaced_and_no_bit_differs(env, truth, caplo
 def test_answers_that_cannot_be_are_faults(env, truth) -> None:
     """The world's step goes further than asked for, as somebody else's request would have it."""
     episode, before = Interrupted(env), env.backend.restarts
-    episode.before(7, lambda: env.backend._asked(lambda world: world.act({})))
+    episode.before(8, lambda: env.backend._asked(lambda world: world.act({})))
     assert differences(rollout(episode, 60, seed=8), truth) == ""
     assert env.backend.restarts == before + 1
 
