@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Environment steps a second in-process, alone and as a vector on one and on two cores.
+"""Environment steps a second in-process, alone and as vectors.
 
     ./ws python3 benchmark/environments.py [--out FOLDER] [--seconds 2.0] [--rounds 5] [--worlds 32]
 
@@ -14,15 +14,14 @@ from collections.abc import Callable
 from typing import Any
 
 import gymnasium
-import numpy as np
 import reporting
 
 import cartpole  # noqa: F401 - registers the environments
+from cartpole.robot import CONTROLLER
 
 IDS = ("cartpole/Balance-v0", "cartpole/Classic-v0", "cartpole/SwingUp-v0")
 VECTOR = IDS[0]
 TARGET = 13_000.0  # steps a second of one environment
-SPEED_UP = 1.8  # of two cores against one
 BATCH = 200  # steps between looks at the clock
 
 
@@ -74,7 +73,7 @@ def robot_alone() -> Callable[[], int]:
 
     def batch() -> int:
         for index in range(BATCH):
-            env.backend.act((0.02 * (index % 2),))
+            env.backend.act({CONTROLLER: 0.02 * (index % 2)})
         return BATCH
 
     return batch
@@ -91,10 +90,8 @@ def subjects(worlds: int) -> dict[str, Callable[[], int]]:
             VECTOR, randomisation={"mass": 0.2, "cart_friction": 0.5}
         ),
         "with random lengths, too": single(VECTOR, randomisation={"mass": 0.2, "length": 0.1}),
-        f"{worlds} worlds, Gymnasium's sync": several(worlds, vectorization_mode="sync"),
-        f"{worlds} worlds, this process": several(worlds, workers=0),
-        f"{worlds} worlds, 1 worker": several(worlds, workers=1),
-        f"{worlds} worlds, 2 workers": several(worlds, workers=2),
+        f"{worlds} worlds": several(worlds),
+        f"{worlds} worlds, Gymnasium's async": several(worlds, vectorization_mode="async"),
     }
 
 
@@ -106,13 +103,10 @@ def main() -> None:
         for name, batch in batches.items():
             taken[name].append(rate(batch, chosen.seconds))
     rates = {name: statistics.median(values) for name, values in taken.items()}
-    *_, one, two = (np.array(values) for values in taken.values())
-    speed_up = float(np.median(two / one))
     print(f"{'steps a second, 8 ticks each':36} {'median':>9} {'target':>9}")
     for name, value in rates.items():
         print(f"{name:36} {value:9,.0f} {f'{TARGET:,.0f}' if name in IDS else '':>9}")
-    print(f"{'2 workers against 1':36} {speed_up:9.2f} {SPEED_UP:9.2f}")
-    reporting.write(chosen.out, "environments", {"steps_per_second": rates, "speed_up": speed_up})
+    reporting.write(chosen.out, "environments", {"steps_per_second": rates})
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from cartpole.environment import CartPoleEnv
 from cartpole.tasks import TASKS, CartPoleTask
 from cartpole.variation import Randomisation
 from robot_envs.making import check_options
+from robot_envs.vector import RobotVectorEnv
 
 OWN = tuple(each.name for each in fields(Randomisation))
 
@@ -31,6 +32,16 @@ def make_environment(
     if randomisation and set(randomisation) <= set(OWN):
         varied = Randomisation(**randomisation)
     return CartPoleEnv(make_task(task, noise), backend, randomisation=varied, **options)
+
+
+def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
+    """Makes several, as `gymnasium.make_vec` does; see `RobotVectorEnv`.
+
+    Raises:
+        ValueError: if an option makes no sense.
+        RobotEnvError: if a robot can't be brought up.
+    """
+    return RobotVectorEnv(num_envs, make_environment, **options)
 
 
 def make_task(name: str, noise: float | None = None) -> CartPoleTask:

@@ -5,6 +5,7 @@ import gymnasium
 NAMESPACE = "cartpole"
 VERSION = 0
 ENTRY_POINT = "cartpole.making:make_environment"
+VECTOR_ENTRY_POINT = "cartpole.making:make_vector"
 IDS = {"Balance": "balance", "Classic": "classic", "SwingUp": "swing-up"}  # name: task
 # Of up to 1500: all 3000 steps, the cart near the middle; of 500 steps, as for CartPole-v1; of 1250, of which
 # swinging up takes 200 and more.
@@ -20,7 +21,7 @@ def register_environments() -> None:
         gymnasium.register(
             identifier,
             entry_point=ENTRY_POINT,
-            vector_entry_point="cartpole.vector:CartPoleVectorEnv",
+            vector_entry_point=VECTOR_ENTRY_POINT,
             reward_threshold=SOLVED.get(task),
             kwargs={"task": task},
         )

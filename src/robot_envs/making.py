@@ -15,6 +15,7 @@ from robot_envs.robot import Robot
 from robot_envs.task import Task
 
 ENTRY_POINT = "robot_envs.making:make_environment"
+VECTOR_ENTRY_POINT = "robot_envs.vector:make_vector"
 OWN = ("robot", "task")  # of RobotEnv's options, that have another form here
 
 
@@ -30,6 +31,7 @@ def register(
 
         register("my_arm/Reach-v0", "my_arm.robot:ARM", "my_arm.tasks:Reach")
         env = gymnasium.make("my_arm/Reach-v0", backend="ros")
+        eight = gymnasium.make_vec("my_arm/Reach-v0", 8, backend="ros")
 
     Robot and task are named, so that other processes can make them: workers, resumed trainings.
 
@@ -46,6 +48,7 @@ def register(
         gymnasium.register(
             identifier,
             entry_point=ENTRY_POINT,
+            vector_entry_point=VECTOR_ENTRY_POINT,
             reward_threshold=reward_threshold,
             kwargs=kwargs,
         )

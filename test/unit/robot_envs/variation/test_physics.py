@@ -9,7 +9,7 @@ from rig import INERTIA, MASS, PERIOD, RIG, Watch, make_both, make_rig
 
 from robot_envs import RobotEnv, SimulatorError
 from robot_envs.variation import LinkScale, Variation
-from robot_envs.vector.environment import RobotVectorEnv
+from robot_envs.vector import RobotVectorEnv
 
 G = 9.8  # [m/s²]
 REST = np.zeros(3)
@@ -195,7 +195,7 @@ def test_robots_that_share_a_world_are_named_with_their_model():
 
 def test_a_vector_of_environments_gives_each_its_own_robot():
     options = {"randomisation": {"mass": 0.2, "com": {"cart": 0.01}}, "actuator_lag": 0.02}
-    many = RobotVectorEnv(3, "rig:make_rig", workers=0, **options)
+    many = RobotVectorEnv(3, make_rig, **options)
     infos = many.reset(seed=4)[1]["variation"]
     pushed = [many.step(np.tile([5.0, 0.0, 0.0], (3, 1)))[0] for _ in range(3)][-1]
     many.close()

@@ -1,0 +1,157 @@
+"""Many robots at once: what `gymnasium.make_vec` makes of every environment here."""
+
+import contextlib
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.vector.utils import iterate
+
+from robot_envs.backends.choice import LOCKSTEP, OWN, REALTIME
+from robot_envs.backends.side_by_side import side_by_side
+from robot_envs.checks.spaces import action_reader
+from robot_envs.environment import RobotEnv
+from robot_envs.making import make_environment
+
+Results = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
+
+
+class RobotVectorEnv(SyncVectorEnv[Any, Any]):
+    """`num_envs` environments with robots of their own: Gymnasium's `SyncVectorEnv`, also over ROS.
+
+    With `backend="ros"` each has a simulator of its own, under a master of its own; all are started side by
+    side and end with this process. `step` sends all commands before it waits for the first answer, so the
+    simulators move at the same time, on as many cores as there are. In this process the worlds move one
+    after the other.
+
+    Each environment gives exactly what it would give alone: a seed s stands for s, s + 1, ..., one for each.
+    An action that is none is refused before anything moves. After an error in the middle of a step all have
+    to be reset.
+
+    Args:
+        num_envs: number of environments.
+        make: makes one, from `backend` and `options`.
+        backend: of all; "ros" and "ros-own" are the same here.
+        autoreset_mode: Gymnasium's: "NextStep", "SameStep" or "Disabled".
+        options: keyword arguments of `make`.
+
+    Raises:
+        ValueError: if an option makes no sense.
+        RobotEnvError: if a robot can't be brought up.
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        make: Callable[..., RobotEnv],
+        *,
+        backend: str | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **options: Any,
+    ) -> None:
+        self.closed = True  # until there is something to close
+        mode = AutoresetMode(autoreset_mode)
+        _check(num_envs, backend, options.get("render_mode"))
+        if backend == LOCKSTEP:
+            backend = OWN
+        self._robots: list[RobotEnv] = []
+
+        def made() -> RobotEnv:
+            self._robots.append(make(backend=backend, **options))
+            return self._robots[-1]
+
+        self._side_by_side = backend == OWN
+        self._broken_off = False
+        try:
+            with side_by_side(num_envs):
+                super().__init__([made] * num_envs, autoreset_mode=mode)
+        except BaseException:  # Ctrl-C, too
+            self.close_extras()
+            raise
+        self.closed = False
+        self._read = action_reader(self.single_action_space)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Starts an episode in each, or in those that `options["reset_mask"]` names; see `SyncVectorEnv`.
+
+        Raises:
+            ValueError: if there are not as many seeds or flags as environments.
+            gymnasium.error.ClosedEnvironmentError: after `close()`.
+            SimulatorError: if a simulator can't go on.
+        """
+        of_all = options is None or "reset_mask" not in options
+        given = super().reset(seed=seed, options=None if options is None else dict(options))
+        if of_all:
+            self._broken_off = False
+        return given
+
+    def step(self, actions: Any) -> Results:
+        """Carries out one action in each; see `SyncVectorEnv`.
+
+        Raises:
+            ValueError: if there are not as many actions as environments, or one is wrong; nothing has moved.
+            gymnasium.error.ResetNeeded: if an episode has ended that isn't reset by itself, or a step was
+                broken off by an error.
+            gymnasium.error.ClosedEnvironmentError: after `close()`.
+            SimulatorError: if a simulator can't go on.
+        """
+        self._check_ready()
+        read = [self._read(action) for action in iterate(self.action_space, actions)]
+        if len(read) != self.num_envs:
+            raise ValueError(f"{len(read)} actions for {self.num_envs} environments")
+        self._broken_off = True
+        if self._side_by_side:
+            for robot, action, ended in zip(
+                self._robots, read, self._autoreset_envs.tolist(), strict=True
+            ):
+                if not ended or self.autoreset_mode is AutoresetMode.SAME_STEP:
+                    robot.begin_step(action)
+        given = super().step(actions)
+        self._broken_off = False
+        return given
+
+    def _check_ready(self) -> None:
+        if self.closed:
+            raise gymnasium.error.ClosedEnvironmentError(
+                "this vector environment is closed; make another one"
+            )
+        if self._broken_off:
+            raise gymnasium.error.ResetNeeded(
+                "the step before was broken off by an error; call reset(), without a reset_mask"
+            )
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._autoreset_envs.any():
+            raise gymnasium.error.ResetNeeded(
+                f"episodes of environments {np.flatnonzero(self._autoreset_envs).tolist()} have ended; reset "
+                'them by options={"reset_mask": ...}'
+            )
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Closes all environments, whose simulators end side by side; `close()` calls this once."""
+        with side_by_side(len(self._robots)), contextlib.ExitStack() as closing:
+            for robot in self._robots:
+                closing.callback(robot.close)
+
+
+def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
+    """Makes environments of robots and tasks by name; see `robot_envs.making.make_environment`.
+
+    Raises:
+        RobotEnvError: if robot or task aren't found, or nobody knows an option.
+        ValueError: if an option makes no sense.
+    """
+    return RobotVectorEnv(num_envs, make_environment, **options)
+
+
+def _check(num_envs: Any, backend: str | None, render_mode: str | None) -> None:
+    if type(num_envs) is not int or num_envs < 1:
+        raise ValueError(f"num_envs must be a whole number of 1 and more, not {num_envs!r}")
+    if backend == REALTIME:
+        raise ValueError(
+            f"many robots need the backend 'ros', or one in this process; {REALTIME!r} has a single robot"
+        )
+    if render_mode == "human":
+        raise ValueError("many robots have no window; use render_mode 'rgb_array'")

@@ -1,1 +1,0 @@
-"""Many environments at once, each in a world of its own, stepped together."""

@@ -1,0 +1,177 @@
+"""Vectors of robots in this process: each as if it were alone; and what can go wrong. Over ROS: test/ros."""
+
+import gymnasium
+import numpy as np
+import pytest
+from environment_conformance import IDS, RICH
+from gymnasium.utils.env_checker import data_equivalence as same
+from gymnasium.vector import AutoresetMode
+
+import cartpole  # noqa: F401 - registers the environments
+import robot_envs.robots  # noqa: F401 - the same of others
+from robot_envs.errors import RobotEnvError, TaskError
+from robot_envs.vector import RobotVectorEnv
+
+COUNT = 4
+OPTIONS = {"max_steps": 40, **RICH}
+
+
+def vector_rollout(env, steps=100):
+    env.action_space.seed(5)
+    given = [env.reset(seed=9)]
+    given += [env.step(env.action_space.sample()) for _ in range(steps)]
+    env.close()
+    return given
+
+
+@pytest.fixture
+def many():
+    vectors = []
+
+    def make(identifier="cartpole/Classic-v0", num_envs=2, **options):
+        vectors.append(gymnasium.make_vec(identifier, num_envs, **options))
+        return vectors[-1]
+
+    yield make
+    for each in vectors:
+        each.close()
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_all_ways_give_the_same_bits(mode):
+    identifier = IDS[mode == "SameStep"]
+    ours = gymnasium.make_vec(identifier, COUNT, autoreset_mode=mode, **OPTIONS)
+    of_gymnasium = [
+        gymnasium.make_vec(identifier, COUNT, kind, {"autoreset_mode": mode}, **OPTIONS)
+        for kind in ("sync", "async")
+    ]
+    assert isinstance(ours.unwrapped, RobotVectorEnv)
+    first, *others = [vector_rollout(env) for env in (ours, *of_gymnasium)]
+    for other in others:
+        assert all(same(a, b, exact=True) for a, b in zip(first, other, strict=True))
+
+
+@pytest.mark.parametrize("identifier", ["robot_envs/TwoLinkReachGoal-v0", "robot_envs/Furuta-v0"])
+def test_environments_that_are_registered_by_name_with_goals_too(many, identifier):
+    kinds = [
+        vector_rollout(many(identifier, 2, vectorization_mode=kind)) for kind in (None, "sync")
+    ]
+    assert all(same(a, b, exact=True) for a, b in zip(*kinds, strict=True))
+
+
+def test_only_the_masked_are_reset_where_episodes_end_apart(many):
+    vector = many(num_envs=COUNT, autoreset_mode="Disabled")
+    vector.reset(seed=1)
+    before = vector.step(np.ones(COUNT, int))[0]
+    mask = np.array([True, False, False, True])
+    options = {"reset_mask": mask}
+    after, _ = vector.reset(seed=[7] * COUNT, options=options)
+    assert options == {"reset_mask": mask}, "the caller's own"
+    assert np.array_equal(after[~mask], before[~mask])
+    assert np.array_equal(after[0], after[3])
+    assert not np.array_equal(after[0], before[0])
+    ended = np.zeros(COUNT, bool)
+    while not ended.any():
+        ended = vector.step(np.array([1, 0, 1, 1]))[2]
+    with pytest.raises(
+        gymnasium.error.ResetNeeded, match=r"episodes of environments \[.*reset_mask"
+    ):
+        vector.step(np.ones(COUNT, int))
+    vector.reset(options={"reset_mask": ended})
+    vector.step(np.ones(COUNT, int))
+
+
+def test_pictures_of_all_and_how_it_resets(many):
+    vector = many(IDS[-1], render_mode="rgb_array", width=64, height=32)
+    vector.reset(seed=1)
+    assert [picture.shape for picture in vector.render()] == [(32, 64, 3)] * 2
+    assert vector.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"num_envs": 0}, "num_envs must be a whole number of 1 and more, not 0"),
+        ({"num_envs": 2.0}, "num_envs must be a whole number of 1 and more, not 2.0"),
+        ({"backend": "ros-realtime"}, "has a single robot"),
+        ({"backend": "rose"}, "there is no backend .rose."),
+        ({"render_mode": "human"}, "no window"),
+        ({"noise": 3.0}, "noise must lie"),
+        ({"autoreset_mode": "later"}, "'later' is not a valid AutoresetMode"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options, text):
+    with pytest.raises(ValueError, match=text):
+        gymnasium.make_vec("cartpole/Balance-v0", **{"num_envs": 2, **options})
+
+
+def test_an_unknown_option_is_refused_by_name():
+    for identifier in ("cartpole/Balance-v0", "robot_envs/TwoLinkReach-v0"):
+        with pytest.raises(RobotEnvError, match="no option 'workers'"):
+            gymnasium.make_vec(identifier, 2, workers=2)
+
+
+@pytest.mark.parametrize(
+    ("actions", "text"),
+    [
+        (np.ones(3, int), "3 actions for 2 environments"),
+        (np.ones((2, 2), int), "an action is 0 or 1"),
+        (np.array([0, 0.7]), "an action is 0 or 1"),
+        (np.array([0, np.nan]), "an action is 0 or 1"),
+        (np.array([0, 7]), "an action is 0 or 1, not .*7"),
+    ],
+)
+def test_a_wrong_action_moves_none_and_the_next_one_works(many, actions, text):
+    plain, vector = many(), many()
+    for each in (plain, vector):
+        each.reset(seed=1)
+    with pytest.raises(ValueError, match=text):
+        vector.step(actions)
+    seen = [each.step(np.array([1, 0]))[0] for each in (plain, vector)]
+    assert np.array_equal(*seen)
+
+
+def test_after_an_error_in_the_middle_all_are_reset(many, monkeypatch):
+    vector = many()
+    with pytest.raises(ValueError, match="length"):
+        vector.reset(seed=[1, 2, 3])
+    vector.reset(seed=1)
+    task = vector.unwrapped.envs[1].task
+    with monkeypatch.context() as patched:
+        patched.setattr(task, "reward", lambda *_: "much")
+        with pytest.raises(TaskError, match="reward"):
+            vector.step(np.ones(2, int))
+    mask = {"reset_mask": np.array([True, False])}
+    for begin in (lambda: None, lambda: vector.reset(options=mask)):
+        begin()
+        with pytest.raises(gymnasium.error.ResetNeeded, match="broken off by an error"):
+            vector.step(np.ones(2, int))
+    again = vector.reset(seed=1)[0]
+    assert np.array_equal(again, many().reset(seed=1)[0])
+    vector.step(np.ones(2, int))
+
+
+def test_a_closed_one_says_so_and_closes_its_worlds(many):
+    vector = many()
+    vector.reset(seed=0)
+    for _ in range(2):
+        vector.close()
+    for call in (vector.reset, lambda: vector.step(np.ones(2, int))):
+        with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="make another one"):
+            call()
+
+
+def test_where_one_cannot_be_made_the_others_are_closed():
+    made = []
+
+    def make(backend):
+        if len(made) == 2:
+            raise RobotEnvError("no third one")
+        made.append(gymnasium.make("cartpole/Balance-v0", backend=backend).unwrapped)
+        return made[-1]
+
+    with pytest.raises(RobotEnvError, match="no third one"):
+        RobotVectorEnv(3, make)
+    for env in made:
+        with pytest.raises(gymnasium.error.ClosedEnvironmentError):
+            env.reset()
