@@ -50,7 +50,7 @@ def make_backend(
     if name not in BACKENDS:
         near = did_you_mean(str(name), BACKENDS) or f"; there are {', '.join(BACKENDS)}"
         raise ValueError(f"there is no backend {name!r}{near}")
-    if deadline is not None and not deadline > 0.0:
+    if deadline is not None and not (isinstance(deadline, (int, float)) and deadline > 0.0):
         raise ValueError(f"deadline is a time above 0 [s], not {deadline!r}")
     plain = scene.robots[0].world in (None, EMPTY)  # other worlds may have another physics step
     if plain and (control_period != 0.0 or name != REALTIME):

@@ -84,6 +84,11 @@ class PrivateSimulator:
         """Whether its processes run."""
         return self._process.poll() is None
 
+    @property
+    def processes(self) -> list[int]:
+        """Ids of the simulator's and the master's."""
+        return [*([self.pid] if self.pid else []), self._process.pid]
+
     def wait(self) -> None:
         """Returns once it answers.
 

@@ -20,6 +20,7 @@ from robot_envs.backends.ros.own_world.journal import Journal, merged
 from robot_envs.backends.ros.own_world.simulator import PrivateSimulator
 from robot_envs.backends.ros.simulator_world import physics_step
 from robot_envs.backends.ros.turn import Turn
+from robot_envs.backends.world_files import world_models
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
@@ -58,6 +59,7 @@ class RestartingWorld:
         self.restarts = 0
         self._period = control_period  # [s]
         self._deadline = DEADLINE if deadline is None else deadline
+        world_models(scene.robots[0].world)  # what can't be read is told before anything starts
         self._place = side_by_side.next_place()
         if self._place.number == 1:
             memory.check(self._place.of)
