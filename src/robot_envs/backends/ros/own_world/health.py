@@ -24,11 +24,14 @@ def check(state: WorldState, expected: int) -> None:
             f"its time stands at {state.time:.9g} s of the episode, and {expected / NANOSECONDS:.9g} s were "
             "asked for"
         )
-    for name, joint in state.joints.items():
-        if not all(-BEYOND < each < BEYOND for each in joint):  # NaN, too
-            what = "out of all bounds" if all(map(math.isfinite, joint)) else "not finite"
-            position, velocity, effort = joint
+    for name, (position, velocity, effort) in state.joints.items():
+        if not (
+            -BEYOND < position < BEYOND
+            and -BEYOND < velocity < BEYOND
+            and -BEYOND < effort < BEYOND
+        ):  # NaN, too
+            finite = all(map(math.isfinite, (position, velocity, effort)))
             raise SimulatorFault(
-                f"the joint '{name}' is {what}: position {position:g}, velocity {velocity:g}, "
-                f"effort {effort:g}"
+                f"the joint '{name}' is {'out of all bounds' if finite else 'not finite'}: position "
+                f"{position:g}, velocity {velocity:g}, effort {effort:g}"
             )

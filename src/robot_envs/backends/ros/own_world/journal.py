@@ -13,7 +13,8 @@ from robot_envs.world_state import Commands, InitialState, WorldState
 class _Part:
     """Steps that commanded the same controllers."""
 
-    layout: tuple[tuple[str, int | None], ...]  # how many numbers each takes; None: a plain one
+    names: tuple[str, ...]
+    sizes: tuple[int | None, ...]  # how many numbers each takes; None: a plain one
     steps: int = 0
     numbers: "array[float]" = field(default_factory=lambda: array("d"))
 
@@ -42,15 +43,14 @@ class Journal:
         """Notes commands, and the state a control period later."""
         self.steps += 1
         self.last = state
-        layout = tuple(
-            (name, None if isinstance(value, (int, float)) else len(value))
-            for name, value in commands.items()
-        )
-        if not self._parts or self._parts[-1].layout != layout:
-            self._parts.append(_Part(layout))
-        part = self._parts[-1]
+        names, values = tuple(commands), tuple(commands.values())
+        sizes = tuple([None if type(each) is float else _size(each) for each in values])
+        part = self._parts[-1] if self._parts else None
+        if part is None or part.names != names or part.sizes != sizes:
+            part = _Part(names, sizes)
+            self._parts.append(part)
         part.steps += 1
-        for value in commands.values():
+        for value in values:
             if isinstance(value, (int, float)):
                 part.numbers.append(value)
             else:
@@ -65,8 +65,12 @@ class Journal:
                     name: next(following)
                     if size is None
                     else tuple(next(following) for _ in range(size))
-                    for name, size in part.layout
+                    for name, size in zip(part.names, part.sizes, strict=True)
                 }
+
+
+def _size(value: Any) -> int | None:
+    return None if isinstance(value, (int, float)) else len(value)
 
 
 def merged(before: Variation, variation: Variation) -> Variation:
