@@ -11,6 +11,7 @@ from geometry_msgs.msg import Pose as PoseMsg
 from sensor_msgs.msg import JointState as JointStateMsg
 
 from bullet_gazebo.physics.pose import Pose, Vector
+from bullet_gazebo.state.query import NOTHING
 from robot_envs.errors import SimulatorFault
 from robot_envs.scene import Scene
 from robot_envs.world_state import (
@@ -118,8 +119,9 @@ def told(
         joints: those of the answer.
         commands: what the controllers hold.
     """
-    passed = (answer.joint_states.header.stamp - begun.joint_states.header.stamp).to_nsec() / 1e9
-    if query == StateQuery():
+    now, then = answer.joint_states.header.stamp, begun.joint_states.header.stamp
+    passed = ((now.secs - then.secs) * 1_000_000_000 + now.nsecs - then.nsecs) / 1e9  # [s]
+    if query == NOTHING:
         return WorldState(passed, joints, commands)
     links = map(_motion, answer.link_poses, answer.link_twists)
     models = map(_motion, answer.model_poses, answer.model_twists)
