@@ -12,7 +12,6 @@ its environments do, and the simulators' own. Prints a table and writes many_sim
 import os
 import statistics
 import time
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -36,28 +35,21 @@ class Measured(NamedTuple):
     simulator: float  # the same
 
 
-def stepper(env: gymnasium.vector.VectorEnv[Any, Any, Any]) -> Callable[[], int]:
-    """Random actions in all environments of a vector; returns the number of steps."""
+def measured(env: gymnasium.vector.VectorEnv[Any, Any, Any], seconds: float) -> Measured:
+    """What random actions in all environments of a vector give and cost in some time."""
     env.action_space.seed(0)
     actions = [env.action_space.sample() for _ in range(BATCH)]
-    env.reset(seed=0)
-
-    def batch() -> int:
-        for action in actions:
-            env.step(action)
-        return BATCH * env.num_envs
-
-    return batch
-
-
-def measured(batch: Callable[[], int], seconds: float, robots: list[RobotEnv]) -> Measured:
-    """What batches give and cost in some time."""
-    batch()  # warms up
-    pids = [robot.backend.simulator.pid for robot in robots]  # type: ignore[attr-defined]
+    env.reset(seed=0)  # its robots were another vector's meanwhile
+    for action in actions:  # warms up
+        env.step(action)
+    backends = [robot.backend for robot in env.unwrapped.envs]  # type: ignore[attr-defined]
+    pids = [backend.simulator.pid for backend in backends if hasattr(backend, "simulator")]
     before, client = sum(map(used, pids)), time.process_time()
     steps, begin = 0, time.perf_counter()
     while (passed := time.perf_counter() - begin) < seconds:
-        steps += batch()
+        for action in actions:
+            env.step(action)
+        steps += BATCH * env.num_envs
     client = time.process_time() - client
     simulators = sum(map(used, pids)) - before
     return Measured(steps / passed, 1e6 * client / steps, 1e6 * simulators / steps)
@@ -78,18 +70,17 @@ def part(robots: list[RobotEnv]) -> RobotVectorEnv:
 
 def main() -> None:
     chosen = reporting.options(__doc__ or "", most=16, seconds=1.0, rounds=5)
-    here = stepper(gymnasium.make_vec(IDENTIFIER, 1))
+    here = gymnasium.make_vec(IDENTIFIER, 1)
     began = time.perf_counter()
     everyone = gymnasium.make_vec(IDENTIFIER, chosen.most, backend="ros")
     began = time.perf_counter() - began
     robots = everyone.unwrapped.envs  # type: ignore[attr-defined]
-    counts = [2**power for power in range(chosen.most.bit_length()) if 2**power <= chosen.most]
-    batches = {count: stepper(part(robots[:count])) for count in counts}
-    taken: dict[int, list[Measured]] = {count: [] for count in (0, *counts)}
+    counts = [2**power for power in range(chosen.most.bit_length())]
+    vectors = {0: here, **{count: part(robots[:count]) for count in counts}}
+    taken: dict[int, list[Measured]] = {count: [] for count in vectors}
     for _ in range(chosen.rounds):
-        taken[0].append(measured(here, chosen.seconds, []))
-        for count, batch in batches.items():
-            taken[count].append(measured(batch, chosen.seconds, robots[:count]))
+        for count, vector in vectors.items():
+            taken[count].append(measured(vector, chosen.seconds))
     restarts = sum(robot.backend.restarts for robot in robots)
     everyone.close()
     report(chosen, taken, {"seconds_to_start": began, "restarts": restarts})

@@ -9,12 +9,12 @@ from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldRespons
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.ros.bring_up import STEP_SERVICE, full_name, ready
-from robot_envs.backends.ros.messages import JointReader, ask_for, place, pose_of, told
 from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.backends.ros.service import ServiceClient
-from robot_envs.backends.ros.step_request import StepRequest
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.backends.ros.variation import RosVariation
+from robot_envs.backends.ros.wire.messages import JointReader, ask_for, place, pose_of, told
+from robot_envs.backends.ros.wire.step_request import StepRequest
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation

@@ -17,11 +17,11 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.ros.bring_up import full_name, ready
-from robot_envs.backends.ros.messages import JointReader, pose_of
 from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.backends.ros.service import ServiceClient
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.backends.ros.variation import RosVariation
+from robot_envs.backends.ros.wire.messages import JointReader, pose_of
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation

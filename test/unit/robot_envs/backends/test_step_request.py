@@ -6,8 +6,8 @@ import struct
 import pytest
 from bullet_gazebo_msgs.srv import StepWorldRequest
 
-from robot_envs.backends.ros.messages import ask_for
-from robot_envs.backends.ros.step_request import StepRequest
+from robot_envs.backends.ros.wire.messages import ask_for
+from robot_envs.backends.ros.wire.step_request import StepRequest
 from robot_envs.world_state import LinkQuery, StateQuery
 
 
@@ -27,12 +27,18 @@ def test_its_bytes_are_genpys():
         ((), []),
         (("/ä",), list(map(float, range(300)))),
     ):
-        for asked in (query, StateQuery(links=(LinkQuery("arm::hand", "arm::base"),), all_models=True)):
+        for asked in (
+            query,
+            StateQuery(links=(LinkQuery("arm::hand", "arm::base"),), all_models=True),
+        ):
             ours.ask_for(asked)
             genpys = StepWorldRequest(ticks=8)
             ask_for(genpys, asked)
             for factor in (1.0, 2.0):
-                genpys.controllers, genpys.commands = list(names), [factor * each for each in numbers]
+                genpys.controllers, genpys.commands = (
+                    list(names),
+                    [factor * each for each in numbers],
+                )
                 ours.command(names, genpys.commands)
                 assert written(ours) == written(genpys)
 

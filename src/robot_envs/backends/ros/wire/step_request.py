@@ -6,7 +6,7 @@ from typing import BinaryIO
 
 from bullet_gazebo_msgs.srv import StepWorldRequest
 
-from robot_envs.backends.ros.messages import ask_for
+from robot_envs.backends.ros.wire.messages import ask_for
 from robot_envs.world_state import StateQuery
 
 _MARK = -1.2345678987654321e-300  # a command that nobody sends

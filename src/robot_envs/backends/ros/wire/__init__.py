@@ -1,0 +1,1 @@
+"""Between the messages of ROS and what backends know."""
