@@ -42,7 +42,7 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
     ("algorithm", "options"),
     [("td3", OFF_POLICY | CONTINUOUS), ("ddpg", OFF_POLICY | CONTINUOUS), ("dqn-sb3", OFF_POLICY),
      ("a2c", {"total_timesteps": 200, "n_steps": 16, "eval_frequency": 100}),
-     ("ppo", {"total_timesteps": 200, "n_steps": 50, "batch_size": 100, "n_envs": 2,
+     ("ppo", {"total_timesteps": 200, "n_steps": 50, "batch_size": 100, "num_envs": 2,
               "eval_frequency": 100})],
 )  # fmt: skip
 def test_every_algorithm_trains_and_its_policy_is_the_librarys(
@@ -74,7 +74,7 @@ def test_checkpoints_every_so_many_steps_and_the_newest_are_kept(tmp_path: Path)
 
 
 def test_of_several_environments_the_step_that_passes_a_multiple_counts(tmp_path: Path) -> None:
-    options = {"n_envs": 3, "n_steps": 20, "batch_size": 60, "keep_checkpoints": 0}
+    options = {"num_envs": 3, "n_steps": 20, "batch_size": 60, "keep_checkpoints": 0}
     train(tmp_path, "ppo", **options, eval_frequency=0, total_timesteps=180)
     steps = [int(path.stem[5:]) for path in sorted((tmp_path / "checkpoints").iterdir())]
     assert steps == [0, 72, 141, 180]
@@ -179,7 +179,7 @@ def test_a_loss_that_is_none() -> None:
 
 
 def test_many_environments_of_training_are_one_when_playing(tmp_path: Path, recwarn) -> None:
-    folder = train(tmp_path, "ppo", n_envs=8, n_steps=1, batch_size=8)
+    folder = train(tmp_path, "ppo", num_envs=8, n_steps=1, batch_size=8)
     recwarn.clear()
     content = torch.load(folder / "best.pt", weights_only=True)
     options = recorded_options(content["config"], "here")
