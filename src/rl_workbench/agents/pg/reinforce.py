@@ -135,8 +135,8 @@ class ReinforceAgent(TwoNetworks):
         spread = Spread(bounds.middle, bounds.half)
         return ClippedAction(nn.Sequential(outputs, spread), bounds.low, bounds.high)
 
-    def learn(self, episode: Episode) -> Losses | None:
-        """Takes an episode; the last one of a batch updates both networks.
+    def learn(self, *episodes: Episode) -> Losses | None:
+        """Takes an episode, or one of each environment; the last ones of a batch update both networks.
 
         Returns:
             The losses of the update, taken before it; None if the batch isn't full yet.
@@ -144,7 +144,7 @@ class ReinforceAgent(TwoNetworks):
         Raises:
             WorkbenchError: if a loss or a gradient isn't finite; the agent is as before then.
         """
-        batch = [*self._batch, episode]
+        batch = [*self._batch, *episodes]
         if len(batch) < self._batch_size:
             self._batch = batch
             return None

@@ -19,7 +19,7 @@ class NumberedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     Args:
         env: the environment.
-        index: its number, from 0 on.
+        index: from 0 on.
         count: of all of them.
     """
 
@@ -104,5 +104,5 @@ def numbered(index: int, count: int) -> Iterator[None]:
     try:
         yield
     except WorkbenchError as error:
-        text = f"environment {index}, of 0 to {count - 1}: {error}"
+        text = f"environment {index + 1} of {count}: {error}"
         raise type(error)(text) from error.__cause__

@@ -6,7 +6,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from rl_workbench.agents.pg.document import Episode, PolicyGradientAgent
+from rl_workbench.agents.pg.document import Episode, Losses, PolicyGradientAgent
 from rl_workbench.agents.pg.gaussian_policy import Bounds
 from rl_workbench.agents.pg.reinforce import ReinforceAgent
 from rl_workbench.agents.pg.settings import DocumentSettings
@@ -125,15 +125,16 @@ class PolicyGradientTraining(Algorithm):
             episodes = self._source.collect(frame.is_interrupted)
             if episodes is None:
                 break
+            losses = self._agent.learn(*episodes)
             self._stride = 0
             for episode in episodes:
-                self._learn_from(episode, frame)
+                self._take_down(episode, losses if episode is episodes[-1] else None, frame)
             self._source.mark()
             frame.step_done()
         self._source.rewind()
 
-    def _learn_from(self, episode: Episode, frame: Frame) -> None:
-        losses = self._agent.learn(episode)
+    def _take_down(self, episode: Episode, losses: Losses | None, frame: Frame) -> None:
+        """Of a round, the last episode has the losses: batches end with it."""
         self._steps += episode.length
         self._stride += episode.length
         by_episode = {"Reward": episode.total_reward}  # the tags of the existing script
