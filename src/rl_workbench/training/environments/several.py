@@ -1,7 +1,7 @@
 """Several environments of a training, side by side: each has its number, and a robot of its own."""
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
 from typing import Any
 
 import gymnasium
@@ -12,6 +12,8 @@ from rl_workbench.training.environments.making import shares_robot
 
 # Attribute of an environment that shares its robot: the options by which a copy has one of its own.
 OWN_ROBOT = "own_robot_options"
+# And its method: side_by_side(count) is a context manager within which that many start, or end, at once.
+SIDE_BY_SIDE = "side_by_side"
 
 
 class NumberedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -58,7 +60,7 @@ def make_several(
     env_id: str,
     count: int,
 ) -> list[gymnasium.Env[Any, Any]]:
-    """Makes environments of which each moves a robot of its own; the caller closes them.
+    """Makes environments of which each moves a robot of its own; the caller closes them, by `close_all`.
 
     Args:
         make: makes one by its options.
@@ -73,25 +75,55 @@ def make_several(
     first = make(given)
     if count == 1:
         return [first]
+    made = [first]
     with ExitStack() as making:
-        making.callback(first.close)
+        making.callback(close_all, made)
         if shares_robot(first):
-            apart = first.get_wrapper_attr(OWN_ROBOT) if first.has_wrapper_attr(OWN_ROBOT) else None
+            apart = _attribute(first, OWN_ROBOT)
             if not apart:
                 raise WorkbenchError(
                     f"{env_id} moves a robot that there is only one of: num_envs is 1, not {count}"
                 )
-            making.pop_all().close()
+            made.pop().close()
             given = {**given, **apart}
-            first = make(given)
-            making.callback(first.close)
-        made = [NumberedEnvironment(first, 0, count)]
-        for index in range(1, count):
-            with numbered(index, count):
-                made.append(NumberedEnvironment(make(given), index, count))
-            making.callback(made[-1].close)
+        with _side_by_side(first, count - len(made)):
+            for index in range(len(made), count):
+                with numbered(index, count):
+                    made.append(make(given))
         making.pop_all()
-    return list(made)
+    return [NumberedEnvironment(env, index, count) for index, env in enumerate(made)]
+
+
+def close_all(envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
+    """Closes environments, all of them also where one fails.
+
+    Raises:
+        WorkbenchError: if one fails.
+    """
+    if not envs:
+        return
+    with _side_by_side(envs[0], len(envs)), ExitStack() as closing:
+        for env in envs:
+            closing.callback(env.close)
+
+
+@contextmanager
+def _side_by_side(env: gymnasium.Env[Any, Any], count: int) -> Iterator[None]:
+    """Within it environments like `env` only begin to start, or to end; it waits for them all.
+
+    Where they know nothing of that, they start and end one after the other.
+    """
+    waiting = _attribute(env, SIDE_BY_SIDE)
+    try:
+        with waiting(count) if waiting else nullcontext():
+            yield
+    except gymnasium.error.Error as error:  # its text is made for the user
+        raise WorkbenchError(str(error) or type(error).__name__) from error
+
+
+def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:
+    """None where it has none."""
+    return env.get_wrapper_attr(name) if env.has_wrapper_attr(name) else None
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """Where the episodes come from that a policy gradient learns from: rounds of one from each environment."""
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from functools import partial
 from typing import Any, Protocol
 
@@ -10,6 +9,7 @@ import gymnasium
 from rl_workbench.agents.pg.document import Episode, PolicyGradientAgent
 from rl_workbench.agents.pg.reinforce import ReinforceAgent
 from rl_workbench.training.environments.checked import BEGIN_STEP
+from rl_workbench.training.environments.several import close_all
 from rl_workbench.training.pg.episodes import play, play_all
 from rl_workbench.training.pg.generators import EpisodeGenerators, action_generator
 
@@ -129,6 +129,4 @@ class LocalEpisodes:
 
     def close(self) -> None:
         """See `EpisodeSource`."""
-        with ExitStack() as closing:  # all of them, also where one fails
-            for env in self._envs:
-                closing.callback(env.close)
+        close_all(self._envs)

@@ -16,7 +16,7 @@ import numpy as np
 
 from rl_workbench.training.environments.checked import CheckedEnvironment
 from rl_workbench.training.environments.making import make_environment
-from rl_workbench.training.environments.several import make_several
+from rl_workbench.training.environments.several import close_all, make_several
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.scalar_log import ScalarLog
 
@@ -201,10 +201,9 @@ def in_its_environments(
     Raises:
         WorkbenchError: if the environments can't be made, or don't suit.
     """
+    envs = training_environments(options)
     with contextlib.ExitStack() as making:
-        envs = training_environments(options)
-        for env in envs:
-            making.callback(env.close)
+        making.callback(close_all, envs)
         made = make(envs)
         making.pop_all()
     return made

@@ -1,7 +1,6 @@
 """Stable-Baselines3's vector environment over several that take their steps at the same time."""
 
 from collections.abc import Sequence
-from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from rl_workbench.training.environments.checked import BEGIN_STEP
+from rl_workbench.training.environments.several import close_all
 
 
 class SideBySide(DummyVecEnv):
@@ -31,10 +31,8 @@ class SideBySide(DummyVecEnv):
             begin(action)
 
     def close(self) -> None:
-        """Closes all environments, also where one fails."""
-        with ExitStack() as closing:
-            for env in self.envs:
-                closing.callback(env.close)
+        """Closes all environments."""
+        close_all(self.envs)
 
 
 def _itself(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
