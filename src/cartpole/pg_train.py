@@ -159,6 +159,10 @@ def _joined(
                 f"{flag(robots[0])} is of the robot: not with --env-id {run.env_id}"
             )
         return options
+    if robot.realtime and run.num_envs > 1:
+        raise WorkbenchError(
+            f"--realtime moves the robot of one simulator: num_envs is 1, not {run.num_envs}"
+        )
     environment = robot.environment
     if "backend" in run.training_environment and not (robot.backend or robot.realtime):
         del environment["backend"]  # it is what those get who name none

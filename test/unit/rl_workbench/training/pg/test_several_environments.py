@@ -2,12 +2,11 @@
 
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
 import pytest
-from learning_fakes import POLE, Died, OnlyOne, Pole, register_with
+from learning_fakes import POLE, Elsewhere, Fragile, OnlyOne, Pole, register_with
 from training_runs import (
     InterruptAfter,
     assert_no_doubles,
@@ -31,47 +30,6 @@ from rl_workbench.training.pg.generators import action_generator
 
 NOISY = {"env_id": POLE, "env_kwargs": {"noise": 0.05}}
 MANY = {**NOISY, "num_envs": 3, "batch_episodes": 2, "episodes": 14}
-
-
-class Elsewhere(Pole):
-    """Its steps take place elsewhere, as in a simulator: they are begun, then taken."""
-
-    calls: ClassVar[list[tuple[str, int]]] = []
-
-    def __init__(self, noise: float) -> None:
-        super().__init__(noise)
-        self._begun: Any = None
-
-    def reset(self, *, seed=None, options=None):
-        self._begun = None
-        return super().reset(seed=seed, options=options)
-
-    def begin_step(self, action):
-        assert self._begun is None
-        Elsewhere.calls.append(("begin", id(self)))
-        self._begun = action
-
-    def step(self, action):
-        assert self._begun in (None, action), "an evaluation begins none"
-        Elsewhere.calls.append(("step", id(self)))
-        self._begun = None
-        return super().step(action)
-
-
-class Fragile(Pole):
-    """The second one that was made dies, at its 40th step."""
-
-    made = 0
-
-    def __init__(self) -> None:
-        super().__init__(0.05)
-        self._is_second = Fragile.made == 1
-        Fragile.made += 1
-
-    def step(self, action):
-        if self._is_second and self._actions == 40:
-            raise Died("its simulator has ended")
-        return super().step(action)
 
 
 class Copied(OnlyOne):

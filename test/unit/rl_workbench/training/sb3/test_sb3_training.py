@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from learning_fakes import POLE, Elsewhere, Fragile, register_with
 from training_runs import (
     InterruptAfter,
     assert_no_doubles,
@@ -78,6 +79,27 @@ def test_of_several_environments_the_step_that_passes_a_multiple_counts(tmp_path
     train(tmp_path, "ppo", **options, eval_frequency=0, total_timesteps=180)
     steps = [int(path.stem[5:]) for path in sorted((tmp_path / "checkpoints").iterdir())]
     assert steps == [0, 72, 141, 180]
+
+
+def test_steps_are_begun_in_all_before_one_is_taken(tmp_path: Path, monkeypatch) -> None:
+    options = {"num_envs": 2, "env_kwargs": {"noise": 0.05}, "eval_frequency": 0}
+    plain = train(tmp_path / "plain", "ppo", **options, env_id=POLE)
+    env_id = register_with(monkeypatch, Elsewhere)
+    Elsewhere.calls.clear()
+    begun = train(tmp_path / "begun", "ppo", **options, env_id=env_id)
+    names = [name for name, _ in Elsewhere.calls]
+    assert names[:8] == ["begin", "begin", "step", "step"] * 2
+    assert_same(checkpoint(plain)["policy"], checkpoint(begun)["policy"])
+    alone = train(tmp_path / "alone", "ppo", env_id=env_id, env_kwargs={"noise": 0.05})
+    assert summary(alone)["complete"], "a single one takes its steps at once"
+
+
+def test_the_one_that_fails_is_named(tmp_path: Path, monkeypatch) -> None:
+    env_id = register_with(monkeypatch, Fragile)
+    monkeypatch.setattr(Fragile, "made", 0)
+    words = "^environment 2 of 3: its simulator has ended; .*what was learned is saved"
+    with pytest.raises(WorkbenchError, match=words):
+        train(tmp_path, "ppo", num_envs=3, env_id=env_id)
 
 
 def test_the_record_says_with_which_version(whole) -> None:
