@@ -89,7 +89,11 @@ def test_parameters_and_flags_over_them() -> None:
         (["--backend=bullet", "--realtime"], "not with --backend bullet"),
         (
             ["--num-envs=2", "--realtime"],
-            "--realtime moves the robot of one simulator: num_envs is",
+            "--realtime is of the robot of one simulator: num_envs is 1",
+        ),
+        (
+            ["--num-envs=2", "--rviz"],
+            "--rviz is of the robot of one simulator: num_envs is 1, not 2",
         ),
         (["--num-envs=2", "--algo=reinforce-document"], "learns in one environment: num_envs is 1"),
         (["--num-envs=0"], "num_envs lies between 1 and 1024, not 0"),
