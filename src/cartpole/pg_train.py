@@ -86,7 +86,7 @@ def main(argv: list[str] | None = None) -> int:
             def begin(folder: Path) -> None:
                 if needs_session(options):
                     beside.enter_context(session(options, name, argv, robot, folder))
-                else:
+                if not shows_itself(options):
                     beside.enter_context(shown(options, folder, PROGRAM))
 
             return _train(options, interrupt, begin)
@@ -144,6 +144,12 @@ def _joined(
 ) -> TrainingOptions:
     if robot.headless and options.showing.gui:
         raise WorkbenchError("--headless: not with --gui")
+    run = options.run
+    for key in ("realtime", "rviz"):
+        if getattr(robot, key) and run.num_envs > 1:
+            raise WorkbenchError(
+                f"--{key} is of the robot of one simulator: num_envs is 1, not {run.num_envs}"
+            )
     recorded = [key for key in given if key not in WINDOWS]
     if options.resume:
         if recorded:
@@ -151,7 +157,6 @@ def _joined(
                 f"a resumed training keeps its settings: --resume allows no {flag(recorded[0])}"
             )
         return options
-    run = options.run
     if not run.env_id.startswith(f"{NAMESPACE}/"):
         robots = [key for key in [*recorded, "rviz"] if getattr(robot, key) not in _ANYWHERE]
         if robots:
@@ -169,6 +174,14 @@ def needs_session(options: TrainingOptions) -> bool:
     """Whether a robot is trained that isn't in this process."""
     of_robot = options.run.env_id.startswith(f"{NAMESPACE}/")
     return of_robot and _backend(options) != "bullet"
+
+
+def shows_itself(options: TrainingOptions) -> bool:
+    """Whether the robot that is trained is seen in its simulator's window, not on a page beside the training.
+
+    Of several environments each has a simulator of its own; in the session's the policy is evaluated.
+    """
+    return needs_session(options) and options.run.num_envs == 1
 
 
 def _backend(options: TrainingOptions) -> str:
@@ -201,7 +214,7 @@ def session(
         name,
         argv,
         realtime=backend == "ros-realtime",
-        gui=options.showing.gui,
+        gui=options.showing.gui and shows_itself(options),
         seed=options.run.seed,
         rviz=robot.rviz,
         curves=folder,

@@ -12,6 +12,7 @@ from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.state.names import did_you_mean
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.backends.choice import OWN, make_backend
+from robot_envs.backends.side_by_side import side_by_side
 from robot_envs.checks import task_checks
 from robot_envs.checks.goals import aim, goal_space, with_goals
 from robot_envs.checks.spaces import action_reader, observation_reader
@@ -57,7 +58,8 @@ class RobotEnv(DrawnEnv):
     |                        | use them one after the other, and begin with a reset                |
     | `spec.nondeterministic` | the same seed and actions give other bits each time, as in real time |
 
-    Where the robot is shared, copies that are made with `own_robot_options` have their own.
+    Where the robot is shared, copies that are made with `own_robot_options` have their own; with
+    `side_by_side(count)` their simulators start, and end, at the same time.
 
     With a `GoalTask` it is a goal environment: observations are dicts, and it has `compute_reward`.
     `reset(options={...})` knows "initial_state", an `InitialState` in place of the task's, and for a
@@ -94,6 +96,8 @@ class RobotEnv(DrawnEnv):
             there is no display.
         ValueError: for an option that makes no sense.
     """
+
+    side_by_side = staticmethod(side_by_side)
 
     def __init__(
         self,

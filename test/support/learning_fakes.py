@@ -1,6 +1,7 @@
 """Small robots and environments to learn on in unit tests: quick, and all but one deterministic."""
 
 import random
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -106,6 +107,47 @@ class Pole(gymnasium.Env):
 
 POLE = "fakes/Pole-v0"
 gymnasium.register(POLE, Pole, max_episode_steps=3000, disable_env_checker=True)
+
+
+class Elsewhere(Pole):
+    """Its steps take place elsewhere, as in a simulator: they are begun, then taken."""
+
+    calls: ClassVar[list[tuple[str, int]]] = []
+
+    def __init__(self, noise: float) -> None:
+        super().__init__(noise)
+        self._begun: Any = None
+
+    def reset(self, *, seed=None, options=None):
+        self._begun = None
+        return super().reset(seed=seed, options=options)
+
+    def begin_step(self, action):
+        assert self._begun is None
+        Elsewhere.calls.append(("begin", id(self)))
+        self._begun = action
+
+    def step(self, action):
+        assert self._begun in (None, action), "an evaluation begins none"
+        Elsewhere.calls.append(("step", id(self)))
+        self._begun = None
+        return super().step(action)
+
+
+class Fragile(Pole):
+    """The second one that was made dies, at its 40th step."""
+
+    made = 0
+
+    def __init__(self) -> None:
+        super().__init__(0.05)
+        self._is_second = Fragile.made == 1
+        Fragile.made += 1
+
+    def step(self, action):
+        if self._is_second and self._actions == 40:
+            raise Died("its simulator has ended")
+        return super().step(action)
 
 
 def learned_lengths(agent: PolicyGradientAgent | ReinforceAgent, episodes: int) -> list[int]:

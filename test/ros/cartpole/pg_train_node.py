@@ -81,7 +81,8 @@ class PgTrain(unittest.TestCase):
         self.assertEqual(inside.processes(), {})
 
     def test_killed_and_resumed_the_weights_are_those_of_one_go(self):
-        flags = ("--start-noise=0.05", "--episodes=40", "--eval-episodes=1",
+        """With a simulator for each of two environments, and in this process."""
+        flags = ("--start-noise=0.05", "--episodes=40", "--eval-episodes=1", "--num-envs=2",
                  "--checkpoint-frequency=60")  # fmt: skip
         whole, killed = self.place(), self.place()
         self.trained(whole, *flags, "--backend=bullet")

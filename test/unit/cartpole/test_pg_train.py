@@ -87,6 +87,16 @@ def test_parameters_and_flags_over_them() -> None:
         (["--gui", "--headless"], "--headless: not with --gui"),
         (["--backend=bullet", "--rviz"], "not with --backend bullet"),
         (["--backend=bullet", "--realtime"], "not with --backend bullet"),
+        (
+            ["--num-envs=2", "--realtime"],
+            "--realtime is of the robot of one simulator: num_envs is 1",
+        ),
+        (
+            ["--num-envs=2", "--rviz"],
+            "--rviz is of the robot of one simulator: num_envs is 1, not 2",
+        ),
+        (["--num-envs=2", "--algo=reinforce-document"], "learns in one environment: num_envs is 1"),
+        (["--num-envs=0"], "num_envs lies between 1 and 1024, not 0"),
         (["--episods=5"], "unknown flag '--episods'; did you mean --episodes?"),
         (["--gamma=1.5"], "gamma lies between 0 and 1"),
         (["--algo=gae"], "the algorithm gae is called reinforce now"),

@@ -3,7 +3,16 @@
 from pathlib import Path
 
 import pytest
-from training_runs import InterruptAfter, assert_same_run, resume, rows, summary, train
+from training_runs import (
+    InterruptAfter,
+    assert_same,
+    assert_same_run,
+    checkpoint,
+    resume,
+    rows,
+    summary,
+    train,
+)
 
 import cartpole
 from cartpole.environment import CartPoleEnv
@@ -25,6 +34,35 @@ def test_it_resumes_exactly(tmp_path: Path, name: str) -> None:
     run = train(tmp_path / "run", name, InterruptAfter(137), **options(name))
     assert summary(run)["interrupted"]
     assert_same_run(whole, resume(run))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "length"),
+    [
+        ("reinforce", {"episodes": 8, "eval_frequency": 0}),
+        pytest.param(
+            "ppo",
+            {"total_timesteps": 256, "eval_frequency": 0},
+            marks=pytest.mark.extras("stable_baselines3"),
+        ),
+    ],
+)
+def test_in_two_simulators_it_comes_to_the_bits_of_two_worlds_here(
+    tmp_path: Path, name: str, length: dict[str, int]
+) -> None:
+    """Both are at work at the same time; policies are evaluated in this process."""
+    given = {"env_id": "cartpole/Balance-v0", "env_kwargs": {"noise": 0.02}, "num_envs": 2, **length,
+             "eval_env_kwargs": {"backend": "bullet"}}  # fmt: skip
+    places = {"bullet": {}, "ros-own": {"backend": "ros-own"}}
+    here, there = (
+        train(tmp_path / place, name, **given, train_env_kwargs=options)
+        for place, options in places.items()
+    )
+    for name in ("agent", "policy", "optimizers", "history", "environment"):
+        mine, other = (checkpoint(run).get(name) for run in (here, there))
+        assert_same(mine, other, name)
+    assert rows(here) == rows(there)
 
 
 @pytest.mark.parametrize("name", ["dqn", "reinforce"])

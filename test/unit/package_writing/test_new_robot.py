@@ -449,7 +449,7 @@ def test_its_options_are_those_of_trainings(new, algo, tmp_path):
     options = choose(algorithm(algo), flags)
     given = yaml.safe_load((folder / f"config/{algo}.yaml").read_text())
     assert options.run.total_timesteps == given["total_timesteps"]
-    assert options.hyperparameters.n_envs == 1, "over ROS there is one robot"
+    assert options.run.num_envs == 1
 
 
 def test_its_test_holds_for_a_task_that_takes_the_place_of_reach(new):

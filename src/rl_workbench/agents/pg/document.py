@@ -191,9 +191,13 @@ class PolicyGradientAgent(TwoNetworks):
         left = self.probability_of_zero(observation)
         return np.array([left, 1.0 - left])
 
-    def act(self, observation: np.ndarray) -> int:
+    def draw(self, observation: np.ndarray, generator: np.random.Generator) -> int:
         """Draws an action from the policy."""
-        return 0 if self.generator.random() < self.probability_of_zero(observation) else 1
+        return 0 if generator.random() < self.probability_of_zero(observation) else 1
+
+    def act(self, observation: np.ndarray) -> int:
+        """Draws one by the agent's own generator."""
+        return self.draw(observation, self.generator)
 
     def limited(self, action: int) -> int:
         """An action that was drawn, as the environment takes it: the same."""

@@ -57,6 +57,7 @@ class ReinforceAgent(TwoNetworks):
         scale: what an observation is divided by, of shape (D,).
         settings: the algorithm's options.
         actions: number of single actions, or the bounds of continuous ones.
+        environments: that episodes come from at the same time, each with its share of a batch.
     """
 
     def __init__(
@@ -65,6 +66,7 @@ class ReinforceAgent(TwoNetworks):
         scale: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
         settings: ReinforceSettings | None = None,
         actions: int | Bounds = 2,
+        environments: int = 1,
     ) -> None:
         self.settings = settings = settings or ReinforceSettings()
         with torch.random.fork_rng():
@@ -77,6 +79,7 @@ class ReinforceAgent(TwoNetworks):
         self._factors = 1.0 / np.asarray(scale, np.float32)  # (D,)
         self._normaliser = Normaliser(len(scale)) if settings.normalize_observations else None
         self._actions = actions
+        self._batch_size = settings.batch_episodes * environments
         self._batch: list[Episode] = []
         self._actor: Actor
         self.sync()
@@ -105,9 +108,13 @@ class ReinforceAgent(TwoNetworks):
         assert isinstance(self._actor, PairActor | SoftmaxActor)
         return self._actor.probabilities(observation)
 
-    def act(self, observation: np.ndarray) -> Any:
+    def draw(self, observation: np.ndarray, generator: np.random.Generator) -> Any:
         """Draws an action from the policy, to be learned from; `limited` is for the environment."""
-        return self._actor.draw(observation, self.generator)
+        return self._actor.draw(observation, generator)
+
+    def act(self, observation: np.ndarray) -> Any:
+        """Draws one by the agent's own generator."""
+        return self.draw(observation, self.generator)
 
     def limited(self, action: Any) -> Any:
         """An action that was drawn, as the environment takes it."""
@@ -128,8 +135,8 @@ class ReinforceAgent(TwoNetworks):
         spread = Spread(bounds.middle, bounds.half)
         return ClippedAction(nn.Sequential(outputs, spread), bounds.low, bounds.high)
 
-    def learn(self, episode: Episode) -> Losses | None:
-        """Takes an episode; the last one of a batch updates both networks.
+    def learn(self, *episodes: Episode) -> Losses | None:
+        """Takes an episode, or one of each environment; the last ones of a batch update both networks.
 
         Returns:
             The losses of the update, taken before it; None if the batch isn't full yet.
@@ -137,8 +144,8 @@ class ReinforceAgent(TwoNetworks):
         Raises:
             WorkbenchError: if a loss or a gradient isn't finite; the agent is as before then.
         """
-        batch = [*self._batch, episode]
-        if len(batch) < self.settings.batch_episodes:
+        batch = [*self._batch, *episodes]
+        if len(batch) < self._batch_size:
             self._batch = batch
             return None
         losses = self._update(batch)

@@ -12,15 +12,15 @@ from rl_workbench.training.environments.answers import as_vector, succeeded
 from rl_workbench.training.environments.making import discrete_actions
 from rl_workbench.training.environments.repeatable import RepeatableEnvironment
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.run.algorithm import Algorithm, Frame, Say, in_its_environment
+from rl_workbench.training.run.algorithm import Algorithm, Frame, Say, in_its_environments
 from rl_workbench.training.run.checkpoints import fitting
 from rl_workbench.training.run.policy import Policy
 
 
 def make(options: TrainingOptions) -> "DQNTraining":
     """A new training; see `make_algorithm`."""
-    return in_its_environment(
-        options, lambda env: DQNTraining(options, env, make_agent(options, env))
+    return in_its_environments(
+        options, lambda envs: DQNTraining(options, envs[0], make_agent(options, envs[0]))
     )
 
 

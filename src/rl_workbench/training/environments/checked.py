@@ -2,7 +2,7 @@
 
 import sysconfig
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from rl_workbench.errors import WorkbenchError
 
 LARGEST = float(np.finfo(np.float32).max)  # networks and replay know no larger number
 COMPUTE_REWARD = "compute_reward"  # method of an environment with a goal
+BEGIN_STEP = "begin_step"  # and of one whose step takes time elsewhere, as in a simulator
 # Where code isn't the user's.
 _LIBRARIES = (
     *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
@@ -39,7 +40,16 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def __init__(self, env: gymnasium.Env[Any, Any], env_id: str) -> None:
         super().__init__(env)
-        self._id = env_id
+        self._id, self._begin_step = env_id, _beginning(env)
+
+    def begin_step(self, action: Any) -> None:
+        """Has a step begin, where the environment can: the next `step`, by the same action, takes its answer.
+
+        Raises:
+            WorkbenchError: if the environment fails.
+        """
+        with self._running("begin_step"):
+            self._begin_step(action)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -174,6 +184,22 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     def _error(self, what: str, value: Any) -> WorkbenchError:
         text = " ".join(str(value).split())
         return WorkbenchError(f"the {what} of {self._id} isn't finite in float32: {text}")
+
+
+def _beginning(env: gymnasium.Env[Any, Any]) -> Callable[[Any], object]:
+    """What has a step of an environment begin.
+
+    That does nothing where the environment can't, as one in this process, or where a wrapper lies between
+    that may have its steps taken by other actions.
+    """
+    layer: Any = env
+    while isinstance(layer, gymnasium.Wrapper):
+        is_known = type(layer).__module__.startswith("gymnasium.")
+        if isinstance(layer, gymnasium.ActionWrapper) or not is_known:
+            return lambda action: None
+        layer = layer.env
+    begin: Callable[[Any], object] = getattr(layer, BEGIN_STEP, lambda action: None)
+    return begin
 
 
 def told(error: BaseException) -> str:

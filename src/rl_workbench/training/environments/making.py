@@ -27,7 +27,7 @@ _REFUSED = (gymnasium.error.Error, ImportError, TypeError, ValueError, LookupErr
 
 def make_environment(
     env_id: str, options: Mapping[str, Any] | None = None, *, keep_dict: bool = False
-) -> gymnasium.Env[Any, Any]:
+) -> CheckedEnvironment:
     """Makes an environment; its observations are vectors, flattened where they weren't.
 
     It refuses to go on with an observation or a reward that isn't finite.

@@ -12,7 +12,8 @@ import yaml
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.mappings import read_mapping
 
-RENAMED = {"algorithm": "algo", "stop_at": "stop_at_length"}  # options that earlier versions had
+# Options that earlier versions had.
+RENAMED = {"algorithm": "algo", "stop_at": "stop_at_length", "n_envs": "num_envs"}
 
 
 class Options:

@@ -27,6 +27,7 @@ class RunOptions:
     )
     eval_env_kwargs: dict[str, Any] = option({}, "on top of these, in evaluations")
     seed: int = option(0, "of weights, exploration, environment, evaluation", 0, 2**31 - 1)
+    num_envs: int = option(1, "environments that it learns in at the same time", 1, 1024)
     total_timesteps: int = option(0, "the training's length [steps]; 0: any", 0, LARGEST)
     episodes: int = option(
         0, "the training's length in episodes, if that comes first; 0: any", 0, LARGEST

@@ -18,6 +18,7 @@ from rl_workbench.training.options.showing import ShowingOptions
 
 # May be changed when resuming.
 EXTENDING = ("total_timesteps", "episodes", "stop_at_length", "stop_at_return", "device")
+RECORDED_AS = {"n_envs": "num_envs"}  # of trainings of earlier versions, which can be gone on with
 
 
 class TrainingOptions(NamedTuple):
@@ -59,7 +60,8 @@ def _flat(record: Any, origin: str) -> dict[str, Any]:
         raise WorkbenchError(f"{origin} isn't a training of this version")
     plain = json.loads(json.dumps(record))
     # Earlier records have some in both; the run's counts.
-    return {"algorithm": plain["algorithm"], **plain["hyperparameters"], **plain["run"]}
+    values = {"algorithm": plain["algorithm"], **plain["hyperparameters"], **plain["run"]}
+    return {RECORDED_AS.get(name, name): value for name, value in values.items()}
 
 
 def known_options(kind: AlgorithmKind) -> Options:
@@ -83,7 +85,11 @@ def make_options(
     options = known_options(kind)
     merged = until_the_steps({"exp_name": kind.name, **kind.defaults}, values)
     hyperparameters = options.make(kind.hyperparameters(), merged)
-    return TrainingOptions(kind, options.make(RunOptions, merged), hyperparameters, resume)
+    run = options.make(RunOptions, merged)
+    count = run.num_envs
+    if count > 1 and not kind.learns_in_several:
+        raise WorkbenchError(f"{kind.name} learns in one environment: num_envs is 1, not {count}")
+    return TrainingOptions(kind, run, hyperparameters, resume)
 
 
 def choose(

@@ -6,7 +6,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from rl_workbench.agents.pg.document import PolicyGradientAgent
+from rl_workbench.agents.pg.document import Episode, Losses, PolicyGradientAgent
 from rl_workbench.agents.pg.gaussian_policy import Bounds
 from rl_workbench.agents.pg.reinforce import ReinforceAgent
 from rl_workbench.agents.pg.settings import DocumentSettings
@@ -14,20 +14,22 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
 from rl_workbench.training.environments.making import discrete_actions, is_continuous
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.pg.episodes import EpisodeGenerators, run_episode
-from rl_workbench.training.run.algorithm import Algorithm, Frame, Say, in_its_environment
+from rl_workbench.training.pg.collecting import Agent, EpisodeSource, LocalEpisodes
+from rl_workbench.training.run.algorithm import Algorithm, Frame, Say, in_its_environments
 from rl_workbench.training.run.checkpoints import fitting
 from rl_workbench.training.run.files import save_tensors
 from rl_workbench.training.run.policy import Policy
 
-Agent = PolicyGradientAgent | ReinforceAgent
-
 
 def make(options: TrainingOptions) -> "PolicyGradientTraining":
     """A new training; see `make_algorithm`."""
-    return in_its_environment(
-        options, lambda env: PolicyGradientTraining(options, env, make_agent(options, env))
-    )
+
+    def learning_in(envs: list[gymnasium.Env[Any, Any]]) -> PolicyGradientTraining:
+        agent = make_agent(options, envs[0])
+        source = LocalEpisodes(envs, agent, options.run.seed)
+        return PolicyGradientTraining(options, envs[0], agent, source)
+
+    return in_its_environments(options, learning_in)
 
 
 def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
@@ -55,7 +57,8 @@ def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
             f"observation_scale has {len(settings.observation_scale)} numbers, the observations of "
             f"{run.env_id} {size}"
         )
-    return ReinforceAgent(run.seed, settings.observation_scale or (1.0,) * size, settings, actions)
+    scale = settings.observation_scale or (1.0,) * size
+    return ReinforceAgent(run.seed, scale, settings, actions, run.num_envs)
 
 
 def load_policy(
@@ -81,20 +84,24 @@ def load_policy(
 
 
 class PolicyGradientTraining(Algorithm):
-    """Runs episodes and learns from each; it can be saved between two of them.
+    """Runs episodes and learns from each, in rounds of one from each environment; saved between two rounds.
 
     Args:
         options: what the user chose.
-        env: is learned in.
+        env: of the kind that is learned in; evaluations take place there, where there is no other.
         agent: acts and learns.
+        source: of the episodes.
     """
 
     def __init__(
-        self, options: TrainingOptions, env: gymnasium.Env[Any, Any], agent: Agent
+        self,
+        options: TrainingOptions,
+        env: gymnasium.Env[Any, Any],
+        agent: Agent,
+        source: EpisodeSource,
     ) -> None:
-        self.env, self._agent = env, agent
-        self._seed, self._save_every = options.run.seed, options.hyperparameters.save_every
-        self._generators = EpisodeGenerators(env, agent.generator)
+        self.env, self._agent, self._source = env, agent, source
+        self._save_every = options.hyperparameters.save_every
         self._episodes = self._steps = self._stride = 0
 
     @property
@@ -104,7 +111,7 @@ class PolicyGradientTraining(Algorithm):
 
     @property
     def stride(self) -> int:
-        """The length of the last episode."""
+        """The lengths of the last round's episodes together."""
         return self._stride
 
     def act_greedily(self, observation: np.ndarray) -> Any:
@@ -113,30 +120,32 @@ class PolicyGradientTraining(Algorithm):
 
     def learn(self, frame: Frame) -> None:
         """See `Algorithm.learn`."""
-        self._generators.mark()
+        self._source.mark()
         while not frame.is_over():
-            episode = run_episode(
-                self.env, self._agent.act, frame.is_interrupted, self._agent.limited
-            )
-            if episode is None:
+            episodes = self._source.collect(frame.is_interrupted)
+            if episodes is None:
                 break
-            losses = self._agent.learn(episode)
-            self._steps += episode.length
-            self._stride = episode.length
-            by_episode = {"Reward": episode.total_reward}  # the tags of the existing script
-            by_step = {}
-            if losses is not None:
-                by_episode |= {"Value Loss": losses.value, "Policy Loss": losses.policy}
-                by_step = {"losses/value_loss": losses.value, "losses/policy_loss": losses.policy}
-            frame.log.add(self._episodes, by_episode)
-            frame.episode_done(
-                episode.total_reward, episode.length, by_step, success=episode.success
-            )
-            self._save_networks_if_due(frame.folder)
-            self._episodes += 1
-            self._generators.mark()
+            losses = self._agent.learn(*episodes)
+            self._stride = 0
+            for episode in episodes:
+                self._take_down(episode, losses if episode is episodes[-1] else None, frame)
+            self._source.mark()
             frame.step_done()
-        self._generators.rewind()
+        self._source.rewind()
+
+    def _take_down(self, episode: Episode, losses: Losses | None, frame: Frame) -> None:
+        """Of a round, the last episode has the losses: batches end with it."""
+        self._steps += episode.length
+        self._stride += episode.length
+        by_episode = {"Reward": episode.total_reward}  # the tags of the existing script
+        by_step = {}
+        if losses is not None:
+            by_episode |= {"Value Loss": losses.value, "Policy Loss": losses.policy}
+            by_step = {"losses/value_loss": losses.value, "losses/policy_loss": losses.policy}
+        frame.log.add(self._episodes, by_episode)
+        frame.episode_done(episode.total_reward, episode.length, by_step, success=episode.success)
+        self._save_networks_if_due(frame.folder)
+        self._episodes += 1
 
     def _save_networks_if_due(self, folder: Path) -> None:
         if self._save_every and self._episodes % self._save_every == 0:
@@ -152,8 +161,8 @@ class PolicyGradientTraining(Algorithm):
         self._save_networks(folder)
 
     def settle(self) -> bool:
-        """Takes back the draws of the episode that failed."""
-        self._generators.rewind()
+        """Takes back the draws of the round that failed."""
+        self._source.rewind()
         return True
 
     def state_dict(self) -> dict[str, Any]:
@@ -171,17 +180,21 @@ class PolicyGradientTraining(Algorithm):
             self._episodes, self._stride = whole(state["episodes"]), whole(state["stride"])
             self._steps = whole(state["steps"])
 
-    def environment_state(self) -> str:
-        """The state of the environment's generator; there is no episode under way."""
-        return self._generators.environment
+    def environment_state(self) -> Any:
+        """The states of the environments' generators; there is no episode under way."""
+        return self._source.state()
 
-    def start_environment(self, state: str | None, say: Say) -> None:
+    def start_environment(self, state: Any, say: Say) -> None:
         """See `Algorithm.start_environment`."""
-        self.env.reset(seed=self._seed)  # the episodes' own resets go on from here
+        self._source.seed()  # the episodes' own resets go on from here
         if state is not None:
-            self._generators.environment = state
-        self._generators.mark()
+            self._source.load_state(state)
+        self._source.mark()
 
-    def restore_environment(self, state: str, say: Say) -> None:
+    def restore_environment(self, state: Any, say: Say) -> None:
         """See `Algorithm.restore_environment`; the next episode begins with a reset anyway."""
-        self._generators.environment = state
+        self._source.load_state(state)
+
+    def close(self) -> None:
+        """Closes all environments."""
+        self._source.close()

@@ -4,6 +4,7 @@ The frame (`training.py`) opens and resumes, evaluates, saves, logs and tells. A
 what it is made of, what one step of its loop does, and what a checkpoint holds.
 """
 
+import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from importlib import import_module
@@ -13,8 +14,9 @@ from typing import Any, Protocol, TypeVar
 import gymnasium
 import numpy as np
 
-from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.environments.checked import CheckedEnvironment
 from rl_workbench.training.environments.making import make_environment
+from rl_workbench.training.environments.several import close_all, make_several
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.scalar_log import ScalarLog
 
@@ -162,7 +164,7 @@ class Algorithm(ABC):
         self.env.close()
 
 
-def environment_for(options: TrainingOptions, given: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
+def environment_for(options: TrainingOptions, given: Mapping[str, Any]) -> CheckedEnvironment:
     """An environment as a training's algorithm observes it.
 
     Args:
@@ -175,23 +177,36 @@ def environment_for(options: TrainingOptions, given: Mapping[str, Any]) -> gymna
     return make_environment(options.run.env_id, given, keep_dict=options.kind.keeps_dict)
 
 
+def training_environments(options: TrainingOptions) -> list[gymnasium.Env[Any, Any]]:
+    """The environments that a training learns in, `num_envs` of them, each with a robot of its own.
+
+    Raises:
+        WorkbenchError: as `make_several`.
+    """
+    run = options.run
+    return make_several(
+        lambda given: environment_for(options, given),
+        run.training_environment, run.env_id, run.num_envs,
+    )  # fmt: skip
+
+
 Made = TypeVar("Made", bound=Algorithm)
 
 
-def in_its_environment(
-    options: TrainingOptions, make: Callable[[gymnasium.Env[Any, Any]], Made]
+def in_its_environments(
+    options: TrainingOptions, make: Callable[[list[gymnasium.Env[Any, Any]]], Made]
 ) -> Made:
-    """An algorithm in a new environment, which is closed if it doesn't suit.
+    """An algorithm in new environments, which are closed if they don't suit.
 
     Raises:
-        WorkbenchError: if the environment can't be made, or doesn't suit.
+        WorkbenchError: if the environments can't be made, or don't suit.
     """
-    env = environment_for(options, options.run.training_environment)
-    try:
-        return make(env)
-    except WorkbenchError:
-        env.close()
-        raise
+    envs = training_environments(options)
+    with contextlib.ExitStack() as making:
+        making.callback(close_all, envs)
+        made = make(envs)
+        making.pop_all()
+    return made
 
 
 def make_algorithm(options: TrainingOptions) -> Algorithm:

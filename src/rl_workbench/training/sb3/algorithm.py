@@ -11,7 +11,6 @@ from gymnasium import spaces
 from stable_baselines3.common.logger import Logger
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.environments.making import shares_robot
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
 from rl_workbench.training.run.files import write_atomically
@@ -33,12 +32,7 @@ def make(options: TrainingOptions) -> "SB3Training":
         raise WorkbenchError(
             f"{options.kind.name} needs total_timesteps: its schedules depend on them"
         )
-    training = SB3Training(options, make_model(options))
-    envs = options.hyperparameters.n_envs
-    if shares_robot(training.env) and envs > 1:
-        training.close()
-        raise WorkbenchError(f"over ROS there is one robot: n_envs is 1, not {envs}")
-    return training
+    return SB3Training(options, make_model(options))
 
 
 class SB3Training(Algorithm):

@@ -20,6 +20,7 @@ def _kind(name: str) -> AlgorithmKind:
         implementation="rl_workbench.training.sb3.algorithm",
         hyperparameters=partial(options_class, name),
         keeps_dict=True,
+        learns_in_several=True,
         defaults={"env_id": env_id, "total_timesteps": 100_000},
         package=("stable_baselines3", "Stable-Baselines3"),
     )

@@ -12,8 +12,9 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.environments.checked import COMPUTE_REWARD, CheckedEnvironment
 from rl_workbench.training.environments.making import has_goal
 from rl_workbench.training.environments.repeatable import RepeatableEnvironment
+from rl_workbench.training.environments.several import NumberedEnvironment
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.run.algorithm import environment_for
+from rl_workbench.training.run.algorithm import training_environments
 from rl_workbench.training.sb3.options import (
     CLASSES,
     NETWORK,
@@ -60,14 +61,17 @@ def make_model(options: TrainingOptions, acts_in: gymnasium.Env[Any, Any] | None
     """
     from stable_baselines3.common.vec_env import DummyVecEnv
 
+    from rl_workbench.training.sb3.side_by_side import SideBySide
+
     name, run, settings = options.kind.name, options.run, options.hyperparameters
     own = settings.own
+    vector: DummyVecEnv
     if acts_in is None:
-        vector = DummyVecEnv([_maker(options)] * settings.n_envs)
+        vector = SideBySide([_watched(env) for env in training_environments(options)])
     else:
         vector = DummyVecEnv([lambda: acts_in])
         if name in ON_POLICY:  # of one environment as many steps as of all
-            own["n_steps"] *= settings.n_envs
+            own["n_steps"] *= run.num_envs
         else:
             own["buffer_size"] = 1  # nothing is learned, so nothing is kept
     try:
@@ -95,11 +99,12 @@ def make_model(options: TrainingOptions, acts_in: gymnasium.Env[Any, Any] | None
         raise WorkbenchError(f"{name} can't be made: {text}") from error
 
 
-def _maker(options: TrainingOptions) -> Callable[[], gymnasium.Env[Any, Any]]:
+def _watched(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
+    """An environment whose episodes are counted, and can be brought back."""
     from stable_baselines3.common.monitor import Monitor
 
-    given = options.run.training_environment
-    return lambda: Monitor(RepeatableEnvironment(environment_for(options, given)))
+    watched: gymnasium.Env[Any, Any] = Monitor(RepeatableEnvironment(env))
+    return watched
 
 
 def repeatable_of(vector: Any) -> RepeatableEnvironment:
@@ -109,10 +114,11 @@ def repeatable_of(vector: Any) -> RepeatableEnvironment:
 
 
 def checked_of(vector: Any) -> CheckedEnvironment:
-    """The same, below what remembers its episodes."""
+    """The same, below what remembers its episodes, and what numbers it."""
     env = repeatable_of(vector).env
-    assert isinstance(env, CheckedEnvironment)
-    return env
+    checked = env.env if isinstance(env, NumberedEnvironment) else env
+    assert isinstance(checked, CheckedEnvironment)
+    return checked
 
 
 def _hindsight(options: TrainingOptions, vector: Any) -> dict[str, Any]:

@@ -42,7 +42,6 @@ class SB3Options:
         WorkbenchError: if a value is beyond its limits, or none that a record can hold.
     """
 
-    n_envs: int = option(1, "environments that are stepped in turn", 1, 1024)
     lr_schedule: str = option(
         "constant", "linear: falls to 0 over total_timesteps", choices=("constant", "linear")
     )

@@ -20,7 +20,7 @@ OFF_POLICY = {"total_timesteps": 200, "learning_starts": 50, "buffer_size": 500,
 
 @pytest.fixture(scope="module")
 def ppo(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return workbench_runs.sb3(tmp_path_factory.mktemp("sb3") / "run", n_envs=2)
+    return workbench_runs.sb3(tmp_path_factory.mktemp("sb3") / "run", num_envs=2)
 
 
 def work(*arguments: object) -> int:
@@ -65,7 +65,7 @@ def test_the_policy_is_the_one_that_was_trained(ppo: Path) -> None:
 
 @pytest.mark.parametrize(
     ("algorithm", "options", "meaning"),
-    [("ppo", {"n_envs": 2}, "P(right) - P(left)"),
+    [("ppo", {"num_envs": 2}, "P(right) - P(left)"),
      ("dqn-sb3", OFF_POLICY | {"env_id": "CartPole-v1"}, "Q(right) - Q(left)")],
 )  # fmt: skip
 def test_a_choice_is_drawn_by_how_much_it_is_preferred(
@@ -90,7 +90,7 @@ def test_the_weights_of_another_run_are_refused(ppo: Path, tmp_path: Path, capsy
 
 
 def test_many_environments_of_training_are_one_when_playing(tmp_path: Path, recwarn) -> None:
-    run = workbench_runs.sb3(tmp_path / "run", n_envs=8, n_steps=1, batch_size=8)
+    run = workbench_runs.sb3(tmp_path / "run", num_envs=8, n_steps=1, batch_size=8)
     recwarn.clear()
     assert work("eval", run, "--episodes", 1) == 0
     assert not [each for each in recwarn if "mini-batch" in str(each.message)]

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.algorithms import algorithm
 from rl_workbench.training.cli import choose_training
 from rl_workbench.training.options.training_options import choose
 from rl_workbench.training.pg.kind import REINFORCE
@@ -34,6 +35,13 @@ def test_the_algorithms_flag_alone(capsys, flags: list[str]) -> None:
     with pytest.raises(SystemExit):
         choose_training(flags)
     assert "--algorithm is called --algo now" in capsys.readouterr().err
+
+
+@pytest.mark.extras("stable_baselines3")
+def test_several_environments(tmp_path: Path) -> None:
+    (tmp_path / "own.yaml").write_text("n_envs: 8\n")
+    with pytest.raises(WorkbenchError, match="the option n_envs is called num_envs now$"):
+        choose(algorithm("ppo"), [f"--config={tmp_path / 'own.yaml'}"])
 
 
 def test_names_that_are_only_wrong_are_told_by_the_nearest() -> None:

@@ -30,6 +30,19 @@ def test_a_record_of_something_else() -> None:
         recorded_options(content | {"algorithm": "pg"}, "here")
 
 
+@pytest.mark.extras("stable_baselines3")
+def test_a_record_of_environments_by_their_earlier_name() -> None:
+    options = small("ppo", num_envs=2)
+    content = options.record()
+    del content["run"]["num_envs"]
+    content["hyperparameters"]["n_envs"] = 2
+    assert recorded_options(content, "here") == options
+    options.check_same(content, "here")
+    content["hyperparameters"]["n_envs"] = 3
+    with pytest.raises(WorkbenchError, match="says num_envs 2, the checkpoint 3"):
+        options.check_same(content, "here")
+
+
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return train(tmp_path_factory.mktemp("done"), "reinforce", episodes=3)

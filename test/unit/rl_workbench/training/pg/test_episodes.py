@@ -8,7 +8,8 @@ import torch
 from learning_fakes import POLE
 
 from rl_workbench.agents.pg.reinforce import ReinforceAgent
-from rl_workbench.training.pg.episodes import EpisodeGenerators, run_episode
+from rl_workbench.training.pg.episodes import run_episode
+from rl_workbench.training.pg.generators import EpisodeGenerators
 
 
 def pole(**options: object) -> gymnasium.Env:
@@ -52,7 +53,7 @@ def test_what_was_drawn_is_taken_back() -> None:
 
     env, agent = pole(noise=0.05), ReinforceAgent(5)
     env.reset(seed=3)
-    generators = EpisodeGenerators(env, agent.generator)
+    generators = EpisodeGenerators([env], [agent.generator])
     generators.mark()
     first = draw()
     generators.rewind()
@@ -64,9 +65,9 @@ def test_what_was_drawn_is_taken_back() -> None:
 def test_an_environment_that_was_seeded_anew_comes_back_too() -> None:
     env, agent = pole(noise=0.05), ReinforceAgent(5)
     env.reset(seed=3)
-    generators = EpisodeGenerators(env, agent.generator)
-    state = generators.environment
+    generators = EpisodeGenerators([env], [agent.generator])
+    state = generators.state()
     wanted = env.reset()[0]
     env.reset(seed=4)
-    generators.environment = state
+    generators.load_state(state)
     assert np.array_equal(env.reset()[0], wanted)

@@ -238,8 +238,10 @@ def test_stable_baselines_moves_the_one_robot_and_learns_the_same(
 
 @pytest.mark.extras("stable_baselines3")
 def test_several_environments_would_move_the_one_robot(tmp_path: Path) -> None:
-    options = options_of("ppo", {"env_id": SHARED_REACH, "n_envs": 2})
-    with pytest.raises(WorkbenchError, match="there is one robot: n_envs is 1, not 2"):
+    options = options_of("ppo", {"env_id": SHARED_REACH, "num_envs": 2})
+    with pytest.raises(
+        WorkbenchError, match="a robot that there is only one of: num_envs is 1, not 2"
+    ):
         run(options, tmp_path)
 
 

@@ -68,7 +68,7 @@ def test_noise_of_actions_is_a_standard_deviation() -> None:
         (["--n-epochs=0"], "n_epochs is a whole number from 1 on, not 0"),
         (["--params", "gamma=["], "--params: gamma must be a YAML value, not '['"),
         (["--params", "use_sde=3"], "--params: use_sde must be true or false, not '3'"),
-        (["--n-envs=0"], "n_envs lies between 1 and 1024, not 0"),
+        (["--num-envs=0"], "num_envs lies between 1 and 1024, not 0"),
         (["--learning-rate=hello"], "ppo can't be made: "),
         (["--lr-schedule=linear", "--learning-rate=x"], "learning_rate is a number, not 'x'"),
         (["--net-arch=64,wide"], "net_arch is whole numbers, as in 64,64, not '64,wide'"),

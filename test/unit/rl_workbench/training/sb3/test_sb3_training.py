@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from learning_fakes import POLE, Elsewhere, Fragile, register_with
 from training_runs import (
     InterruptAfter,
     assert_no_doubles,
@@ -42,7 +43,7 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
     ("algorithm", "options"),
     [("td3", OFF_POLICY | CONTINUOUS), ("ddpg", OFF_POLICY | CONTINUOUS), ("dqn-sb3", OFF_POLICY),
      ("a2c", {"total_timesteps": 200, "n_steps": 16, "eval_frequency": 100}),
-     ("ppo", {"total_timesteps": 200, "n_steps": 50, "batch_size": 100, "n_envs": 2,
+     ("ppo", {"total_timesteps": 200, "n_steps": 50, "batch_size": 100, "num_envs": 2,
               "eval_frequency": 100})],
 )  # fmt: skip
 def test_every_algorithm_trains_and_its_policy_is_the_librarys(
@@ -74,10 +75,31 @@ def test_checkpoints_every_so_many_steps_and_the_newest_are_kept(tmp_path: Path)
 
 
 def test_of_several_environments_the_step_that_passes_a_multiple_counts(tmp_path: Path) -> None:
-    options = {"n_envs": 3, "n_steps": 20, "batch_size": 60, "keep_checkpoints": 0}
+    options = {"num_envs": 3, "n_steps": 20, "batch_size": 60, "keep_checkpoints": 0}
     train(tmp_path, "ppo", **options, eval_frequency=0, total_timesteps=180)
     steps = [int(path.stem[5:]) for path in sorted((tmp_path / "checkpoints").iterdir())]
     assert steps == [0, 72, 141, 180]
+
+
+def test_steps_are_begun_in_all_before_one_is_taken(tmp_path: Path, monkeypatch) -> None:
+    options = {"num_envs": 2, "env_kwargs": {"noise": 0.05}, "eval_frequency": 0}
+    plain = train(tmp_path / "plain", "ppo", **options, env_id=POLE)
+    env_id = register_with(monkeypatch, Elsewhere)
+    Elsewhere.calls.clear()
+    begun = train(tmp_path / "begun", "ppo", **options, env_id=env_id)
+    names = [name for name, _ in Elsewhere.calls]
+    assert names[:8] == ["begin", "begin", "step", "step"] * 2
+    assert_same(checkpoint(plain)["policy"], checkpoint(begun)["policy"])
+    alone = train(tmp_path / "alone", "ppo", env_id=env_id, env_kwargs={"noise": 0.05})
+    assert summary(alone)["complete"], "a single one takes its steps at once"
+
+
+def test_the_one_that_fails_is_named(tmp_path: Path, monkeypatch) -> None:
+    env_id = register_with(monkeypatch, Fragile)
+    monkeypatch.setattr(Fragile, "made", 0)
+    words = "^environment 2 of 3: its simulator has ended; .*what was learned is saved"
+    with pytest.raises(WorkbenchError, match=words):
+        train(tmp_path, "ppo", num_envs=3, env_id=env_id)
 
 
 def test_the_record_says_with_which_version(whole) -> None:
@@ -179,7 +201,7 @@ def test_a_loss_that_is_none() -> None:
 
 
 def test_many_environments_of_training_are_one_when_playing(tmp_path: Path, recwarn) -> None:
-    folder = train(tmp_path, "ppo", n_envs=8, n_steps=1, batch_size=8)
+    folder = train(tmp_path, "ppo", num_envs=8, n_steps=1, batch_size=8)
     recwarn.clear()
     content = torch.load(folder / "best.pt", weights_only=True)
     options = recorded_options(content["config"], "here")
