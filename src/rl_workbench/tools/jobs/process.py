@@ -52,6 +52,10 @@ class TrainingProcess:
         looking.register(self.descriptor, select.POLLIN)
         return bool(looking.poll(1000 * seconds))
 
+    def is_running(self) -> bool:
+        """Whether nobody has asked yet how it ended."""
+        return self._process.returncode is None
+
     def stop(self) -> None:
         """Has it save what it has and end."""
         self._is_stopped = True

@@ -26,6 +26,7 @@ QUIET = {
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
     "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
 }
+PATIENCE = 60.0  # [s] until every node has started a worker that answers
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -49,7 +50,7 @@ def joined(address: str, say: Callable[[str], None] = warn) -> Iterator[Cluster]
         ray = _started(stack) if address == LOCAL else _found(without_auto(address))
         stack.callback(ray.shutdown)
         cluster = Cluster(ray, say)
-        cluster.update()
+        cluster.update(PATIENCE)
         if not cluster.nodes:
             raise WorkbenchError(f"no node of the cluster at {address} can be used")
         yield cluster
