@@ -59,11 +59,12 @@ class Runner:
         self._again: deque[tuple[float, Job]] = deque()  # not before this time [s]
         self._losses: dict[Job, tuple[int, object]] = {}  # in a row, and the checkpoint at the last
 
-    def run(self, jobs: Iterable[Job], interrupt: Interrupt) -> None:
+    def run(self, jobs: Iterable[Job | None], interrupt: Interrupt) -> None:
         """Runs what isn't done yet; ends all if the user interrupts.
 
         Args:
             jobs: each is taken only when there is room for it, so they may depend on those that ended.
+                None: there is none at the moment, but will be after one that runs or has been lost.
 
         Raises:
             WorkbenchError: if a folder can't be written to.
@@ -79,7 +80,7 @@ class Runner:
             finally:
                 self._stop()
 
-    def _begin(self, waiting: Iterator[Job]) -> bool:
+    def _begin(self, waiting: Iterator[Job | None]) -> bool:
         """Begins as many as there is room for; returns whether none is left that waits."""
         while self._machines.free() > 0:
             job = self._next(waiting)
@@ -95,7 +96,7 @@ class Runner:
                 watch.began(job, node)
         return False
 
-    def _next(self, waiting: Iterator[Job]) -> Job | None:
+    def _next(self, waiting: Iterator[Job | None]) -> Job | None:
         now = time.monotonic()
         for due, job in self._again:
             if due <= now:

@@ -15,7 +15,7 @@ from rl_workbench.training.run.interrupt import Interrupt
 def run_jobs(
     machines: Machines,
     folder: Path,
-    jobs: Iterable[Job],
+    jobs: Iterable[Job | None],
     interrupt: Interrupt,
     known: Sequence[Job] = (),
     watches: Sequence[Watch] = (),
