@@ -118,15 +118,12 @@ class Search(Watch):
         ]
         return _Begun(trial, jobs, Evaluations(jobs[0].folder, self._frequency(trial.values)))
 
-    def progressed(self, job: Job, node: str) -> None:
+    def is_unwanted(self, job: Job) -> bool:
         """See Watch."""
         begun = self._begun[job]
         if job == begun.jobs[0]:
-            begun.look()
-
-    def is_unwanted(self, job: Job) -> bool:
-        """See Watch."""
-        return self._begun[job].is_decided
+            begun.look()  # where folders are shared nobody tells that they have changed
+        return begun.is_decided
 
     def skipped(self, job: Job) -> None:
         """See Watch."""
