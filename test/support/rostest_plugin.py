@@ -38,8 +38,6 @@ class RostestFile(pytest.File):
 
     def collect(self) -> Iterator[pytest.Item]:
         item = RostestItem.from_parent(self, name=self.path.stem)
-        # One after the other on one of pytest-xdist's workers: each starts several processes.
-        item.add_marker(pytest.mark.xdist_group("ros"))
         item.add_marker(pytest.mark.rostest)
         yield item
 

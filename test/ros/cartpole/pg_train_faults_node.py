@@ -44,9 +44,12 @@ class PgTrainFaults(unittest.TestCase):
         self.assertIsNotNone(self.assert_saved(place)["failure"])
         self.assertEqual(place.left_after(), {})
 
-    def test_ctrl_c_saves(self):
+    def test_a_second_one_at_the_same_master_is_refused_and_ctrl_c_saves_the_first(self):
         place = self.place()
         training = self.training(place)
+        second = place.start("rosrun", "cartpole", "pg_train.py", "--episodes=1")
+        self.assertEqual(second.end(), 1, second.output)
+        self.assertIn("runs at", second.output)
         training.interrupt()
         self.assertEqual(training.end(), 130, training.output)
         self.assertNotIn("Traceback", training.output)
@@ -128,16 +131,6 @@ class PgTrainFaults(unittest.TestCase):
         self.assertIn(reason, training.output)
         self.assertNotIn("Traceback", training.output)
         self.assertFalse(place.run.exists())
-
-    def test_a_second_training_at_the_same_master_is_refused(self):
-        place = self.place()
-        first = self.training(place)
-        second = place.start("rosrun", "cartpole", "pg_train.py", "--episodes=1")
-        self.assertEqual(second.end(), 1, second.output)
-        self.assertIn("runs at", second.output)
-        first.interrupt()
-        self.assertEqual(first.end(), 130, first.output)
-        self.assert_saved(place)
 
 
 if __name__ == "__main__":

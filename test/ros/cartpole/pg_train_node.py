@@ -42,9 +42,6 @@ class PgTrain(unittest.TestCase):
         self.assertNotIn("Traceback", training.output)
         return training.output
 
-    def weights(self, place: Place) -> torch.Tensor:
-        return torch.load(place.run / "policy_network.pth", weights_only=True)["fc.weight"]
-
     def test_from_nothing(self):
         place = self.place()
         output = self.trained(place, "--episodes=5", "--seed=1", "--save-every=4", "--gui")
@@ -61,31 +58,30 @@ class PgTrain(unittest.TestCase):
         self.assertEqual(set(log.Tags()["scalars"]), TAGS)
         self.assertEqual([point.step for point in log.Scalars("Reward")], [0, 1, 2, 3, 4])
 
-    def test_same_seed_same_weights(self):
-        first, second = self.place(), self.place()
-        for place in (first, second):
-            self.trained(place, "--episodes=8", "--seed=3")
-        self.assertTrue(torch.equal(self.weights(first), self.weights(second)))
+    def assert_same_weights(self, one, other):
+        for name in NETWORKS:
+            ours, theirs = (
+                torch.load(place.run / name, weights_only=True) for place in (one, other)
+            )
+            self.assertEqual(ours.keys(), theirs.keys())
+            self.assertTrue(all(torch.equal(ours[key], theirs[key]) for key in ours), name)
 
     def test_in_this_process_the_weights_are_those_over_ros(self):
         over_ros, inside = self.place(), self.place()
         flags = ("--episodes=8", "--seed=4", "--start-noise=0.05")
         self.trained(over_ros, *flags)
         self.trained(inside, *flags, "--backend=bullet")
-        for name in NETWORKS:
-            ours, theirs = (
-                torch.load(place.run / name, weights_only=True) for place in (inside, over_ros)
-            )
-            self.assertEqual(ours.keys(), theirs.keys())
-            self.assertTrue(all(torch.equal(ours[key], theirs[key]) for key in ours), name)
+        self.assert_same_weights(over_ros, inside)
         self.assertEqual(inside.processes(), {})
 
-    def test_killed_and_resumed_the_weights_are_those_of_one_go(self):
-        """With a simulator for each of two environments, and in this process."""
-        flags = ("--start-noise=0.05", "--episodes=40", "--eval-episodes=1", "--num-envs=2",
+    def test_over_ros_killed_and_resumed_the_weights_are_those_of_one_go_in_this_process(self):
+        """With a simulator for each of two environments: the same seed gives the same weights, whatever
+        moves the robots."""
+        flags = ("--start-noise=0.05", "--episodes=40", "--eval-episodes=1", "--num-envs=2", "--seed=4",
                  "--checkpoint-frequency=60")  # fmt: skip
-        whole, killed = self.place(), self.place()
-        self.trained(whole, *flags, "--backend=bullet")
+        inside, killed = self.place(), self.place()
+        self.trained(inside, *flags, "--backend=bullet")
+        self.assertEqual(inside.processes(), {})
         training = killed.train(*flags)
         training.wait_for("Episode   20 |")
         for pid in killed.processes():
@@ -95,7 +91,7 @@ class PgTrain(unittest.TestCase):
         resumed = killed.start("rosrun", "cartpole", "pg_train.py", f"--resume={killed.run}")
         self.assertEqual(resumed.end(), 0, resumed.output)
         self.assertIn("going on at step", resumed.output)
-        self.assertTrue(torch.equal(self.weights(whole), self.weights(killed)))
+        self.assert_same_weights(inside, killed)
         self.assertEqual(killed.left_after(), {})
 
     def test_another_environment_needs_no_master_and_starts_none(self):

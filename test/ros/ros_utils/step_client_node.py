@@ -36,54 +36,78 @@ def positions(response):
     return dict(zip(response.joint_states.name, response.joint_states.position, strict=True))
 
 
-class StepClientTest(unittest.TestCase):
-    def simulate(self, **arguments):
-        simulation = Simulation(lockstep=True, **arguments)
-        self.addCleanup(simulation.close)
-        return simulation
-
+class Clients(unittest.TestCase):
     def client(self, **arguments):
         client = StepClient(**arguments)
         self.addCleanup(client.close)
         return client
 
+
+class OneRobot(Clients):
+    """All in one simulator, at time zero."""
+
+    @classmethod
+    def setUpClass(cls):
+        simulation = Simulation(lockstep=True)
+        cls.addClassCleanup(simulation.close)
+        cls.enterClassContext(simulation.active())
+        add_cartpole()
+
+    def setUp(self):
+        self.assertEqual(self.client().reset(everything=True).sim_time, 0.0)
+
     def test_an_episode(self):
-        with self.simulate().active():
-            add_cartpole()
-            client = self.client()
-            runs = []
-            for _ in range(2):
-                first = client.reset({"cart_pole": 0.1, "stand_cart": 0.05}, {"cart_pole": -0.5})
-                self.assertEqual(first.joint_states.position, (0.1, 0.05))
-                self.assertEqual(first.joint_states.velocity, (-0.5, 0.0))
-                runs.append(
-                    [client.step(8, {CART: 0.02 * n}).joint_states.position for n in range(20)]
-                )
-            self.assertEqual(runs[0], runs[1])
-            self.assertEqual(client.reset(everything=True).sim_time, 0.0)
-            self.assertEqual(
-                client.step(8, model_states=True).model_names, ["ground_plane", "cartpole"]
+        client = self.client()
+        runs = []
+        for _ in range(2):
+            first = client.reset({"cart_pole": 0.1, "stand_cart": 0.05}, {"cart_pole": -0.5})
+            self.assertEqual(first.joint_states.position, (0.1, 0.05))
+            self.assertEqual(first.joint_states.velocity, (-0.5, 0.0))
+            runs.append(
+                [client.step(8, {CART: 0.02 * n}).joint_states.position for n in range(20)]
             )
+        self.assertEqual(runs[0], runs[1])
+        self.assertEqual(client.reset(everything=True).sim_time, 0.0)
+        self.assertEqual(
+            client.step(8, model_states=True).model_names, ["ground_plane", "cartpole"]
+        )
 
     def test_what_is_refused(self):
-        with self.simulate().active():
-            add_cartpole()
-            client = self.client()
-            for call in (
-                lambda: client.step(0),
-                lambda: client.step(-1),
-                lambda: client.step(1, {"nobody": 1.0}),
-                lambda: client.step(1, {CART: float("nan")}),
-                lambda: client.step(1, {CART: [0.1, 0.2]}),
-                lambda: client.reset({"elbow": 0.0}),
-                lambda: client.reset({"cart_pole": float("inf")}),
-                lambda: client.reset({}, {"cart_pole": 1.0}),
-            ):
-                with self.assertRaises(StepRefused):
-                    call()
-            with self.assertRaises(ServiceFailed):
-                client.step("many")
-            self.assertEqual(client.step(1).sim_time, 0.001)
+        client = self.client()
+        for call in (
+            lambda: client.step(0),
+            lambda: client.step(-1),
+            lambda: client.step(1, {"nobody": 1.0}),
+            lambda: client.step(1, {CART: float("nan")}),
+            lambda: client.step(1, {CART: [0.1, 0.2]}),
+            lambda: client.reset({"elbow": 0.0}),
+            lambda: client.reset({"cart_pole": float("inf")}),
+            lambda: client.reset({}, {"cart_pole": 1.0}),
+        ):
+            with self.assertRaises(StepRefused):
+                call()
+        with self.assertRaises(ServiceFailed):
+            client.step("many")
+        self.assertEqual(client.step(1).sim_time, 0.001)
+
+    def test_a_long_step_is_given_its_time(self):
+        client = self.client(timeout=0.2)
+        begin = time.monotonic()
+        self.assertAlmostEqual(client.step(100_000).sim_time, 100.0, places=6)
+        self.assertGreater(time.monotonic() - begin, 0.4)
+
+    def test_the_world_survives_a_client_that_goes_in_the_middle(self):
+        gone = self.client()
+        gone.step(100, {CART: 0.1})
+        gone.close()
+        self.assertAlmostEqual(self.client().step(1).sim_time, 0.101, places=9)
+
+
+class OwnSimulators(Clients):
+    def simulate(self, **arguments):
+        simulation = Simulation(lockstep=True, **arguments)
+        self.addCleanup(simulation.close)
+        return simulation
 
     def test_several_robots_have_full_names(self):
         with self.simulate().active():
@@ -101,38 +125,20 @@ class StepClientTest(unittest.TestCase):
             self.assertGreater(found["left::stand_cart"], 0.05)
 
     def test_a_restarted_simulator_is_found_again(self):
+        """By a reset: the first one after a step that failed, the second one without an error before."""
         port = reserved_port()
         client = None
-        for _ in range(2):
-            simulation = self.simulate(port=port)
-            with simulation.active():
-                add_cartpole()
-                if client is None:
-                    client = self.client()
-                self.assertEqual(client.reset({"cart_pole": 0.1}).joint_states.position[0], 0.1)
-                client.step(8, {CART: 0.1})
-                simulation.close()
-                with self.assertRaises(ServiceGone):
-                    client.step(8, {CART: 0.1})
-
-    def test_a_reset_goes_to_the_restarted_simulator_without_an_error(self):
-        port = reserved_port()
-        client = None
-        for angle in (0.1, 0.2):
+        for angle in (0.1, 0.2, 0.3):
             simulation = self.simulate(port=port)
             with simulation.active():
                 add_cartpole()
                 client = client or self.client()
                 self.assertEqual(client.reset({"cart_pole": angle}).joint_states.position[0], angle)
-            simulation.close()
-
-    def test_a_long_step_is_given_its_time(self):
-        with self.simulate().active():
-            add_cartpole()
-            client = self.client(timeout=0.2)
-            begin = time.monotonic()
-            self.assertAlmostEqual(client.step(100_000).sim_time, 100.0, places=6)
-            self.assertGreater(time.monotonic() - begin, 0.4)
+                client.step(8, {CART: 0.1})
+                simulation.close()
+                if angle == 0.1:
+                    with self.assertRaises(ServiceGone):
+                        client.step(8, {CART: 0.1})
 
     def test_a_simulator_that_hangs_is_an_error_in_time(self):
         simulation = self.simulate()
@@ -146,15 +152,6 @@ class StepClientTest(unittest.TestCase):
             with self.assertRaisesRegex(ServiceHangs, r"within 1(\.\d+)? s"):
                 client.step(1)
 
-    def test_the_world_survives_a_client_that_goes_in_the_middle(self):
-        with self.simulate().active():
-            add_cartpole()
-            gone = self.client()
-            gone.step(100, {CART: 0.1})
-            gone.close()
-            client = self.client()
-            self.assertAlmostEqual(client.step(1).sim_time, 0.101, places=9)
-
 
 def simulator_process(master_uri):
     """Process id of the simulator under a master."""
@@ -163,4 +160,4 @@ def simulator_process(master_uri):
 
 
 if __name__ == "__main__":
-    rostest.rosrun("cartpole", "step_client", StepClientTest)
+    rostest.rosrun("cartpole", "step_client", "__main__")

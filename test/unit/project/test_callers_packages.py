@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-# Built once: the tests of a group run in one process.
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("callers_packages")]
+pytestmark = pytest.mark.slow
 PACKAGE = """<package format="2"><name>{name}</name><version>9.9.9</version><description>d</description>
 <maintainer email="a@example.com">a</maintainer><license>BSD</license>
 <buildtool_depend>catkin</buildtool_depend><build_depend>message_generation</build_depend></package>"""

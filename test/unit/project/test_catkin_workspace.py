@@ -14,8 +14,7 @@ from pathlib import Path
 
 import pytest
 
-# Built once: the tests of a group run in one process.
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("catkin")]
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = ROOT / "docs/catkin.md"
 NOT_FOR_CATKIN = {"ca-certificates", "catkin-lint", "procps", "shellcheck"}  # ws's own tools

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheel")]  # built once
+pytestmark = pytest.mark.slow
 
 SOURCES = ("src", "config", "urdf", "companions", "requirements")
 ROS = ("rospy", "roslib", "rosgraph", "rospkg", "catkin_pkg", "gazebo_msgs", "bullet_gazebo_msgs")

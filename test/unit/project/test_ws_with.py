@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-# What one test has built is there for the next.
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("ws_with")]
+pytestmark = pytest.mark.slow  # what one test has built is there for the next
 XML = """<package format="2"><name>{name}</name><version>0.0.1</version><description>d</description>
 <maintainer email="a@example.com">a</maintainer><license>BSD</license>
 <buildtool_depend>catkin</buildtool_depend>{depends}</package>"""

@@ -101,7 +101,7 @@ def check_package(variant: Variant) -> None:
     """
     kind = algorithm(variant.algorithm)
     if kind.package:
-        choose(kind, arguments(variant, 0, Path("run"))[2:])
+        choose(kind, arguments(variant, 0)[2:])
 
 
 def _without_special(name: str, options: dict[str, Any]) -> dict[str, Any]:
@@ -110,11 +110,13 @@ def _without_special(name: str, options: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in options.items() if key not in special}
 
 
-def arguments(variant: Variant, seed: int, folder: Path) -> list[str]:
-    """What `workbench.py train` is told for one run."""
+def arguments(variant: Variant, seed: int) -> list[str]:
+    """What `workbench.py train` is told for one run, but for its folder."""
     rest = _without_special(variant.algorithm, variant.options)
     special = {key: value for key, value in variant.options.items() if key not in rest}
-    own = {"run_dir": folder, "exp_name": variant.name, "seed": seed, **special}
+    if "config" in special:  # another machine's folders aren't this one's
+        special["config"] = Path(special["config"]).resolve()
+    own = {"exp_name": variant.name, "seed": seed, **special}
     flags = [f"--{key.replace('_', '-')}={value}" for key, value in own.items()]
     pairs = [f"{key}={_text(value)}" for key, value in rest.items()]
     return ["--algo", variant.algorithm, *flags, *(["--params", *pairs] if pairs else [])]

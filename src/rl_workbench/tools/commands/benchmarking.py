@@ -5,9 +5,10 @@ import datetime
 import json
 import os
 import platform
-from dataclasses import asdict
+from collections.abc import Iterable
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from file_reading.content import open_text
 from rl_workbench.curves import evaluation_curves, seed_curves
@@ -18,12 +19,16 @@ from rl_workbench.tools.benchmark.results import RunResult, examine
 from rl_workbench.tools.benchmark.suites import (
     SEEDS,
     Suite,
+    Variant,
+    arguments as flags_of,
     check_package,
     make_variant,
     read_suite,
 )
-from rl_workbench.tools.benchmark.trainings import Job, Trainings
+from rl_workbench.tools.commands.machines import add_job_flags, machines_for
 from rl_workbench.tools.commands.shared import number, write_figure
+from rl_workbench.tools.jobs.job import Job
+from rl_workbench.tools.jobs.running import run_jobs
 from rl_workbench.tools.pictures.panels import seed_panels, variant_panels
 from rl_workbench.tools.runs.runs import Run, open_run
 from rl_workbench.training.algorithms import ALGORITHMS
@@ -35,6 +40,14 @@ from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell, warn
 
 RECORD = "suite.json"
+
+
+class _Planned(NamedTuple):
+    """A training of the benchmark."""
+
+    variant: str
+    seed: int
+    job: Job
 
 
 class _Hint(argparse.Action):
@@ -56,8 +69,7 @@ def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
     add("--params", nargs="+", default=[], metavar="KEY=VALUE", help="options of the training")
     add("--seeds", type=number(1), metavar="N", help=f"how many (the suite's, or {SEEDS})")
     add("--first-seed", type=number(0), default=0, metavar="N", help="default 0")
-    add("--jobs", type=number(1), default=1, metavar="N",
-        help="trainings at a time, each on one core (default 1)")  # fmt: skip
+    add_job_flags(parser)
     add("--episodes", type=number(1), default=100, metavar="N",
         help="unseen greedy episodes for each policy's figure (default 100)")  # fmt: skip
     add("--out", type=Path, metavar="FOLDER",
@@ -68,7 +80,7 @@ def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Trains what isn't trained yet, then writes results.md, results.json and two pictures.
+    """Trains what isn't trained yet, then writes results.md, costs.md, results.json and two pictures.
 
     Raises:
         WorkbenchError: if a name is unknown, the folder holds another benchmark or one runs in
@@ -79,20 +91,29 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         check_package(variant)
     folder = (arguments.out or Path("runs/benchmark") / suite.name).resolve()
     seeds = range(arguments.first_seed, arguments.first_seed + (arguments.seeds or suite.seeds))
-    _claim(folder, suite)
-    jobs = [
-        Job(variant, seed, folder / variant.name / f"seed_{seed}")
-        for variant in suite.variants
-        for seed in seeds
-    ]
-    with run_folder.held(folder):
-        interrupt.defer()
-        Trainings(tell, arguments.program).run(jobs, arguments.jobs, interrupt)
+    _make(folder)
+    with run_folder.held(folder, "another benchmark"):
+        _claim(folder, suite)
+        planned = [
+            _Planned(variant.name, seed, _job(variant, seed, folder))
+            for variant in suite.variants
+            for seed in seeds
+        ]
+        jobs = [each.job for each in planned]
+        with machines_for(arguments, folder, interrupt) as machines:
+            interrupt.defer()
+            run_jobs(machines, folder, jobs, interrupt, known=jobs)
+            where = machines.about()
         if interrupt.requested():
             tell("interrupted; the same command goes on")
             return
         interrupt.at_once()  # what follows takes minutes, and can be made again
-        _report(folder, suite, jobs, arguments)
+        _report(folder, suite, planned, arguments, where)
+
+
+def _job(variant: Variant, seed: int, folder: Path) -> Job:
+    place = folder / variant.name / f"seed_{seed}"
+    return Job(f"{variant.name}, seed {seed}", place, tuple(flags_of(variant, seed)))
 
 
 def _suite(arguments: argparse.Namespace) -> Suite:
@@ -114,6 +135,13 @@ def _suite(arguments: argparse.Namespace) -> Suite:
     return Suite(name, "", SEEDS, (make_variant("--params", name, options),))
 
 
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WorkbenchError(f"can't make {folder}: {error.strerror}") from error
+
+
 def _claim(folder: Path, suite: Suite) -> None:
     """Notes what the folder's runs are, or checks that they are the same."""
     path, wanted = folder / RECORD, [asdict(variant) for variant in suite.variants]
@@ -131,17 +159,26 @@ def _claim(folder: Path, suite: Suite) -> None:
         raise WorkbenchError(f"{folder} holds runs with other options; name another folder")
 
 
-def _report(folder: Path, suite: Suite, jobs: list[Job], arguments: argparse.Namespace) -> None:
-    runs, results = _examine(jobs, arguments.episodes)
+def _report(
+    folder: Path, suite: Suite, planned: list[_Planned], arguments: argparse.Namespace, where: str
+) -> None:
+    runs, results = _examine(planned, arguments.episodes)
+    # The same table wherever the folder lies.
+    results = [replace(each, fault=each.fault.replace(f"{folder}/", "")) for each in results]
     if all(each.steps is None for each in results):
-        raise WorkbenchError(f"no training came to anything; see {jobs[0].log}")
+        raise WorkbenchError(f"no training came to anything; see {planned[0].job.log}")
     thresholds = {run.experiment: threshold(run.env_id) for run in runs}
-    summary = tables.summary_table(tables.grouped(results), tables.BENCHMARK_SUMMARY, thresholds)
-    every = tables.table(results, tables.BENCHMARK)
-    about = _machine(arguments, set(thresholds.values()))
+    groups = tables.grouped(results)
+    summary = tables.summary_table(groups, tables.RESULTS_SUMMARY, thresholds)
+    every = tables.table(results, tables.RESULTS)
+    about = _measured(arguments.episodes, thresholds.values())
     text = f"# {suite.name}\n\n{suite.about}\n\n{about}\n\n{summary}\n\n{every}\n"
     write_file(folder / "results.md", as_text(text))
-    write_file(folder / "results.json", as_json(_content(results, arguments)))
+    costs = tables.summary_table(groups, tables.COSTS_SUMMARY)
+    costs += f"\n\n{tables.table(results, tables.COSTS)}"
+    text = f"# {suite.name}: what it took\n\n{_machine(where)}\n\n{costs}\n"
+    write_file(folder / "costs.md", as_text(text))
+    write_file(folder / "results.json", as_json(_content(results, arguments, where)))
     for name, panels, draw in (
         ("curves.png", seed_panels, seed_curves),
         ("evaluations.png", variant_panels, evaluation_curves),
@@ -152,37 +189,43 @@ def _report(folder: Path, suite: Suite, jobs: list[Job], arguments: argparse.Nam
             warn(f"no {name}: {error}")
         else:
             write_figure(folder / name, figure)
-    tell(f"{every}\n\n{summary}\n\ntables, figures and curves lie in {folder}")
+    tell(f"{every}\n\n{summary}\n\n{costs}\n\ntables, figures and curves lie in {folder}")
 
 
-def _examine(jobs: list[Job], episodes: int) -> tuple[list[Run], list[RunResult]]:
-    """The runs whose record can be read, and a row of figures for every job."""
+def _examine(planned: list[_Planned], episodes: int) -> tuple[list[Run], list[RunResult]]:
+    """The runs whose record can be read, and a row of figures for every one that was planned."""
     runs, results = [], []
-    for job in jobs:
-        name = job.variant.name
+    for name, seed, job in planned:
         try:
             runs.append(open_run(job.folder))
         except WorkbenchError as error:
-            results.append(RunResult(name, job.seed, job.folder.name, fault=str(error)))
+            results.append(RunResult(name, seed, job.folder.name, fault=str(error)))
         else:
             results.append(examine(runs[-1], name, episodes, warn, also_last=True))
     return runs, results
 
 
-def _machine(arguments: argparse.Namespace, thresholds: set[float | None]) -> str:
-    about = f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
-    solved = "".join(f" Solved: {line:g}." for line in thresholds if line is not None)
+def _measured(episodes: int, thresholds: Iterable[float | None]) -> str:
+    """How, without anything that depends on when or where."""
+    lines = sorted({line for line in thresholds if line is not None})
+    solved = "".join(f" Solved: {line:g}." for line in lines)
     return (
-        f"{datetime.date.today().isoformat()}, {about}, {arguments.jobs} at a time. Best and final: "
-        f"mean return of {arguments.episodes} greedy episodes that nothing was chosen by.{solved}"
+        f"Best and final: mean return of {episodes} greedy episodes that nothing was chosen by.{solved}"
     )
 
 
-def _content(results: list[RunResult], arguments: argparse.Namespace) -> dict[str, Any]:
+def _machine(where: str) -> str:
+    about = f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
+    return f"{datetime.date.today().isoformat()}, {about}, {where}."
+
+
+def _content(
+    results: list[RunResult], arguments: argparse.Namespace, where: str
+) -> dict[str, Any]:
     return {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "versions": run_folder.versions(),
         "episodes": arguments.episodes,
-        "jobs": arguments.jobs,
-        "runs": tables.rows(results, tables.BENCHMARK),
+        "where": where,
+        "runs": tables.rows(results, {**tables.RESULTS, **tables.COSTS}),
     }

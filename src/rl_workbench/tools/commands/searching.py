@@ -1,20 +1,32 @@
 """sweep: many trainings, in search of options."""
 
 import argparse
+import json
 import time
 from pathlib import Path
 from typing import Any
 
+from file_reading.content import open_text
 from rl_workbench.env_ids import as_file_name
+from rl_workbench.errors import WorkbenchError
 from rl_workbench.extras import need
+from rl_workbench.tools.commands.machines import add_job_flags, machines_for
 from rl_workbench.tools.commands.shared import number
+from rl_workbench.tools.jobs.running import run_jobs
 from rl_workbench.tools.sweep.ranges import read_ranges
-from rl_workbench.tools.sweep.sweep import Sweep, run_sweep
-from rl_workbench.tools.sweep.trainers import trainer
+from rl_workbench.tools.sweep.study import PRUNERS, Pruner, Study
+from rl_workbench.tools.sweep.sweep import Search, Sweep, write_results
+from rl_workbench.tools.sweep.trainings import flags
 from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.options.options import key_values
-from rl_workbench.training.options.training_options import known_options
+from rl_workbench.training.options.run_options import RunOptions
+from rl_workbench.training.options.training_options import choose, known_options
+from rl_workbench.training.run import folder as run_folder
+from rl_workbench.training.run.files import as_json, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.progress import tell
+
+RECORD, OLD = "sweep.json", "study.db"
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
@@ -34,12 +46,15 @@ def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
     add("--seeds", type=number(1), default=1, metavar="N", help="trainings a trial (default 1)")
     add("--seed", type=number(0), default=0, metavar="N", help="of the search (default 0)")
     add("--total-timesteps", type=number(1), metavar="N", help="of each training")
+    add("--pruner", choices=PRUNERS, default=PRUNERS[0],
+        help="ends trials whose evaluations fall behind the others' (default median)")  # fmt: skip
+    add_job_flags(parser)
     add("--out", type=Path, metavar="FOLDER",
         help="of the study; one that exists is gone on with (runs/sweep__ENV__ALGO__TIME)")  # fmt: skip
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Searches.
+    """Searches until there are as many trials as wanted, or until interrupted.
 
     Raises:
         WorkbenchError: if something fails that the user can mend.
@@ -54,8 +69,64 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     known.read(fixed, "--params")  # a mistake would be every trial's
     ranges = read_ranges(arguments.ranges, algorithm, env_id, known.names)
     ranges = {name: each for name, each in ranges.items() if name not in fixed}
-    section = kind.section.format(env_id=env_id)
     place = f"runs/sweep__{as_file_name(env_id)}__{algorithm}__{int(time.time())}"
-    folder = arguments.out or Path(place)
-    sweep = Sweep(folder, section, ranges, arguments.trials, arguments.seeds, arguments.seed)
-    run_sweep(sweep, trainer(algorithm, fixed), interrupt)
+    sweep = Sweep(
+        (arguments.out or Path(place)).resolve(), algorithm, fixed, ranges,
+        arguments.trials, arguments.seeds, kind.section.format(env_id=env_id),
+    )  # fmt: skip
+    usual = _run_options(sweep, {})
+    pruner = Pruner(arguments.pruner, usual.eval_frequency, usual.total_timesteps)
+    check_writable(sweep.folder / RECORD)
+    at_once = arguments.jobs or (1 if arguments.ray is None else None)
+    with run_folder.held(sweep.folder, "another search"):
+        _claim(sweep, arguments.seed)
+        study = Study(sweep.folder, ranges, arguments.seed, pruner)
+        search = Search(
+            sweep, study, lambda values: _run_options(sweep, values).eval_frequency, at_once == 1
+        )
+        tell(f"{study.ended()} of {sweep.trials} trials are done: {sweep.folder}")
+        with machines_for(arguments, sweep.folder, interrupt) as machines:
+            interrupt.defer()
+            run_jobs(machines, sweep.folder, search.jobs(), interrupt, watches=[search])
+        write_results(sweep, study)
+        if interrupt.requested():
+            tell("interrupted; the same command goes on")
+
+
+def _run_options(sweep: Sweep, values: dict[str, Any]) -> RunOptions:
+    """Those of a training with the values that a trial has picked."""
+    _, _, *rest = flags(sweep.algorithm, {**sweep.options, **values})
+    return choose(ALGORITHMS[sweep.algorithm], rest).run
+
+
+def _claim(sweep: Sweep, seed: int) -> None:
+    """Notes what a folder's search is, or checks that it is the same.
+
+    Raises:
+        WorkbenchError: if it has another one, or one that can't go on.
+    """
+    wanted = {
+        "algorithm": sweep.algorithm,
+        "options": sweep.options,
+        "ranges": {name: each._asdict() for name, each in sweep.ranges.items()},
+        "seeds": sweep.seeds,
+        "seed": seed,
+    }
+    path = sweep.folder / RECORD
+    try:
+        with open_text(path) as file:
+            found = json.load(file)
+    except FileNotFoundError:
+        if (sweep.folder / OLD).exists():
+            raise WorkbenchError(
+                f"{sweep.folder / OLD} is a search of an earlier version, which can't go on; "
+                "begin a new one with another --out"
+            ) from None
+        write_file(path, as_json(wanted))
+        return
+    except (OSError, ValueError) as error:
+        raise WorkbenchError(f"can't read {path}: {error}") from error
+    if found != json.loads(json.dumps(wanted)):
+        raise WorkbenchError(
+            f"{sweep.folder} holds a search of other options, ranges or seeds; name another folder"
+        )

@@ -74,7 +74,7 @@ class Checkpoints:
         save_tensors(path, {"format": FORMAT, **content})
         # The last one last: killed in between, a training goes on from before its best step.
         for name in (BEST, LAST) if best else (LAST,):
-            _name(path, self._run / name)
+            give_name(path, self._run / name)
         if self._keep:
             for old in _numbered(self._run)[self._keep :]:
                 if old != path:
@@ -102,7 +102,7 @@ class Checkpoints:
                     path.unlink()
 
 
-def _name(path: Path, name: Path) -> None:
+def give_name(path: Path, name: Path) -> None:
     """Gives a file a second name, in one step; a copy where the disk knows no second names."""
     temporary = name.with_name(f".{name.name}.new")
     temporary.unlink(missing_ok=True)

@@ -79,8 +79,11 @@ def _no_place(folder: Path, error: OSError) -> WorkbenchError:
 
 
 @contextlib.contextmanager
-def held(folder: Path) -> Iterator[None]:
+def held(folder: Path, holder: str = "a training") -> Iterator[None]:
     """Keeps a second training out of a run's folder; the lock ends with the process.
+
+    Args:
+        holder: what may hold it, for the error.
 
     Raises:
         WorkbenchError: if another process holds it, or there is no such folder.
@@ -93,7 +96,7 @@ def held(folder: Path) -> Iterator[None]:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            raise WorkbenchError(f"a training is running in {folder}") from error
+            raise WorkbenchError(f"{holder} is running in {folder}") from error
         if not _is_at(descriptor, folder):  # its last holder has removed it meanwhile
             raise WorkbenchError(f"{folder} is no run folder: it was removed just now")
         yield

@@ -5,12 +5,14 @@ The world is paused throughout. Lines are those that ros_control's own tests exp
 """
 
 import contextlib
+import functools
 import io
 import os
 import socket
 import subprocess
 import unittest
 
+import roslib.packages
 import rospy
 import rostest
 from controller_client import BOUND, STRICT, Manager, delete, spawn
@@ -32,9 +34,16 @@ def listed(name, state):
     return f"'{name}' - 'hardware_interface::EffortJointInterface' ( {state} )\n"
 
 
+@functools.cache
+def program(script):
+    """What rosrun runs; looking it up takes rosrun as long as most of the scripts take."""
+    path, *_ = roslib.packages.find_node("controller_manager", script)
+    return path
+
+
 def start_script(script, *arguments, **environment):
     return subprocess.Popen(
-        ["rosrun", "controller_manager", script, *arguments],
+        [program(script), *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 import workbench_runs
+from training_runs import assert_same_run
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.tools.benchmark import trainings
 from rl_workbench.tools.benchmark.results import RunResult, examine
 from rl_workbench.tools.benchmark.suites import (
     CONFIG,
@@ -25,9 +25,13 @@ from rl_workbench.tools.benchmark.suites import (
     make_variant,
     read_suite,
 )
-from rl_workbench.tools.benchmark.tables import BENCHMARK_SUMMARY, grouped, summary_table
-from rl_workbench.tools.benchmark.trainings import Job, Trainings
+from rl_workbench.tools.benchmark.tables import RESULTS_SUMMARY, grouped, summary_table
 from rl_workbench.tools.commands import benchmarking
+from rl_workbench.tools.jobs import machines, runner
+from rl_workbench.tools.jobs.job import Job, command
+from rl_workbench.tools.jobs.machines import ThisMachine
+from rl_workbench.tools.jobs.runner import Runner, Watch
+from rl_workbench.tools.jobs.states import steps_of
 from rl_workbench.tools.runs.runs import cost_file, cost_of, open_run
 from rl_workbench.training.cli import PROGRAM
 from rl_workbench.training.run import folder as run_folder
@@ -37,6 +41,7 @@ pytestmark = pytest.mark.usefixtures("signals")
 
 QUICK = {"total_timesteps": 300, "learning_starts": 50, "batch_size": 8, "hidden_sizes": [8],
          "eval_frequency": 150, "eval_episodes": 1, "confirm_episodes": 1}  # fmt: skip
+LONGER = {"total_timesteps": 3000, "checkpoint_frequency": 100}
 SUITE = """
 two:
   about: Two ways.
@@ -57,7 +62,8 @@ def suites(tmp_path: Path) -> Path:
 
 
 def job(folder: Path, seed: int = 0, **options: object) -> Job:
-    return Job(make_variant("test", "quick", {**QUICK, **options}), seed, folder / f"seed_{seed}")
+    variant = make_variant("test", "quick", {**QUICK, **options})
+    return Job(f"quick, seed {seed}", folder / f"seed_{seed}", tuple(arguments(variant, seed)))
 
 
 def examined(one: Job) -> RunResult:
@@ -81,7 +87,7 @@ def test_a_suite_gives_tables_with_every_seed_and_every_failure(
     assert cli.main(command) == 0
     said = capsys.readouterr().out
     assert re.search(
-        r"broken, seed 0: ended with exit code 1, .*unknown environment 'NoSuch-v0'", said
+        r"of 2, 1 failed\] broken, seed 0: ended with exit code 1, .*unknown environment 'NoSuch-v0'", said
     )
     rows = {row["variant"]: row for row in json.loads((out / "results.json").read_text())["runs"]}
     assert rows["plain"]["steps"] == 300 and rows["plain"]["best"] is not None
@@ -103,10 +109,10 @@ def test_an_interrupted_benchmark_goes_on_where_it_was(tmp_path: Path) -> None:
     out = tmp_path / "out"
     params = [f"{key}={value}" for key, value in QUICK.items() if key != "hidden_sizes"]
     params += ["hidden_sizes=8", "total_timesteps=20000000"]
-    command = [sys.executable, "-m", "rl_workbench", "benchmark", f"--out={out}",
-               "--seeds=1", "--params", *params]  # fmt: skip
+    words = [sys.executable, "-m", "rl_workbench", "benchmark", f"--out={out}",
+             "--seeds=1", "--params", *params]  # fmt: skip
     run = out / "dqn__CartPole-v1/seed_0"
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=dict(os.environ))
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=dict(os.environ))
     try:
         while not (run / "last.pt").exists():
             assert process.poll() is None
@@ -118,8 +124,8 @@ def test_an_interrupted_benchmark_goes_on_where_it_was(tmp_path: Path) -> None:
     assert process.returncode == 143 and "interrupted; the same command goes on" in said
     first = json.loads((run / "summary.json").read_text())
     assert first["interrupted"] and not first["complete"]
-    same = Job(make_variant("t", "t", {}), 0, run)
-    assert not same.is_done() and trainings.command(same, PROGRAM)[-1] == f"--resume={run}"
+    same = Job("t", run, ())
+    assert not same.is_done() and command(same, run, PROGRAM)[-1] == f"--resume={run}"
 
 
 def test_a_folder_of_other_options_is_refused(
@@ -241,7 +247,7 @@ def row(seed: int, score: float | None, step: int | None, fault: str = "") -> Ru
 
 
 def summarised(rows: list[RunResult], line: float | None) -> str:
-    return summary_table(grouped(rows), BENCHMARK_SUMMARY, {"a": line}).splitlines()[2]
+    return summary_table(grouped(rows), RESULTS_SUMMARY, {"a": line}).splitlines()[2]
 
 
 def test_seeds_that_never_solve_count_as_never() -> None:
@@ -264,7 +270,7 @@ def test_where_there_is_no_line_nobody_has_missed_it() -> None:
 
 def test_a_variant_without_any_run_has_a_line_of_its_own() -> None:
     line = summarised([RunResult("a", 0, "run", fault="no run folder")], None)
-    assert line == "| a | 0 of 1, 1 failed | - | - | - | - | - | - | - | - |"
+    assert line == "| a | 0 of 1, 1 failed | - | - | - | - | - | - |"
 
 
 def complete(out: Path) -> list[str]:
@@ -278,7 +284,7 @@ def complete(out: Path) -> list[str]:
 
 
 def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(trainings, "command", lambda *_: pytest.fail("it is done"))
+    monkeypatch.setattr(machines, "command", lambda *_: pytest.fail("it is done"))
     assert cli.main(complete(tmp_path)) == 0
     assert (tmp_path / "results.md").exists()
 
@@ -300,15 +306,56 @@ def test_two_benchmarks_do_not_share_a_folder(
     command = complete(tmp_path)
     with run_folder.held(tmp_path):
         assert cli.main(command) == 1
-    assert f"a training is running in {tmp_path}" in capsys.readouterr().err
+    assert f"another benchmark is running in {tmp_path}" in capsys.readouterr().err
 
 
-def test_a_training_that_outlived_its_benchmark_is_left_alone(tmp_path: Path) -> None:
+class Told(Watch):
+    """What a runner tells of its jobs."""
+
+    def __init__(self) -> None:
+        self.losses: list[str] = []
+        self.endings: dict[str, str] = {}
+
+    def lost(self, job: Job, reason: str) -> None:
+        self.losses.append(reason)
+
+    def ended(self, job: Job, failure: str) -> None:
+        self.endings[job.name] = failure
+
+
+def run(jobs: list[Job], at_once: int = 1, interrupt: Interrupt | None = None) -> Told:
+    told = Told()
+    Runner(ThisMachine(at_once, PROGRAM), told).run(jobs, interrupt or Interrupt())
+    return told
+
+
+def test_a_training_that_outlived_its_benchmark_is_left_alone(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(runner, "MOST_LOST", 2)
     one = job(tmp_path)
     one.folder.mkdir()
-    with run_folder.held(one.folder), pytest.raises(WorkbenchError, match="a training is running"):
-        Trainings(print, PROGRAM).run([one], 1, Interrupt())
-    assert one.folder.exists()
+    with run_folder.held(one.folder):
+        told = run([one])
+    assert told.losses == [f"a training is running in {one.folder}"]
+    assert "given up after 2 attempts" in told.endings[one.name]
+    assert one.folder.exists() and not one.log.exists()
+
+
+@pytest.mark.slow
+def test_a_training_that_is_killed_goes_on_to_the_same_bits(tmp_path: Path) -> None:
+    killed, other = job(tmp_path / "a", **LONGER), job(tmp_path / "b", **LONGER)
+    machine = ThisMachine(1, PROGRAM)
+
+    class Killing(Told):
+        def progressed(self, job: Job, node: str) -> None:
+            if job is killed and not self.losses and steps_of(job.folder)[0] >= 300:
+                os.kill(machine._running[job]._process.pid, signal.SIGKILL)
+
+    told = Killing()
+    Runner(machine, told).run([killed, other], Interrupt())
+    assert told.losses == ["its process was killed"]
+    assert told.endings == {killed.name: "", other.name: ""}
+    assert len(cost_of(killed.folder)["spans"]) == 2
+    assert_same_run(killed.folder, other.folder)
 
 
 def test_a_damaged_record_costs_no_other_run_its_row(tmp_path: Path) -> None:
@@ -323,34 +370,34 @@ def test_a_damaged_record_costs_no_other_run_its_row(tmp_path: Path) -> None:
 
 def test_every_training_has_a_master_of_its_own(tmp_path: Path, monkeypatch) -> None:
     program = "import os; print(os.environ['ROS_MASTER_URI'])"
-    monkeypatch.setattr(trainings, "command", lambda *_: [sys.executable, "-c", program])
+    monkeypatch.setattr(machines, "command", lambda *_: [sys.executable, "-c", program])
     jobs = [job(tmp_path, seed) for seed in range(2)]
-    Trainings(lambda text: None, PROGRAM).run(jobs, 2, Interrupt())
+    told = run(jobs, 2)
     masters = {one.log.read_text().strip() for one in jobs}
     assert len(masters) == 2 and all(each.startswith("http://127.0.0.1:") for each in masters)
+    assert all("ended with exit code 0" in told.endings[one.name] for one in jobs), "it left nothing"
 
 
-def test_ctrl_c_as_a_training_ends_by_itself(tmp_path: Path, monkeypatch) -> None:
-    """Its process number may belong to somebody else as soon as it was asked how it ended."""
-    running, interrupt, genuine = Trainings(lambda text: None, PROGRAM), Interrupt(), os.waitid
+def test_no_further_job_begins_after_ctrl_c(tmp_path: Path, monkeypatch) -> None:
+    interrupt, genuine = Interrupt(), ThisMachine.wait
 
-    def waited(*arguments: int) -> object:
+    def waited(*arguments: object) -> object:
         result = genuine(*arguments)
         interrupt.signal = signal.SIGINT
-        running._stop(interrupt)
         return result
 
-    monkeypatch.setattr(trainings, "command", lambda *_: ["true"])
-    monkeypatch.setattr(os, "waitid", waited)
+    monkeypatch.setattr(machines, "command", lambda *_: ["sleep", "1000"])
+    monkeypatch.setattr(ThisMachine, "wait", waited)
     one, other = (job(tmp_path, seed) for seed in range(2))
-    running.run([one, other], 1, interrupt)
-    assert interrupt.requested() and cost_of(one.folder)["cpu_seconds"] >= 0.0
-    assert not other.log.read_text() and not cost_of(other.folder), "no further one begins"
+    run([one, other], 1, interrupt)
+    assert cost_of(one.folder)["cpu_seconds"] >= 0.0
+    assert not other.log.exists() and not cost_of(other.folder)
 
 
 def test_the_training_is_told_all_of_its_options(tmp_path: Path) -> None:
     variant = make_variant("t", "wide", {"preset": "tutorial", "hidden_sizes": [64, 32]})
-    told = arguments(variant, 1, tmp_path)
-    assert told[:2] == ["--algo", "dqn"]
+    flags = tuple(arguments(variant, 1))
+    told = command(Job("wide", tmp_path / "run", flags), tmp_path / "run", PROGRAM)[3:]
+    assert told[:4] == ["train", f"--run-dir={tmp_path / 'run'}", "--algo", "dqn"]
     assert {"--preset=tutorial", "--seed=1", "--exp-name=wide"} <= set(told)
     assert told[told.index("--params") + 1 :] == ["hidden_sizes=[64,32]"]

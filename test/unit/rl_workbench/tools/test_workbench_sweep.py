@@ -1,7 +1,9 @@
-"""The search for options: ranges, trials that fail, a study that is gone on with."""
+"""The search for options: ranges, trials that fail or fall behind, a search that is ended and goes on."""
 
 import json
 import signal
+import sqlite3
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,80 +12,250 @@ import yaml
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools.jobs.job import Ending, Job
+from rl_workbench.tools.jobs.machines import Progressed
+from rl_workbench.tools.jobs.runner import Runner
 from rl_workbench.tools.sweep.ranges import Range, read_ranges
-from rl_workbench.tools.sweep.sweep import Sweep, run_sweep
+from rl_workbench.tools.sweep.study import Pruner, Study
+from rl_workbench.tools.sweep.sweep import Search, Sweep, write_results
 from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.options.training_options import known_options
 from rl_workbench.training.run.interrupt import Interrupt
 
 pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.extras("optuna", "stable_baselines3")]
 RANGES = {"x": Range(-10.0, 10.0, False, ()), "kind": Range(0, 0, False, ("a", "b"))}
+EVERY, STEPS = 100, 500
+Curve = Callable[[int, float], float]  # of a seed and x: the return that it comes to
 
 
-def sweep(folder: Path, trials: int, seeds: int = 1) -> Sweep:
+def parabola(seed: int, x: float) -> float:
+    return seed - (x - 3.0) ** 2
+
+
+class Trainers:
+    """Machines whose trainings come to what a function says, one evaluation at each wait.
+
+    Args:
+        at_once: how many there are.
+        curve: raises if the training fails.
+    """
+
+    def __init__(self, at_once: int, curve: Curve) -> None:
+        self._at_once, self._curve = at_once, curve
+        self.running: dict[Job, int] = {}  # steps done
+        self.stopped: set[Job] = set()
+        self.begun: list[str] = []
+        self.lost = ""  # the name of a job whose first attempt is
+
+    def free(self) -> int:
+        return self._at_once - len(self.running)
+
+    def start(self, job: Job) -> str:
+        self.begun.append(job.name)
+        self.running[job] = 0
+        job.folder.mkdir(parents=True, exist_ok=True)
+        (job.folder / "scalars.csv").write_text("step,tag,value,wall_time\n")
+        return "here"
+
+    def wait(self, seconds: float, progressed: Progressed) -> list[tuple[Job, Ending]]:
+        ended = []
+        for job in list(self.running):
+            try:
+                code = None if job in self.stopped else self._train_on(job)
+                if job.name == self.lost and self.begun.count(job.name) == 1:
+                    del self.running[job]
+                    ended.append((job, Ending(lost="its process was killed")))
+                    continue
+            except ValueError as error:
+                job.log.write_text(f"{error}\n")
+                code = 1
+            progressed(job, "here")
+            if job in self.stopped or code is not None:
+                del self.running[job]
+                ended.append((job, Ending(code)))
+        return ended
+
+    def _train_on(self, job: Job) -> int | None:
+        given = dict(each.split("=") for each in job.flags if each.count("=") == 1)
+        final = self._curve(int(given["--seed"]), float(given["x"]))
+        self.running[job] += EVERY
+        steps = self.running[job]
+        with (job.folder / "scalars.csv").open("a") as table:
+            table.write(f"{steps},eval/mean_reward,{final + steps - STEPS},0\n")
+        if steps < STEPS:
+            return None
+        (job.folder / "summary.json").write_text(
+            json.dumps({"complete": True, "best": [STEPS, final]})
+        )
+        return 0
+
+    def stop(self, job: Job) -> None:
+        self.stopped.add(job)
+
+    def close(self) -> None:
+        self.running.clear()
+
+
+def search(
+    folder: Path, trials: int, curve: Curve = parabola, seeds: int = 1, at_once: int = 1,
+    pruner: str = "none", interrupt: Interrupt | None = None, lost: str = "",
+) -> Trainers:  # fmt: skip
     folder.mkdir(exist_ok=True)
-    return Sweep(folder, "Some-v0", RANGES, trials, seeds, 0)
-
-
-def parabola(values: dict[str, Any], folder: Path, seed: int, interrupt: Interrupt) -> float:
-    return seed - (values["x"] - 3.0) ** 2
+    sweep = Sweep(folder, "dqn", {}, RANGES, trials, seeds, "Some-v0")
+    study = Study(folder, RANGES, 0, Pruner(pruner, EVERY, STEPS))
+    search = Search(sweep, study, lambda values: EVERY, at_once == 1)
+    trainers = Trainers(at_once, curve)
+    trainers.lost = lost
+    Runner(trainers, search).run(search.jobs(), interrupt or Interrupt())
+    write_results(sweep, study)
+    return trainers
 
 
 def trials(folder: Path) -> list[dict[str, Any]]:
     return json.loads((folder / "trials.json").read_text())
 
 
+def states(folder: Path) -> list[str]:
+    return [row["state"] for row in trials(folder)]
+
+
 def test_it_finds_the_best_and_writes_it_down(tmp_path: Path) -> None:
-    run_sweep(sweep(tmp_path, 40), parabola, Interrupt())
+    search(tmp_path, 40)
     best = yaml.safe_load((tmp_path / "best.yaml").read_text())["Some-v0"]
     assert best["x"] == pytest.approx(3.0, abs=1.5)
     assert len(trials(tmp_path)) == 40
 
 
-def test_a_study_is_gone_on_with(tmp_path: Path) -> None:
-    run_sweep(sweep(tmp_path, 3), parabola, Interrupt())
-    run_sweep(sweep(tmp_path, 5), parabola, Interrupt())
-    found = trials(tmp_path)
-    assert len(found) == 5 and len({row["options"]["x"] for row in found}) == 5
-    run_sweep(sweep(tmp_path, 5), parabola, Interrupt())
-    assert len(trials(tmp_path)) == 5
+def test_a_study_is_gone_on_with_as_if_it_had_been_one(tmp_path: Path) -> None:
+    search(tmp_path / "parts", 3)
+    search(tmp_path / "parts", 15)
+    assert search(tmp_path / "parts", 15).begun == []
+    search(tmp_path / "one", 15)
+    assert trials(tmp_path / "parts") == trials(tmp_path / "one")
+    assert len({row["options"]["x"] for row in trials(tmp_path / "one")}) == 15
 
 
 def test_the_score_is_the_mean_over_seeds(tmp_path: Path) -> None:
-    run_sweep(sweep(tmp_path, 1, seeds=3), parabola, Interrupt())
+    search(tmp_path, 1, seeds=3)
     (row,) = trials(tmp_path)
     assert row["score"] == pytest.approx(1.0 - (row["options"]["x"] - 3.0) ** 2)
 
 
+def failing_above(limit: float) -> Curve:
+    def curve(seed: int, x: float) -> float:
+        if x > limit:
+            raise ValueError("the loss is nan")
+        return x
+
+    return curve
+
+
 def test_a_trial_that_fails_costs_no_other(tmp_path: Path) -> None:
-    def train(values: dict, folder: Path, seed: int, interrupt: Interrupt) -> float:
-        if folder.name.startswith("trial_0001"):
-            raise WorkbenchError("the loss is nan")
-        return 1.0
+    trainers = search(tmp_path, 8, failing_above(0.0), seeds=2)
+    for row in trials(tmp_path):
+        assert row["state"] == ("fail" if row["options"]["x"] > 0.0 else "complete")
+        assert ("the loss is nan" in (row["failure"] or "")) == (row["state"] == "fail")
+    assert len(set(states(tmp_path))) == 2
+    # The second seed of one whose first has failed isn't trained.
+    assert len(trainers.begun) == 8 + states(tmp_path).count("complete")
 
-    run_sweep(sweep(tmp_path, 3), train, Interrupt())
-    assert [row["state"] for row in trials(tmp_path)] == ["complete", "fail", "complete"]
-    assert trials(tmp_path)[1]["failure"] == "the loss is nan"
+
+@pytest.mark.parametrize("pruner", ["median", "hyperband"])
+def test_trials_that_fall_behind_are_ended(tmp_path: Path, pruner: str) -> None:
+    trainers = search(tmp_path, 20, pruner=pruner, seeds=2)
+    pruned = [row for row in trials(tmp_path) if row["state"] == "pruned"]
+    assert len(pruned) >= 3
+    assert {job.name for job in trainers.stopped} == {
+        f"trial_{row['number']:04d}, seed 0" for row in pruned if row["pruned_at"] < STEPS
+    }
+    assert len(trainers.begun) == 40 - len(pruned)  # nor is a second seed of theirs trained
+    best = yaml.safe_load((tmp_path / "best.yaml").read_text())["Some-v0"]
+    scores = [(row["score"], row["options"]) for row in trials(tmp_path) if row not in pruned]
+    assert max(scores, key=lambda row: row[0])[1] == best
 
 
-def test_an_interrupted_trial_isnt_counted(tmp_path: Path) -> None:
+def test_without_a_pruner_none_is(tmp_path: Path) -> None:
+    search(tmp_path, 12)
+    assert set(states(tmp_path)) == {"complete"}
+
+
+class Killed(BaseException):
+    """What a kill -9 is to this process: nothing is told or written any more."""
+
+
+def killed_after(evaluations: int) -> Curve:
+    left = iter(range(evaluations))
+
+    def curve(seed: int, x: float) -> float:
+        if next(left, None) is None:
+            raise Killed
+        return parabola(seed, x)
+
+    return curve
+
+
+def test_a_search_that_is_killed_again_and_again_comes_to_the_same(tmp_path: Path) -> None:
+    search(tmp_path / "one", 12, pruner="median")
+    for _ in range(100):
+        try:
+            search(tmp_path / "killed", 12, killed_after(9), pruner="median")
+        except Killed:
+            continue
+        break
+    assert "pruned" in states(tmp_path / "one")
+    assert trials(tmp_path / "killed") == trials(tmp_path / "one")
+
+
+def test_a_training_that_is_lost_is_tried_again_before_the_next_trial_is_made(
+    tmp_path: Path,
+) -> None:
+    search(tmp_path / "one", 4)
+    trainers = search(tmp_path / "lost", 4, lost="trial_0001, seed 0")
+    assert trainers.begun == [f"trial_000{number}, seed 0" for number in (0, 1, 1, 2, 3)]
+    assert trials(tmp_path / "lost") == trials(tmp_path / "one")
+
+
+def test_with_several_at_once_the_first_ten_trials_are_the_same(tmp_path: Path) -> None:
+    search(tmp_path / "one", 10)
+    search(tmp_path / "three", 10, at_once=3)
+    assert trials(tmp_path / "three") == trials(tmp_path / "one")
+
+
+def test_a_trial_that_is_interrupted_goes_on(tmp_path: Path) -> None:
     interrupt = Interrupt()
 
-    def train(values: dict, folder: Path, seed: int, stop: Interrupt) -> float:
-        if folder.name.startswith("trial_0001"):
-            stop.signal = signal.SIGINT
-        return 1.0
+    def curve(seed: int, x: float) -> float:
+        if len(list(tmp_path.glob("trial_*"))) == 2:
+            interrupt.signal = signal.SIGINT
+        return x
 
-    run_sweep(sweep(tmp_path, 4), train, interrupt)
-    assert [row["state"] for row in trials(tmp_path)] == ["complete", "fail"]
-    run_sweep(sweep(tmp_path, 4), parabola, Interrupt())
-    assert sum(row["state"] == "complete" for row in trials(tmp_path)) == 4
+    trainers = search(tmp_path, 4, curve, interrupt=interrupt)
+    assert states(tmp_path) == ["complete", "running"]
+    assert [job.name for job in trainers.stopped] == ["trial_0001, seed 0"]
+    x = trials(tmp_path)[1]["options"]["x"]
+    assert search(tmp_path, 4).begun[0] == "trial_0001, seed 0"
+    assert states(tmp_path) == ["complete"] * 4
+    assert trials(tmp_path)[1]["options"]["x"] == x
 
 
-def test_a_damaged_study(tmp_path: Path) -> None:
-    (tmp_path / "study.db").write_bytes(b"no database" * 100)
+@pytest.mark.parametrize(
+    "damage", [b"no journal" * 100, b"no\njournal\n", b'{"op_code": 99}\n' * 2]
+)
+def test_a_damaged_study(tmp_path: Path, damage: bytes) -> None:
+    (tmp_path / "study.journal").write_bytes(damage)
     with pytest.raises(WorkbenchError, match="isn't a study"):
-        run_sweep(sweep(tmp_path, 1), parabola, Interrupt())
+        search(tmp_path, 1)
+
+
+def test_a_line_that_a_kill_has_cut_off(tmp_path: Path) -> None:
+    search(tmp_path, 3)
+    before = trials(tmp_path)
+    with (tmp_path / "study.journal").open("ab") as file:
+        file.write(b'{"op_code": 4, "wor')
+    search(tmp_path, 4)
+    search(tmp_path, 5)
+    assert trials(tmp_path)[:3] == before
+    assert len(trials(tmp_path)) == 5
 
 
 @pytest.mark.parametrize(
@@ -112,10 +284,8 @@ def test_the_packages_own_ranges(algorithm: str) -> None:
     assert read_ranges(None, algorithm, "Any-v0", known_options(ALGORITHMS[algorithm]).names)
 
 
-@pytest.mark.parametrize("algorithm", ["dqn", "reinforce", "ppo"])
-def test_the_command_trains_and_its_best_options_can_be_used(
-    tmp_path: Path, algorithm: str, capsys
-) -> None:
+@pytest.fixture
+def command(tmp_path: Path) -> Iterator[Callable[..., int]]:
     ranges = tmp_path / "ranges.yaml"
     ranges.write_text(
         "dqn: {gamma: {choices: [0.98, 0.99]}, eval_frequency: {choices: [200]}, "
@@ -123,10 +293,35 @@ def test_the_command_trains_and_its_best_options_can_be_used(
         "ppo: {gamma: {choices: [0.98]}, n_steps: {choices: [64]}, eval_frequency: {choices: [64]}}\n"
         "reinforce: {gamma: {choices: [0.98]}, batch_episodes: {choices: [1, 2]}}"
     )
-    flags = ["sweep", "--algo", algorithm, "--out", str(tmp_path / "study"), "--trials", "2",
-             "--ranges", str(ranges), "--total-timesteps", "200"]  # fmt: skip
-    assert cli.main(flags) == 0
-    assert len(trials(tmp_path / "study")) == 2
+
+    def run(algorithm: str, *flags: str) -> int:
+        return cli.main(
+            ["sweep", "--algo", algorithm, "--out", str(tmp_path / "study"), "--trials", "2",
+             "--ranges", str(ranges), "--total-timesteps", "200", *flags]
+        )  # fmt: skip
+
+    return run
+
+
+@pytest.mark.parametrize(("algorithm", "count"), [("dqn", 2), ("reinforce", 1), ("ppo", 1)])
+def test_the_command_trains_and_its_best_options_can_be_used(
+    tmp_path: Path, algorithm: str, count: int, command: Callable[..., int], capsys
+) -> None:
+    assert command(algorithm, "--jobs=2", f"--trials={count}") == 0
+    assert states(tmp_path / "study") == ["complete"] * count
     assert "its options are in" in capsys.readouterr().out
     best = yaml.safe_load((tmp_path / "study" / "best.yaml").read_text())
     assert list(best) == ["ppo CartPole-v1" if algorithm == "ppo" else "CartPole-v1"]
+
+
+def test_a_folder_of_another_search_is_refused(
+    tmp_path: Path, command: Callable[..., int], capsys
+) -> None:
+    (tmp_path / "study").mkdir()
+    sqlite3.connect(tmp_path / "study" / "study.db").close()
+    assert command("dqn") == 1
+    assert "a search of an earlier version" in capsys.readouterr().err
+    (tmp_path / "study" / "study.db").unlink()
+    (tmp_path / "study" / "sweep.json").write_text("{}")
+    assert command("dqn") == 1
+    assert "other options, ranges or seeds" in capsys.readouterr().err

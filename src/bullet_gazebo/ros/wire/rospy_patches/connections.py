@@ -72,9 +72,13 @@ class Reception:
             client.close()
             rospy.logwarn_throttle(REPEAT, f"{CROWDED}; a client of {address[0]} is turned away")
             return
+        oldest = None
         with self._guard:
             self._strangers[client] = None
-            oldest = next(iter(self._strangers)) if len(self._strangers) > MOST_STRANGERS else None
+            if len(self._strangers) > MOST_STRANGERS:
+                # Not when its thread ends: clients that come at once would push out the same one.
+                oldest = next(iter(self._strangers))
+                del self._strangers[oldest]
         if oldest is not None:
             _hang_up(oldest)
         try:

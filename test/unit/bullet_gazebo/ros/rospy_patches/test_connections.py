@@ -128,12 +128,29 @@ def test_garbage_ends_its_own_connection_only(server, garbage) -> None:
 
 def test_silent_clients_push_each_other_out_and_nobody_else(server, monkeypatch) -> None:
     monkeypatch.setattr(connections, "MOST_STRANGERS", 5)
+    monkeypatch.setattr(connections, "SILENCE", 2 * BOUND)  # nobody ends by himself
     silent = [server.connect() for _ in range(20)]
     assert server.greet() == b"/any"
     pushed = [ends(client) for client in silent[:15]]
     assert all(pushed)
     for client in silent:
         client.close()
+
+
+def test_each_newcomer_pushes_out_another_one_before_their_threads_have_noticed(monkeypatch):
+    monkeypatch.setattr(connections, "MOST_STRANGERS", 2)
+    noticed = threading.Event()
+    reception = Reception(lambda client, address: noticed.wait(BOUND))
+    pairs = [socket.socketpair() for _ in range(6)]
+    for there, _ in pairs:
+        reception.greet(there, ("", 0))
+    for _, here in pairs:
+        here.setblocking(False)
+    assert [here.recv(1) for _, here in pairs[:4]] == [b""] * 4
+    for _, here in pairs[4:]:
+        with pytest.raises(BlockingIOError):
+            here.recv(1)
+    noticed.set()
 
 
 def test_a_client_that_says_nothing_for_long_is_let_go(server, monkeypatch) -> None:

@@ -170,7 +170,7 @@ def test_killed_between_the_names_of_a_best_checkpoint(
     whole, tmp_path: Path, monkeypatch, name: str
 ) -> None:
     """Resumed, the training comes to the same best checkpoint."""
-    give_name, save, bests = run_checkpoints._name, Checkpoints.save, [False]
+    give_name, save, bests = run_checkpoints.give_name, Checkpoints.save, [False]
 
     def saved(writer: Checkpoints, step: int, content: dict, best: bool = False) -> None:
         bests.append(best)
@@ -183,7 +183,7 @@ def test_killed_between_the_names_of_a_best_checkpoint(
 
     with monkeypatch.context() as patched:
         patched.setattr(Checkpoints, "save", saved)
-        patched.setattr(run_checkpoints, "_name", killed)
+        patched.setattr(run_checkpoints, "give_name", killed)
         with pytest.raises(Killed):
             train(tmp_path / "run", name)
     assert_same_run(whole(name), resume(tmp_path / "run"))

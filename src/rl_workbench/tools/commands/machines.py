@@ -1,0 +1,48 @@
+"""Where a command's jobs run: flags, and the machines that they name."""
+
+import argparse
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+
+from rl_workbench.tools.commands.shared import number
+from rl_workbench.tools.jobs.machines import CARRIED, SHARED, Machines, ThisMachine
+from rl_workbench.training.cluster.flag import add_ray_flag
+from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.run.progress import tell
+
+
+def add_job_flags(parser: argparse.ArgumentParser) -> None:
+    """Where jobs run, and how many at a time."""
+    parser.add_argument("--jobs", type=number(1), metavar="N",
+        help="trainings at a time, each on one core (default 1; with --ray as many as there are cores)")  # fmt: skip
+    add_ray_flag(parser)
+    parser.add_argument("--folders", choices=(SHARED, CARRIED),
+        help="with --ray: the nodes share a file system, or Ray carries results home (found out unless given)")  # fmt: skip
+
+
+@contextlib.contextmanager
+def machines_for(
+    arguments: argparse.Namespace, folder: Path, interrupt: Interrupt
+) -> Iterator[Machines]:
+    """Where the jobs of a command run: here, or on the cluster that it names.
+
+    Args:
+        arguments: with the flags of `add_job_flags`, and the program.
+        folder: in which all jobs' folders lie.
+
+    Raises:
+        WorkbenchError: if there is no such cluster.
+    """
+    if arguments.ray is None:
+        yield ThisMachine(arguments.jobs or 1, arguments.program)
+        return
+    with contextlib.ExitStack() as stack:
+        with interrupt.reading():  # Ray's processes are started, or none of them
+            from rl_workbench.tools.jobs.cluster.nodes import RayNodes
+            from rl_workbench.training.cluster.joining import joined
+
+            cluster = stack.enter_context(joined(arguments.ray))
+        nodes = RayNodes(cluster, folder, arguments.program, arguments.jobs, arguments.folders)
+        tell(nodes.about())
+        yield nodes

@@ -1,0 +1,1 @@
+"""Many trainings as jobs: on this machine or on a cluster, skipped when done, resumed when half done."""

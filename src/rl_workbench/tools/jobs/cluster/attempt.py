@@ -1,0 +1,160 @@
+"""What a node does: one attempt at a job. It runs in a worker of Ray's, and the training as a process of its own."""
+
+import contextlib
+import fcntl
+import os
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools.jobs.cluster.parcels import Inbox, Outbox, Parcel
+from rl_workbench.tools.jobs.job import Ending, Job, command, environment, log_of
+from rl_workbench.tools.jobs.process import TrainingProcess
+
+LOOK_EVERY = 0.5  # [s] at the training's files
+GROWTH_EVERY = 5.0  # [s] at least between two parcels of tables alone
+TIME_TO_SAVE = 5.0  # [s] after being stopped
+ABANDONED_AFTER = 60.0  # [s] since it was made
+TOKEN = ".seen_by_nodes"
+
+
+class Home(NamedTuple):
+    """The folder of all jobs, as the node has to know it."""
+
+    folder: Path
+    token: str  # in a file there: who reads it sees the same folder
+    is_shared: bool | None  # None: find out
+
+
+class Began(NamedTuple):
+    """An attempt has begun."""
+
+    node: str  # its id
+    is_carried: bool
+
+
+Told = Began | Parcel | Ending
+
+
+def attempt(
+    job: Job, home: Home, luggage: Sequence[Any] | None, program: Sequence[str]
+) -> Iterator[Told]:
+    """Trains, and tells what there is to be told of it, an Ending as the last.
+
+    Args:
+        luggage: references to the parcels of a half done run; None: nobody has packed them, since all
+            nodes see the folder.
+        program: what starts the command line, without `train`.
+    """
+    import ray
+
+    node = ray.get_runtime_context().get_node_id()
+    is_shared = sees(home) if home.is_shared is None else home.is_shared
+    yield Began(node, not is_shared)
+    # Where Python is may differ between machines.
+    words = [sys.executable, *program[1:]]
+    if is_shared:
+        yield from _run(job, job.folder, words, None)
+    elif luggage is None:
+        yield Ending(lost=f"its node doesn't see {home.folder}")
+    else:
+        with _scratch() as place:
+            folder = place / job.folder.name
+            inbox = Inbox(folder, log_of(folder))
+            for each in luggage:
+                inbox.take(ray.get(each))
+            outbox = Outbox(folder, log_of(folder))
+            for _ in outbox.pack():  # that is what home has
+                pass
+            yield from _run(job, folder, words, outbox)
+
+
+def sees(home: Home) -> bool:
+    """Whether this machine sees the folder of the jobs."""
+    try:
+        return (home.folder / TOKEN).read_text(encoding="utf-8") == home.token
+    except OSError:
+        return False
+
+
+def is_told_of_locks(home: Home) -> bool:
+    """Whether this machine, where the folder is seen, knows that another one holds it."""
+    descriptor = os.open(home.folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
+
+
+def _run(job: Job, folder: Path, program: Sequence[str], outbox: Outbox | None) -> Iterator[Told]:
+    """The training as a process; its files, if they are to be carried, as they are written."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        process = TrainingProcess(command(job, folder, program), log_of(folder), environment())
+    except WorkbenchError as error:
+        yield Ending(lost=str(error))
+        return
+    except OSError as error:
+        yield Ending(lost=f"its node can't begin it: {error.strerror} {error.filename or ''}")
+        return
+    try:
+        yield from _followed(process, outbox)
+        ending = process.ending()
+        if outbox:
+            yield from outbox.pack()
+        yield ending
+    finally:
+        if process.is_running():  # the worker is to end
+            process.kill()
+            process.ending()
+
+
+def _followed(process: TrainingProcess, outbox: Outbox | None) -> Iterator[Told]:
+    """Until the training has ended, or was stopped, which is a KeyboardInterrupt in a task of Ray's."""
+    packed = time.monotonic()
+    try:
+        while not process.wait(LOOK_EVERY):
+            is_due = time.monotonic() - packed > GROWTH_EVERY
+            if outbox and (is_due or outbox.has_new_files()):
+                yield from outbox.pack()
+                packed = time.monotonic()
+    except KeyboardInterrupt:
+        process.stop()
+        if not process.wait(TIME_TO_SAVE):
+            process.kill()
+
+
+@contextlib.contextmanager
+def _scratch() -> Iterator[Path]:
+    """A folder on this node alone, for one attempt. Those that killed attempts left behind are removed."""
+    prefix = f"rl_workbench_{os.getuid()}_"
+    for left in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
+        _remove_abandoned(left)
+    with tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True) as name:
+        descriptor = os.open(name, os.O_RDONLY)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            yield Path(name)
+        finally:
+            os.close(descriptor)
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Removes it if nobody holds it; one that was only just made will be held in a moment."""
+    with contextlib.suppress(OSError):  # another's, or gone meanwhile
+        descriptor = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            status = os.fstat(descriptor)
+            if status.st_uid == os.getuid() and time.time() - status.st_mtime > ABANDONED_AFTER:
+                shutil.rmtree(folder)
+        finally:
+            os.close(descriptor)

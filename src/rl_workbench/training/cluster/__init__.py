@@ -1,0 +1,1 @@
+"""Many machines: a cluster of Ray's, joined or started here."""

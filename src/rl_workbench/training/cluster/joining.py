@@ -1,0 +1,119 @@
+"""Joining a cluster of Ray's, or starting one on this machine for as long as it is used."""
+
+import contextlib
+import logging
+import os
+import secrets
+import shutil
+import signal
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.extras import need
+from rl_workbench.training.cluster.address import AUTO, LOCAL, check_address, without_auto
+from rl_workbench.training.cluster.nodes import Cluster
+from rl_workbench.training.run.progress import warn
+
+STORE = 128 * 2**20  # [bytes] of a local cluster's object store, which jobs hardly use
+SOCKETS = 107  # [bytes] in the path of a socket, at most
+SESSION = len("/ray_12345678/session_2000-01-01_00-00-00_000000_1234567/sockets/plasma_store")
+# What Ray reads as it is imported: nothing is sent home, nothing is told but errors, `uv` isn't looked for.
+QUIET = {
+    "RAY_USAGE_STATS_ENABLED": "0",
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+    "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
+}
+PATIENCE = 60.0  # [s] until every node has started a worker that answers
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextlib.contextmanager
+def joined(address: str, say: Callable[[str], None] = warn) -> Iterator[Cluster]:
+    """A cluster, as long as it is entered; of this process's handlers of signals none is changed.
+
+    Args:
+        address: HOST:PORT of its head; `auto`: the one that this machine belongs to; `local`: one of
+            this process's own, which ends with it.
+        say: is told of nodes that can't be used.
+
+    Raises:
+        WorkbenchError: if Ray isn't installed, no cluster is there, it has another version of Ray or
+            Python, or none of its nodes can be used.
+    """
+    need("ray", "Ray", "--ray")
+    for name, value in QUIET.items():
+        os.environ.setdefault(name, value)
+    with contextlib.ExitStack() as stack:
+        ray = _started(stack) if address == LOCAL else _found(without_auto(address))
+        stack.callback(ray.shutdown)
+        cluster = Cluster(ray, say)
+        cluster.update(PATIENCE)
+        if not cluster.nodes:
+            raise WorkbenchError(f"no node of the cluster at {address} can be used")
+        yield cluster
+
+
+def _started(stack: contextlib.ExitStack) -> Any:
+    """A cluster on this machine that nobody else can use; its files go with it."""
+    place = tempfile.gettempdir()
+    if len(os.fsencode(place)) + SESSION > SOCKETS:
+        place = "/tmp"
+    folder = Path(tempfile.mkdtemp(prefix="ray_", dir=place))
+    stack.callback(shutil.rmtree, folder, ignore_errors=True)
+    own = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(32), "RAY_worker_niceness": "0"}
+    stack.enter_context(_environment(own))
+    return _init(
+        "a local cluster",
+        address=LOCAL,
+        num_cpus=len(os.sched_getaffinity(0)),
+        object_store_memory=STORE,
+        include_dashboard=False,
+        _temp_dir=str(folder),
+    )
+
+
+def _found(address: str) -> Any:
+    if address != AUTO:
+        check_address(address)
+    return _init(f"the Ray cluster at {address}", address=address)
+
+
+def _init(what: str, **options: Any) -> Any:
+    """Ray, initialised.
+
+    Raises:
+        WorkbenchError: if it can't be.
+    """
+    import ray
+
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    try:
+        ray.init(
+            log_to_driver=False, logging_level=logging.ERROR, configure_logging=False, **options
+        )
+    except (RuntimeError, ValueError, OSError, ray.exceptions.RayError) as error:
+        ray.shutdown()
+        text = " ".join(str(error).split())
+        raise WorkbenchError(f"can't join {what}: {text}") from error
+    finally:
+        for number, handler in before.items():  # Ray's own would leave out what ours save
+            signal.signal(number, handler)
+    return ray
+
+
+@contextlib.contextmanager
+def _environment(own: dict[str, str]) -> Iterator[None]:
+    """Adds to this process's environment, which a local cluster inherits."""
+    before = {name: os.environ.get(name) for name in own}
+    os.environ.update(own)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
