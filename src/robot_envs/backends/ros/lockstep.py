@@ -42,7 +42,7 @@ class LockstepWorld:
     def __init__(self, scene: Scene, ticks: int, turn: Turn) -> None:
         self.scene, self._turn = scene, turn
         self._simulator = OwnSimulator()
-        self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True)
+        self._step = ServiceClient(STEP_SERVICE, StepWorld, persistent=True, polls=True)
         moved = [f"{robot.model}::{name}" for robot, name in scene.moved.values()]
         self._begin = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=moved)
         self._advance = StepWorldRequest(ticks=ticks)
