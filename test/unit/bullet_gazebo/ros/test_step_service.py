@@ -1,6 +1,7 @@
 """step_world as a function: random numbers, groups, joints of every interface, several robots, refusals."""
 
 import contextlib
+import io
 import itertools
 import random
 import sys
@@ -12,7 +13,7 @@ import pytest
 import rospy
 import xacro
 import yaml
-from bullet_gazebo_msgs.srv import StepWorldRequest
+from bullet_gazebo_msgs.srv import StepWorldRequest, StepWorldResponse
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 
@@ -453,3 +454,20 @@ def test_no_more_lists_of_names_are_kept_than_clients_send(world):
         assert world.step(1, commanded_joints=names, joint_commands=numbers)
     assert len(world.service._addresses._movable_joints) == MOST_LISTS
     assert len(world.service._addresses._free_joints) == MOST_LISTS
+
+
+def test_an_answer_is_on_the_wire_what_its_fields_are(world):
+    """Names of joints are put together once; what clients read must be the whole answer all the same."""
+    for robots in range(3):
+        if robots:
+            world.add(f"r\u00f6bot{robots}")
+        for ticks in (1, 2):
+            answer = world.call(ticks)
+            kept, whole = io.BytesIO(), io.BytesIO()
+            answer.serialize(kept)
+            fields = {name: getattr(answer, name) for name in answer.__slots__}
+            StepWorldResponse(**fields).serialize(whole)
+            assert kept.getvalue() == whole.getvalue()
+            read = StepWorldResponse().deserialize(kept.getvalue())
+            assert len(read.joint_states.velocity) == 6 * robots
+            assert read.sim_time == world.sim.sim_time

@@ -13,6 +13,7 @@ from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import RUNNING
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.robot import ControlledRobot
+from bullet_gazebo.ros.services.stepping.answers import ToldJoints
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state.names import did_you_mean
 
@@ -63,13 +64,9 @@ class Addresses:
         return self._version != self._sim.version
 
     @cached_property
-    def told_joints(self) -> tuple[list[str], list[JointHandle]]:
-        """The joints of all robots, and what an answer calls them."""
-        robots = self._sim.robots
-        joints = [(robot, joint) for robot in robots for joint in robot.hardware.joints.values()]
-        scoped = len(robots) > 1
-        names = [f"{r.model.name}::{j.name}" if scoped else j.name for r, j in joints]
-        return names, [joint for _, joint in joints]
+    def told_joints(self) -> ToldJoints:
+        """The joints that each answer tells."""
+        return ToldJoints(self._sim.robots)
 
     def command_ports(self, names: Sequence[str], commands: int) -> CommandPorts:
         """Returns which running controllers get so many commands; each takes as many as its command topic.

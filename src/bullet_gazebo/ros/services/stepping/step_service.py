@@ -2,26 +2,18 @@
 
 import threading
 from contextlib import AbstractContextManager
-from typing import Any
 
 import rospy
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.ros.services.stepping.addresses import Addresses
+from bullet_gazebo.ros.services.stepping.answers import JointsAnswer, fields_of
 from bullet_gazebo.ros.services.stepping.step_requests import StepPlan
-from bullet_gazebo.ros.wire.conversions import (
-    to_contact_state,
-    to_pose_msg,
-    to_time,
-    to_twist_msg,
-)
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state.names import UnknownName
-from bullet_gazebo.state.query import NOTHING, StateAnswer, StateQuery, StateReader
+from bullet_gazebo.state.query import NOTHING, StateQuery, StateReader
 
 SLICE = 500  # ticks between which other services get their turn
 
@@ -50,9 +42,8 @@ class StepService:
         with self._one_at_a_time, self._sim.lock:
             self._sim.await_holds()
             try:
-                plan = StepPlan(
-                    self._sim, request, self._found()
-                )  # everything is checked before anything is done
+                # Everything is checked before anything is done.
+                plan = StepPlan(self._sim, request, self._found())
                 reader = self._reader_of(plan.query)
                 self._begin(request, plan)  # what is left to fail is a user's controller
             except (ControlError, UnknownName) as error:
@@ -121,39 +112,19 @@ class StepService:
         self._sim.advance(ticks, hold_on)
 
     def _answer(self, reader: StateReader | None, stepped: bool) -> StepWorldResponse:
+        sim, joints = self._sim, self._found().told_joints
+        if reader is None:
+            return JointsAnswer(joints, sim.sim_time, sim.now)
         return StepWorldResponse(
             success=True,
-            sim_time=self._sim.sim_time,
-            joint_states=self._joint_states(),
-            **({} if reader is None else _told(reader.read(stepped))),
+            sim_time=sim.sim_time,
+            joint_states=joints.message(sim.now),
+            **fields_of(reader.read(stepped)),
         )
 
     def _refusal(self, fault: str) -> StepWorldResponse:
         return StepWorldResponse(
             status_message=f"StepWorld: {fault}",
             sim_time=self._sim.sim_time,
-            joint_states=self._joint_states(),
+            joint_states=self._found().told_joints.message(self._sim.now),
         )
-
-    def _joint_states(self) -> JointState:
-        names, joints = self._found().told_joints
-        return JointState(
-            header=Header(stamp=to_time(self._sim.now)),
-            name=names,
-            position=[joint.position for joint in joints],
-            velocity=[joint.velocity for joint in joints],
-            effort=[joint.effort for joint in joints],
-        )
-
-
-def _told(answer: StateAnswer) -> dict[str, Any]:
-    """Fields of a response."""
-    models = answer.models.values()
-    return {
-        "model_names": list(answer.models),
-        "model_poses": [to_pose_msg(pose) for pose, _ in models],
-        "model_twists": [to_twist_msg(twist) for _, twist in models],
-        "link_poses": [to_pose_msg(pose) for pose, _ in answer.links],
-        "link_twists": [to_twist_msg(twist) for _, twist in answer.links],
-        "contacts": [to_contact_state(pair) for pair in answer.contacts],
-    }
