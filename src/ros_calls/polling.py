@@ -18,7 +18,7 @@ LONGEST = 0.001  # [s]; what takes longer is slept for
 SHORTEST = 0.00005  # [s]; for waits that were next to nothing
 RECENT = 4  # waits that tell how long the next one may be
 LOST = 0.0001  # [s] between two looks: somebody else had the core, or Python's lock
-FIRST_REST, LONGEST_REST = 8, 1024  # waits that aren't polled after others have wanted the core
+FIRST_REST, LONGEST_REST = 8, 1024  # waits that aren't polled after another one has had the core
 FORGIVEN = 8  # polls that were worth it, after which the next rest is half as long again
 
 
@@ -26,9 +26,9 @@ class AdaptivePoll:
     """Polls before a thread sleeps; one for each end of a connection.
 
     Each wait lies between `before` and `after`. It is polled for twice as long as the longest of the last few
-    took, unless one of them took longer than LONGEST: so nothing is polled where nothing comes. The core is
-    offered to others between two looks. When one takes it, or more threads want to run on this machine than
-    it has cores, waits to come are slept for: eight, and twice as many each time.
+    took, unless one of them took longer than LONGEST: so nothing is polled where nothing comes, and neither
+    while more threads want to run on this machine than it has cores. The core is offered to others between
+    two looks. When one keeps it, waits to come are slept for: eight, and twice as many each time.
     """
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
@@ -52,10 +52,7 @@ class AdaptivePoll:
             self._rest -= 1
             return
         expected = max(self._waits)
-        if expected > LONGEST:
-            return
-        if is_crowded():
-            self._give_up()
+        if expected > LONGEST or is_crowded():
             return
         end = begin + max(SHORTEST, min(2.0 * expected, LONGEST))
         looked = begin

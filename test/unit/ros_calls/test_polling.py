@@ -79,18 +79,12 @@ def test_waits_of_no_length_are_polled_too():
     assert [waits.wait(0.0) for _ in range(RECENT + 2)][-2:] == [1, 1]
 
 
-@pytest.mark.parametrize("sign", ["the core was taken", "more threads than cores"])
-def test_who_is_in_the_way_of_others_sleeps_for_longer_and_longer(cores, sign):
+def test_who_loses_the_core_sleeps_for_longer_and_longer():
     waits = Waits()
     waits.warm_up()
     rests = []
     for _ in range(10):
-        if sign == "the core was taken":
-            assert waits.wait(BRIEF, look=2 * polling.LOST) == 1
-        else:
-            cores["crowded"] = True
-            assert waits.wait(BRIEF) == 0
-            cores["crowded"] = False
+        assert waits.wait(BRIEF, look=2 * polling.LOST) == 1
         rests.append(0)
         while not waits.wait(BRIEF):
             rests[-1] += 1
@@ -99,6 +93,14 @@ def test_who_is_in_the_way_of_others_sleeps_for_longer_and_longer(cores, sign):
         assert waits.wait(BRIEF)
     waits.wait(BRIEF, look=2 * polling.LOST)
     assert [bool(waits.wait(BRIEF)) for _ in range(FIRST_REST + 1)] == [False] * FIRST_REST + [True]
+
+
+def test_nothing_is_polled_while_more_threads_want_to_run_than_there_are_cores(cores):
+    waits = Waits()
+    waits.warm_up()
+    for crowded in (True, False, True, False):
+        cores["crowded"] = crowded
+        assert [bool(waits.wait(BRIEF)) for _ in range(100)] == [not crowded] * 100
 
 
 def test_it_can_be_switched_off_and_needs_a_second_core(cores, monkeypatch):
