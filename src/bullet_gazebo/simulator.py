@@ -56,6 +56,7 @@ class Simulator:
         self.relatch = relatch
         self.now = 0  # [ns] of simulated time
         self.robots: list[ControlledRobot] = []
+        self._robots_version = 0
         self.applied = AppliedForces()
         # Called with `now` before each physics step.
         self.listeners: list[Callable[[int], None]] = []
@@ -73,6 +74,14 @@ class Simulator:
     def sim_time(self) -> float:
         """Simulated time [s]."""
         return self.now / NANOSECONDS
+
+    @property
+    def version(self) -> tuple[int, int, int]:
+        """Another one whenever models, robots or controllers have come or gone; the caller holds the lock."""
+        loaded = sum(
+            [robot.manager.version for robot in self.robots]
+        )  # of the same robots, if all is equal
+        return self.world.version, self._robots_version, loaded
 
     @property
     def paused(self) -> bool:
@@ -187,10 +196,12 @@ class Simulator:
         # Its controllers may start before time moves on.
         robot.joints_moved(self.now, relatch=False)
         self.robots.append(robot)
+        self._robots_version += 1
 
     def remove_robot(self, robot: ControlledRobot) -> None:
         """Ends control of a robot; the caller holds the lock."""
         self.robots.remove(robot)
+        self._robots_version += 1
 
     def set_joint_positions(self, model: Model, positions: Mapping[str, float]) -> None:
         """Puts joints of `model` at `positions` [rad, m], at rest; the caller holds the lock."""

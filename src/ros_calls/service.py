@@ -9,6 +9,7 @@ import rospy
 
 from ros_calls import master, tcpros
 from ros_calls.absence import why_absent
+from ros_calls.polling import AdaptivePoll
 from ros_calls.xmlrpc import NoAnswer, Refused
 
 TIMEOUT = 5.0  # [s] of wall time
@@ -43,17 +44,25 @@ class ServiceClient:
         name: the service's name, global or relative to the node's namespace.
         kind: its generated class.
         persistent: keep the connection between calls; several times as fast.
+        polls: look for an answer again and again before sleeping for it, where that pays (`polling.py`): for
+            a service that is called again at once.
         timeout: wall time [s] that connecting and an answer may take; with infinity a call waits until
             the caller's node is shut down. The attribute may be changed.
     """
 
     def __init__(
-        self, name: str, kind: Any, persistent: bool = False, timeout: float = TIMEOUT
+        self,
+        name: str,
+        kind: Any,
+        persistent: bool = False,
+        timeout: float = TIMEOUT,
+        polls: bool = False,
     ) -> None:
         self.name = str(rospy.resolve_name(name))
         self._kind = kind
         self._persistent = persistent
         self.timeout = timeout
+        self._poll = AdaptivePoll() if polls else None
         self._connection: tcpros.Connection | None = None
         self._begun = False  # whether an answer is still to be taken
 
@@ -133,7 +142,7 @@ class ServiceClient:
     def _connected(self) -> tcpros.Connection:
         if self._connection is None:
             self._connection = tcpros.Connection(
-                self._address(), self.name, self._kind, self.timeout
+                self._address(), self.name, self._kind, self.timeout, self._poll
             )
         return self._connection
 

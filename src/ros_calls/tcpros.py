@@ -12,11 +12,14 @@ import select
 import socket
 import struct
 import time
+from functools import partial
 from typing import Any
 
 import genpy
 import rosgraph
 import rospy
+
+from ros_calls.polling import AdaptivePoll
 
 CHUNK = 65536  # [bytes]
 HEAD = struct.Struct("<BI")  # of an answer: whether the call succeeded, and its length
@@ -39,8 +42,10 @@ class Connection:
     Time limits are wall time [s]; infinity means: until the caller's node is shut down.
     """
 
-    def __init__(self, address: str, name: str, kind: Any, timeout: float) -> None:
-        """Connects to the service at a ``rosrpc://`` address.
+    def __init__(
+        self, address: str, name: str, kind: Any, timeout: float, poll: AdaptivePoll | None = None
+    ) -> None:
+        """Connects to the service at a ``rosrpc://`` address; with `poll`, answers are polled for.
 
         Raises:
             CallFailed: no connection, or another type of service.
@@ -48,6 +53,7 @@ class Connection:
         """
         self._kind = kind
         self._kernels_timeout = 0.0  # [s]; none is set yet
+        self._poll = poll
         deadline = time.monotonic() + timeout
         try:
             host, port = rospy.core.parse_rosrpc_uri(address)
@@ -55,6 +61,9 @@ class Connection:
             try:
                 self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 self._shake_hands(name, deadline)
+                looker = select.poll()
+                looker.register(self._socket, select.POLLIN)
+                self._has_come = partial(looker.poll, 0)
             except BaseException:
                 self._socket.close()
                 raise
@@ -146,7 +155,7 @@ class Connection:
 
     def _receive(self, deadline: float) -> tuple[bool, bytes]:
         """Reads one answer; most come in one piece, for which the kernel's time limit is enough."""
-        data = self._part()
+        data = self._first_part()
         while len(data) < HEAD.size:
             self._await_data(deadline)
             data += self._part()
@@ -158,6 +167,14 @@ class Connection:
             self._await_data(deadline)
             whole += self._part()
         return bool(ok), bytes(whole[HEAD.size :])
+
+    def _first_part(self) -> bytes:
+        if self._poll is None:
+            return self._part()
+        self._poll.before(self._has_come)
+        part = self._part()
+        self._poll.after()
+        return part
 
     def _part(self) -> bytes:
         part = self._socket.recv(CHUNK)

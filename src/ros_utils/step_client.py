@@ -38,7 +38,7 @@ class StepClient:
 
     def __init__(self, service: str = STEP_SERVICE, timeout: float = TIMEOUT) -> None:
         self._timeout = timeout
-        self._call = ServiceClient(service, StepWorld, persistent=True, timeout=timeout)
+        self._call = ServiceClient(service, StepWorld, persistent=True, timeout=timeout, polls=True)
 
     def step(
         self,

@@ -41,6 +41,7 @@ class ControllerManager:
         self.types: dict[str, type[Controller]] = dict(BUILT_IN)
         self._controllers: dict[str, Controller] = {}
         self._running: list[Controller] = []
+        self.version = 0  # counts what changes `loaded`
         self._now = 0
         self.on_fault: Callable[[Controller, BaseException], None] = _ignore
         # Called when other controllers are loaded or run, and when somebody has changed gains.
@@ -94,6 +95,7 @@ class ControllerManager:
             reason = error if isinstance(error, ControlError) else repr(error)
             raise ControlError(f"Initializing controller '{name}' failed: {reason}") from error
         self._controllers[name] = controller
+        self.version += 1
         self.on_change()
         return controller
 
@@ -102,6 +104,7 @@ class ControllerManager:
         controller = self.get(name)
         if controller.state == RUNNING:
             raise ControlError(f"Could not unload controller '{name}' because it is still running")
+        self.version += 1
         return self._controllers.pop(name)
 
     def switch(
@@ -152,6 +155,7 @@ class ControllerManager:
         self.switch([], [c.name for c in self._running])
         gone = list(self._controllers.values())
         self._controllers.clear()
+        self.version += 1
         return gone
 
     def loops_changed(self) -> None:

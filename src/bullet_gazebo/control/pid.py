@@ -47,19 +47,26 @@ def _number(params: Mapping[str, object], key: str, default: float, place: str) 
     return float(value)
 
 
+def one_listener() -> int:
+    """Whoever sets a sink and says nothing of listeners is one himself."""
+    return 1
+
+
 class Pid:
     """Gains and the state that they act on. One instance a controlled joint.
 
-    With `publish_state` each computation is reported to `sink`, once somebody has set it.
+    With `publish_state` each computation is reported to `sink`, once somebody has set it; `listeners` tells
+    how many hear it then, and for nobody no report is made.
     """
 
-    __slots__ = ("d_error", "gains", "i_error", "last_error", "output", "p_error", "publish_state",
-                 "seeded", "sink")  # fmt: skip
+    __slots__ = ("d_error", "gains", "i_error", "last_error", "listeners", "output", "p_error",
+                 "publish_state", "seeded", "sink")  # fmt: skip
 
     def __init__(self, gains: Gains, publish_state: bool = False) -> None:
         self.gains = gains
         self.publish_state = publish_state
         self.sink: Callable[[PidSample], None] | None = None
+        self.listeners: Callable[[], int] = one_listener
         self.clear()
         self.seeded = False
 
@@ -106,7 +113,7 @@ class Pid:
         if not gains.antiwindup:
             i_term = max(gains.i_min, min(gains.i_max, i_term))
         self.output = gains.p * error + i_term + gains.d * rate
-        if self.sink is not None:
+        if self.sink is not None and self.listeners() > 0:
             self.sink(self._sample(i_term, dt))
         return self.output
 

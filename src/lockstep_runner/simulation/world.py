@@ -72,7 +72,9 @@ class World:
             self._next_look = originals.monotonic() + LOOK
             if not is_running():
                 return False
-            self._call = ServiceClient(SERVICE, AdvanceWorld, persistent=True, timeout=TIMEOUT)
+            self._call = ServiceClient(
+                SERVICE, AdvanceWorld, persistent=True, timeout=TIMEOUT, polls=True
+            )
             self._pending.clear()
             self._physics = AdvanceWorldRequest.AS_IT_IS
             self._seeded = self._seed is None

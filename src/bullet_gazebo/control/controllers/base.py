@@ -8,23 +8,35 @@ from typing import Any, ClassVar
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointHandle
-from bullet_gazebo.control.pid import Loop, Pid
+from bullet_gazebo.control.pid import Loop, Pid, one_listener
 
 
 class Output:
-    """A topic that a controller writes to. `sink` is set by whoever listens, else records are not made.
+    """A topic that a controller writes to: `sink` takes a record, if there is one. `listeners` tells how many
+    hear it; records for nobody needn't be made.
 
     `topic` is relative to the controller's namespace, or to the manager's if `shared`. `kind` names a
     record of control/samples.py, or is a ROS message type whose messages are then published as they are.
     """
 
-    __slots__ = ("kind", "shared", "sink", "topic")
+    __slots__ = ("kind", "listeners", "shared", "sink", "topic")
 
     def __init__(self, topic: str, kind: str | type, shared: bool = False) -> None:
         self.topic = topic
         self.kind = kind
         self.shared = shared
         self.sink: Callable[[Any], None] | None = None
+        self.listeners: Callable[[], int] = one_listener
+
+    @property
+    def wanted(self) -> bool:
+        """Whether somebody hears what is given to `sink`, which there is then."""
+        return self.sink is not None and self.listeners() > 0
+
+    def send(self, record: Any) -> None:
+        """Gives a record to `sink`, if there is one."""
+        if self.sink is not None:
+            self.sink(record)
 
 
 class Input:

@@ -69,8 +69,8 @@ class JointStateController(Controller):
             self._report(now)
 
     def _report(self, now: int) -> None:
-        if self._output.sink is not None:
-            self._output.sink(self.sample(now))
+        if self._output.wanted:
+            self._output.send(self.sample(now))
 
     def sample(self, now: int) -> JointStateSample:
         """Returns the joints' state, extra joints last."""

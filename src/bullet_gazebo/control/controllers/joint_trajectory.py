@@ -85,8 +85,8 @@ class JointTrajectoryController(Controller):
             self._monitor(self._goal)
         if self._settings.state_period and uptime >= self._next_state:
             self._next_state = max(self._next_state + self._settings.state_period, uptime)
-            if self._state.sink is not None:
-                self._state.sink(self.sample())
+            if self._state.wanted:
+                self._state.send(self.sample())
 
     def sample(self) -> TrajectorySample:
         """Returns where the joints are wanted and where they are, as of the last tick."""

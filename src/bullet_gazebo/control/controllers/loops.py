@@ -55,20 +55,19 @@ class StateReport:
         """Counts an update; returns whether it is one to report, and somebody listens."""
         count = self._updates
         self._updates = count + 1
-        return count % REPORT_EVERY == 0 and self.output.sink is not None
+        return count % REPORT_EVERY == 0 and self.output.wanted
 
     def send(
         self, now: int, dt: float, set_point: float, value: float, rate: float, error: float
     ) -> None:
         """Reports process `value` and its `rate`; `now` [ns], `dt` [s]."""
-        gains, sink = self._pid.gains, self.output.sink
-        if sink is not None:
-            sink(
-                JointControllerSample(
-                    now, set_point, value, rate, error, dt, self._joint.command,
-                    gains.p, gains.i, gains.d, gains.i_max, gains.antiwindup,
-                )
-            )  # fmt: skip
+        gains = self._pid.gains
+        self.output.send(
+            JointControllerSample(
+                now, set_point, value, rate, error, dt, self._joint.command,
+                gains.p, gains.i, gains.d, gains.i_max, gains.antiwindup,
+            )
+        )  # fmt: skip
 
 
 class PidJoint(Controller):

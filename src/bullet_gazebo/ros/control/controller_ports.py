@@ -93,7 +93,7 @@ class ControllerPorts:
             if publisher.get_num_connections():
                 topic.send(sample)
 
-        output.sink = send
+        output.sink, output.listeners = send, publisher.get_num_connections
         self._closing.callback(_mute, output)
 
     def _subscribe(self, port: Input, namespace: str) -> None:

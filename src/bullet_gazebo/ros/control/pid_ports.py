@@ -51,7 +51,7 @@ class PidPorts:
             self._topic = ThinnedTopic(
                 thinner, self._publisher.resolved_name, self._publisher.publish
             )
-            pid.sink = self._publish
+            pid.sink, pid.listeners = self._publish, self._publisher.get_num_connections
 
     def shutdown(self) -> None:
         """Takes all of it away."""

@@ -41,8 +41,8 @@ class Spring(Controller):
     def update(self, now, dt):
         stretch = self.set_point - self.joint.position
         self.joint.command = self.stiffness * stretch
-        if self.stretch.sink is not None:
-            self.stretch.sink(Vector3(x=stretch))
+        if self.stretch.wanted:  # somebody listens
+            self.stretch.send(Vector3(x=stretch))
 
 
 class Raises(Controller):

@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 from robots import cartpole_urdf
 
 from bullet_gazebo.control.angles import normalized, shortest_distance, shortest_distance_within
-from bullet_gazebo.control.controllers import BUILT_IN
+from bullet_gazebo.control.controllers import BUILT_IN, joint_state, loops
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
 from bullet_gazebo.control.limits import effort_enforcer
+from bullet_gazebo.control.pid import Pid
 
 MS = 1_000_000  # [ns]
 STATE = "joint_state_controller/JointStateController"
@@ -244,3 +245,41 @@ def test_state_is_reported_on_every_tenth_update(hardware):
 def test_bad_position_controller_parameters_are_refused(hardware, params):
     with pytest.raises(ControlError):
         BUILT_IN[POSITION].create("c", params, hardware)
+
+
+@pytest.mark.parametrize("kind", [STATE, POSITION])
+def test_no_record_is_made_that_nobody_hears_and_the_next_one_once_somebody_does(
+    hardware, kind, monkeypatch
+):
+    params = {STATE: {"publish_rate": 1000.0}, POSITION: {"joint": "stand_cart", "pid": {"p": 1.0}}}
+    controller = BUILT_IN[kind].create("c", params[kind], hardware)
+    samples = collect(controller)
+    listeners = 0
+    controller.outputs[0].listeners = lambda: listeners
+    made = []
+    for module, record in ((joint_state, "JointStateSample"), (loops, "JointControllerSample")):
+        make = getattr(module, record)
+        monkeypatch.setattr(
+            module, record, lambda *fields, make=make: made.append(0) or make(*fields)
+        )
+    controller.starting(0)
+    for tick in range(1, 101):
+        listeners = int(tick > 50)
+        controller.update(tick * MS, 0.001)
+        controller.joints_moved(tick * MS)
+        if tick == 50:
+            assert not made
+    assert samples
+    assert len(made) == len(samples)
+    assert samples[0].stamp == 51 * MS
+
+
+def test_a_pid_reports_to_nobody_unless_somebody_listens():
+    pid = Pid.from_params({"p": 1.0, "publish_state": True}, "pid")
+    samples = []
+    pid.sink, pid.listeners = samples.append, lambda: 0
+    assert pid.compute(1.0, 0.001) == 1.0
+    assert not samples
+    pid.listeners = lambda: 1
+    pid.compute(2.0, 0.001)
+    assert [sample.error for sample in samples] == [2.0]

@@ -1,7 +1,10 @@
 """step_world as a function: random numbers, groups, joints of every interface, several robots, refusals."""
 
 import contextlib
+import io
+import itertools
 import random
+import sys
 import threading
 from functools import lru_cache
 
@@ -10,7 +13,7 @@ import pytest
 import rospy
 import xacro
 import yaml
-from bullet_gazebo_msgs.srv import StepWorldRequest
+from bullet_gazebo_msgs.srv import StepWorldRequest, StepWorldResponse
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 
@@ -22,6 +25,7 @@ from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.robot import ControlledRobot
+from bullet_gazebo.ros.services.stepping.addresses import MOST_LISTS
 from bullet_gazebo.ros.services.stepping.step_service import StepService
 from bullet_gazebo.simulator import Simulator
 
@@ -332,3 +336,138 @@ def test_what_has_gone_during_a_long_request_is_told(objects, monkeypatch):
     assert not answer.success
     assert "the ticks are done, but meanwhile there is no link 'crate'" in answer.status_message
     assert answer.sim_time == pytest.approx(0.6)
+
+
+def calls_of(function):
+    """How many functions are called while one runs, Python's own among them."""
+    count = 0
+
+    def note(_frame, event, _argument):
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(note)
+    try:
+        function()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def names_of(robots):
+    return {
+        "controllers": [f"/{name}/effort_joint" for name in robots],
+        "commands": [0.1] * len(robots),
+        "commanded_joints": [f"{name}::effort_b" for name in robots],
+        "joint_commands": [0.2] * len(robots),
+        "joints": [f"{name}::velocity_b" for name in robots],
+        "positions": [0.3] * len(robots),
+    }
+
+
+def test_what_a_request_costs_grows_with_the_number_of_robots_and_no_faster(world, monkeypatch):
+    monkeypatch.setattr(Simulator, "advance", lambda *args: 1)  # the ticks are measured elsewhere
+    monkeypatch.setattr(Simulator, "set_joint_states", lambda *args: None)
+    robots, first, again = [], [], []
+    for count in (2, 4, 6):
+        while len(robots) < count:
+            robots.append(f"r{len(robots)}")
+            world.add(robots[-1], "effort_joint")
+        fields = names_of(robots)
+        first.append(calls_of(lambda fields=fields: world.step(1, **fields)))
+        again.append(calls_of(lambda fields=fields: world.step(1, **fields)))
+    for costs in (first, again):
+        assert costs[2] - costs[1] == pytest.approx(costs[1] - costs[0], abs=4)
+    assert again[2] < first[2] / 2  # names are looked up once
+
+
+def test_who_comes_goes_stops_or_is_another_one_is_noticed_by_the_same_request(world):
+    """What was found for the names of a request must not outlive those who had them."""
+    world.add("left", "effort_joint")
+    command = {"controllers": ["effort_joint"], "commands": [1.0]}
+    joint = {"commanded_joints": ["effort_b"], "joint_commands": [2.0]}
+    place = {"joints": ["velocity_b"], "positions": [0.5]}
+
+    def refused(text, **fields):
+        answer = world.call(1, **fields)
+        assert not answer.success
+        assert text in answer.status_message
+
+    everything = {**command, **joint, **place}
+    for _ in range(2):
+        assert world.step(1, **everything)["effort_a"][2] == 1.0
+    manager = world.sim.robots[0].manager
+    manager.switch([], ["effort_joint"])
+    refused("controller 'effort_joint' is stopped", **everything)
+    manager.unload("effort_joint")
+    refused("no controller named 'effort_joint'", **everything)
+    fresh = manager.load("effort_joint", world._params["effort_joint"])
+    refused("controller 'effort_joint' is initialized", **everything)
+    manager.switch(["effort_joint"], [])
+    assert world.step(1, **everything)["effort_a"][2] == 1.0
+    assert fresh._commands == [1.0]
+    manager.load("effort_group", world._params["effort_group"])
+    manager.switch(["effort_group"], ["effort_joint"])
+    refused("joint 'effort_b' belongs to controller 'effort_group'", **joint)
+    manager.switch(["effort_joint"], ["effort_group"])
+    assert world.step(1, **joint)["effort_b"][2] == 2.0
+
+    world.add("right", "effort_joint")
+    refused("several robots have a controller 'effort_joint'", **command)
+    refused("several robots have a joint 'effort_b'", **joint)
+    refused("several models have a joint 'velocity_b'", **place)
+    assert world.call(1).joint_states.name[0] == "left::effort_a"
+
+    gone = world.sim.robots[0]
+    world.sim.remove_robot(gone)
+    world.sim.delete_model(gone.model)
+    joints = world.step(1, **everything)
+    assert joints["effort_a"][2] == 1.0  # plain again
+    assert joints["velocity_b"][0] == pytest.approx(0.5)
+    world.sim.remove_robot(world.sim.robots[0])
+    world.sim.delete_model(world.sim.world.models["right"])
+    refused("no controller named 'effort_joint'", **command)
+    refused("there is no movable joint 'velocity_b'", **place)
+    world.add("right", "effort_joint")
+    assert world.step(1, **everything)["effort_a"][2] == 1.0
+    assert gone.hardware.joints["velocity_b"].position == pytest.approx(0.5)
+
+
+def test_faults_are_told_in_the_order_of_the_names_also_for_names_that_are_known(world):
+    world.add("slides", "effort_joint", "position_joint")
+    names = {"controllers": ["effort_joint", "position_joint"]}
+    assert world.step(1, commands=[1.0, 0.0], **names)
+    world.sim.robots[0].manager.switch([], ["position_joint"])
+    assert "2 controllers but 0 commands" in world.call(1, commands=[], **names).status_message
+    stopped = world.call(1, commands=[1.0], **names).status_message
+    assert "controller 'position_joint' is stopped, not running" in stopped
+
+
+def test_no_more_lists_of_names_are_kept_than_clients_send(world):
+    world.add("slides")
+    joints = sorted(world.sim.robots[0].hardware.joints)
+    lists = [list(names) for size in (1, 2) for names in itertools.permutations(joints, size)]
+    assert len(lists) > MOST_LISTS
+    for names in lists + lists:
+        numbers = [0.0] * len(names)
+        assert world.step(1, joints=names, positions=numbers)
+        assert world.step(1, commanded_joints=names, joint_commands=numbers)
+    assert len(world.service._addresses._movable_joints) == MOST_LISTS
+    assert len(world.service._addresses._free_joints) == MOST_LISTS
+
+
+def test_an_answer_is_on_the_wire_what_its_fields_are(world):
+    """Names of joints are put together once; what clients read must be the whole answer all the same."""
+    for robots in range(3):
+        if robots:
+            world.add(f"r\u00f6bot{robots}")
+        for ticks in (1, 2):
+            answer = world.call(ticks)
+            kept, whole = io.BytesIO(), io.BytesIO()
+            answer.serialize(kept)
+            fields = {name: getattr(answer, name) for name in answer.__slots__}
+            StepWorldResponse(**fields).serialize(whole)
+            assert kept.getvalue() == whole.getvalue()
+            read = StepWorldResponse().deserialize(kept.getvalue())
+            assert len(read.joint_states.velocity) == 6 * robots
+            assert read.sim_time == world.sim.sim_time

@@ -1,27 +1,19 @@
 """step_world: resets, commands and moves a world in lock-step, and answers with its state."""
 
 import threading
-from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from typing import Any
 
 import rospy
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
 
 from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.ros.services.stepping.addresses import Addresses
+from bullet_gazebo.ros.services.stepping.answers import JointsAnswer, fields_of
 from bullet_gazebo.ros.services.stepping.step_requests import StepPlan
-from bullet_gazebo.ros.wire.conversions import (
-    to_contact_state,
-    to_pose_msg,
-    to_time,
-    to_twist_msg,
-)
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state.names import UnknownName
-from bullet_gazebo.state.query import NOTHING, StateAnswer, StateQuery, StateReader
+from bullet_gazebo.state.query import NOTHING, StateQuery, StateReader
 
 SLICE = 500  # ticks between which other services get their turn
 
@@ -42,6 +34,7 @@ class StepService:
         self._watchdog = watchdog
         self._one_at_a_time = one_at_a_time
         self._reader = StateReader(sim.world, NOTHING)
+        self._addresses = Addresses(sim)
         self._knows_contacts = False  # the last tick's, which a reset or a placing makes void
         self._service = rospy.Service("~step_world", StepWorld, self._step)
 
@@ -49,19 +42,26 @@ class StepService:
         with self._one_at_a_time, self._sim.lock:
             self._sim.await_holds()
             try:
-                plan = StepPlan(self._sim, request)  # everything is checked before anything is done
+                # Everything is checked before anything is done.
+                plan = StepPlan(self._sim, request, self._found())
                 reader = self._reader_of(plan.query)
                 self._begin(request, plan)  # what is left to fail is a user's controller
             except (ControlError, UnknownName) as error:
                 return self._refusal(str(error))
             with self._watchdog:
-                self._advance(request.ticks, plan.held)
+                self._advance(request.ticks, plan)
             if request.ticks:
                 self._knows_contacts = True
             try:
                 return self._answer(reader, self._knows_contacts)
             except UnknownName as error:
                 return self._refusal(f"the ticks are done, but meanwhile {error}")
+
+    def _found(self) -> Addresses:
+        """What names stand for now; clients send the same again and again."""
+        if self._addresses.is_stale:
+            self._addresses = Addresses(self._sim)
+        return self._addresses
 
     def _reader_of(self, query: StateQuery) -> StateReader | None:
         """Clients ask the same again and again, so the names are looked up but once."""
@@ -83,63 +83,48 @@ class StepService:
             sim.place_model(model, pose, twist)
         for model, (positions, velocities) in plan.placed.items():
             sim.set_joint_states(model, positions, velocities)
-        for command in (*plan.commands, *plan.held):
-            command()
+        plan.send()
+        plan.hold()
 
-    def _advance(self, ticks: int, held: Sequence[Callable[[], None]]) -> None:
+    def _advance(self, ticks: int, plan: StepPlan) -> None:
         while ticks > SLICE:
-            self._pass(SLICE, held)
+            self._pass(SLICE, plan)
             ticks -= SLICE
             self._sim.lock.yield_turn()
             self._sim.await_holds()
         if ticks:
-            self._pass(ticks, held)
+            self._pass(ticks, plan)
 
-    def _pass(self, ticks: int, held: Sequence[Callable[[], None]]) -> None:
-        if not held:
+    def _pass(self, ticks: int, plan: StepPlan) -> None:
+        if not plan.holds:
             self._sim.advance(ticks)
             return
-        for _ in range(ticks):  # limits clip a command in place, to what one tick can do of it
-            for command in held:
-                command()
-            self._sim.advance(1)
+        left = ticks
+
+        def hold_on() -> bool:
+            nonlocal left
+            left -= 1
+            if left:  # not after the last tick: what limits have left of a command stays
+                plan.hold()
+            return False
+
+        plan.hold()
+        self._sim.advance(ticks, hold_on)
 
     def _answer(self, reader: StateReader | None, stepped: bool) -> StepWorldResponse:
+        sim, joints = self._sim, self._found().told_joints
+        if reader is None:
+            return JointsAnswer(joints, sim.sim_time, sim.now)
         return StepWorldResponse(
             success=True,
-            sim_time=self._sim.sim_time,
-            joint_states=self._joint_states(),
-            **({} if reader is None else _told(reader.read(stepped))),
+            sim_time=sim.sim_time,
+            joint_states=joints.message(sim.now),
+            **fields_of(reader.read(stepped)),
         )
 
     def _refusal(self, fault: str) -> StepWorldResponse:
         return StepWorldResponse(
             status_message=f"StepWorld: {fault}",
             sim_time=self._sim.sim_time,
-            joint_states=self._joint_states(),
+            joint_states=self._found().told_joints.message(self._sim.now),
         )
-
-    def _joint_states(self) -> JointState:
-        robots = self._sim.robots
-        scoped = len(robots) > 1
-        joints = [(robot, joint) for robot in robots for joint in robot.hardware.joints.values()]
-        return JointState(
-            header=Header(stamp=to_time(self._sim.now)),
-            name=[f"{r.model.name}::{j.name}" if scoped else j.name for r, j in joints],
-            position=[joint.position for _, joint in joints],
-            velocity=[joint.velocity for _, joint in joints],
-            effort=[joint.effort for _, joint in joints],
-        )
-
-
-def _told(answer: StateAnswer) -> dict[str, Any]:
-    """Fields of a response."""
-    models = answer.models.values()
-    return {
-        "model_names": list(answer.models),
-        "model_poses": [to_pose_msg(pose) for pose, _ in models],
-        "model_twists": [to_twist_msg(twist) for _, twist in models],
-        "link_poses": [to_pose_msg(pose) for pose, _ in answer.links],
-        "link_twists": [to_twist_msg(twist) for _, twist in answer.links],
-        "contacts": [to_contact_state(pair) for pair in answer.contacts],
-    }

@@ -1,0 +1,164 @@
+"""Polling before sleeping: for how long, when not at all, and that calls are the same with it.
+
+Nothing is timed: clocks tell what the tests say.
+"""
+
+import os
+
+import pytest
+from ros_fakes import FakeService, ok
+from std_srvs.srv import SetBool, SetBoolRequest
+
+from ros_calls import polling
+from ros_calls.polling import FIRST_REST, FORGIVEN, LONGEST, LONGEST_REST, RECENT, AdaptivePoll
+from ros_calls.tcpros import Connection, ConnectionEnded
+
+LOOK = 0.00001  # [s] that each look takes
+BRIEF = 0.0002  # [s] of a wait
+
+
+class Waits:
+    """Waits of a thread that polls, with a clock of their own."""
+
+    def __init__(self):
+        self.now = 0.0
+        self.poll = AdaptivePoll(lambda: self.now)
+
+    def wait(self, length, look=LOOK):
+        """Has something come after `length`; returns how often was looked for it."""
+        looks, end = self.poll.looks, self.now + length
+
+        def ready():
+            self.now += look
+            return self.now >= end
+
+        self.poll.before(ready)
+        self.now = max(self.now, end)
+        self.poll.after()
+        return self.poll.looks - looks
+
+    def warm_up(self):
+        for _ in range(RECENT):
+            self.wait(BRIEF)
+
+
+@pytest.fixture(autouse=True)
+def cores(monkeypatch):
+    """A machine with two cores, on which nothing else runs; a test changes what it likes."""
+    machine = {"cores": {0, 1}, "crowded": False}
+    monkeypatch.delenv(polling.SWITCH, raising=False)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _process: machine["cores"])
+    monkeypatch.setattr(polling, "is_crowded", lambda: machine["crowded"])
+    return machine
+
+
+def test_waits_are_polled_once_it_is_known_that_they_are_short():
+    waits = Waits()
+    assert [waits.wait(BRIEF) for _ in range(RECENT)] == [0] * RECENT
+    assert waits.wait(BRIEF) == pytest.approx(BRIEF / LOOK, abs=1)
+
+
+def test_what_does_not_come_is_polled_for_twice_the_longest_of_the_last_and_never_longer_than_the_bound():
+    waits = Waits()
+    waits.warm_up()
+    assert waits.wait(10.0) == pytest.approx(2 * BRIEF / LOOK, abs=1)
+    assert [waits.wait(BRIEF) for _ in range(RECENT)] == [
+        0
+    ] * RECENT  # after a long one nobody polls
+    waits.wait(0.9 * LONGEST)
+    assert waits.wait(10.0) == pytest.approx(LONGEST / LOOK, abs=1)
+
+
+def test_nothing_is_polled_where_waits_are_long():
+    waits = Waits()
+    assert sum(waits.wait(1.5 * LONGEST) for _ in range(100)) == 0
+
+
+def test_waits_of_no_length_are_polled_too():
+    waits = Waits()
+    assert [waits.wait(0.0) for _ in range(RECENT + 2)][-2:] == [1, 1]
+
+
+def test_who_loses_the_core_sleeps_for_longer_and_longer():
+    waits = Waits()
+    waits.warm_up()
+    rests = []
+    for _ in range(10):
+        assert waits.wait(BRIEF, look=2 * polling.LOST) == 1
+        rests.append(0)
+        while not waits.wait(BRIEF):
+            rests[-1] += 1
+    assert rests == [min(FIRST_REST * 2**n, LONGEST_REST) for n in range(10)]
+    for _ in range(10 * FORGIVEN):  # all is well for a while
+        assert waits.wait(BRIEF)
+    waits.wait(BRIEF, look=2 * polling.LOST)
+    assert [bool(waits.wait(BRIEF)) for _ in range(FIRST_REST + 1)] == [False] * FIRST_REST + [True]
+
+
+def test_nothing_is_polled_while_more_threads_want_to_run_than_there_are_cores(cores):
+    waits = Waits()
+    waits.warm_up()
+    for crowded in (True, False, True, False):
+        cores["crowded"] = crowded
+        assert [bool(waits.wait(BRIEF)) for _ in range(100)] == [not crowded] * 100
+
+
+def test_it_can_be_switched_off_and_needs_a_second_core(cores, monkeypatch):
+    cores["cores"] = {1}
+    alone = Waits()
+    cores["cores"] = {0, 1}
+    monkeypatch.setenv(polling.SWITCH, "0")
+    off = Waits()
+    monkeypatch.setenv(polling.SWITCH, "1")
+    on = Waits()
+    polled = [sum(waits.wait(BRIEF) for _ in range(2000)) > 0 for waits in (alone, off, on)]
+    assert polled == [False, False, True]
+
+
+def test_the_kernel_tells_how_many_threads_want_to_run(monkeypatch):
+    monkeypatch.undo()
+    for cores, crowded in ((10_000, False), (0, True)):
+        monkeypatch.setattr(os, "cpu_count", lambda cores=cores: cores or None)
+        monkeypatch.setattr(os, "pread", lambda *_where: b"0.10 0.20 0.30 2/345 678\n")
+        assert polling.is_crowded() is crowded
+    monkeypatch.undo()
+    monkeypatch.setattr(os, "cpu_count", lambda: 10_000_000)
+    assert not polling.is_crowded()  # the file as this machine has it
+    for text in (b"", b"0.1 0.2 0.3 nonsense 5\n"):
+        monkeypatch.setattr(os, "pread", lambda *_where, text=text: text)
+        assert polling.is_crowded()
+
+
+def test_calls_are_the_same_with_polling_and_an_end_is_told_at_once():
+    ticks = iter(range(10**9))
+    poll = AdaptivePoll(lambda: next(ticks) * 1e-6)  # however slow this machine is, waits are short
+    service = FakeService()
+    connection = Connection(service.address, "/fake", SetBool, 30.0, poll)
+    try:
+        answers = [connection.call(SetBoolRequest(n % 2 == 0), 30.0).success for n in range(50)]
+        assert answers == [n % 2 == 0 for n in range(50)]
+        assert poll.looks > 0
+        service.break_off()
+        with pytest.raises(ConnectionEnded):
+            connection.call(SetBoolRequest(True), 30.0)
+    finally:
+        connection.close()
+        service.close()
+
+
+def test_a_time_limit_holds_with_polling():
+    ticks = iter(range(10**9))
+    poll = AdaptivePoll(lambda: next(ticks) * 1e-6)
+    left = iter([True] * 6)
+    service = FakeService(lambda request: [ok(request.data)] if next(left, False) else None)
+    connection = Connection(service.address, "/fake", SetBool, 30.0, poll)
+    try:
+        for _ in range(6):
+            connection.call(SetBoolRequest(True), 30.0)
+        looks = poll.looks
+        with pytest.raises(TimeoutError):
+            connection.call(SetBoolRequest(True), 0.05)
+        assert poll.looks > looks
+    finally:
+        connection.close()
+        service.close()
