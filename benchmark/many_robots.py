@@ -36,6 +36,7 @@ TARGET, TARGET_ROBOTS = 0.40, 64  # of bare steps
 REAL_TIME_ROBOTS = 32
 REAL_TIME = 10.0  # [s]
 APART = 2.0  # [m]
+HEIGHT = 1.0  # [m] above the ground, which a pole would touch that falls
 Action = Callable[[int], None]  # does so many ticks
 
 
@@ -64,7 +65,7 @@ def make_world(urdf: str, robots: int, controllers: Mapping[str, Mapping[str, ob
     sim = Simulator(World(BulletEngine()), lockstep=True)
     sim.world.spawn("ground_plane", ground_plane(), Pose())
     for index in range(robots):
-        pose = Pose((0.0, APART * index, 0.0))
+        pose = Pose((0.0, APART * index, HEIGHT))
         add_robot(sim, f"robot{index}", urdf, pose, controllers, listener=None)
     return sim
 
@@ -105,7 +106,7 @@ def simulator(robots: int, **launch: bool) -> Iterator[Simulation]:
     """A running simulator with so many cart-poles under control."""
     with Simulation(**launch) as simulation, simulation.active():
         for index in range(robots):
-            add_cartpole(f"robot{index}", f"/robot{index}", pos_y=APART * index)
+            add_cartpole(f"robot{index}", f"/robot{index}", pos_y=APART * index, pos_z=HEIGHT)
         yield simulation
 
 
