@@ -33,6 +33,7 @@ from ros_utils.step_client import StepClient
 ROBOTS = (1, 8, 32, 64, 256)
 CALLS = (1, 20)  # ticks of one call of step_world
 TARGET, TARGET_ROBOTS = 0.40, 64  # of bare steps
+LEAN = 0.5  # [rad] of the poles at first: they swing
 REAL_TIME_ROBOTS = 32
 REAL_TIME = 10.0  # [s]
 APART = 2.0  # [m]
@@ -67,6 +68,8 @@ def make_world(urdf: str, robots: int, controllers: Mapping[str, Mapping[str, ob
     for index in range(robots):
         pose = Pose((0.0, APART * index, HEIGHT))
         add_robot(sim, f"robot{index}", urdf, pose, controllers, listener=None)
+    for model in list(sim.world.models.values())[1:]:
+        sim.set_joint_states(model, {"cart_pole": LEAN}, {})
     return sim
 
 
@@ -116,7 +119,7 @@ def over_ros(urdf: str, rounds: int, seconds: float) -> dict[int, dict[str, floa
     for robots in ROBOTS:
         with simulator(robots, lockstep=True):
             client = StepClient()
-            client.reset()
+            client.reset({f"robot{i}::cart_pole": LEAN for i in range(robots)})
             commands = [dict.fromkeys((f"/robot{i}/{CART}" for i in range(robots)), x) for x in (0.0, 0.02)]
             calls = 0
 
