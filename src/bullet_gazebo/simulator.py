@@ -162,7 +162,7 @@ class Simulator:
             if until is not None and until():
                 break
         for robot in self.robots:
-            robot.read()
+            robot.read_ahead()
         return passed
 
     def step(self, ticks: int) -> None:
@@ -184,7 +184,7 @@ class Simulator:
                 self._tick()
         with self.lock:
             for robot in self.robots:
-                robot.read()
+                robot.read_ahead()
 
     def await_holds(self) -> None:
         """Waits until nobody holds time; for those who step, in whose lock others go on meanwhile."""

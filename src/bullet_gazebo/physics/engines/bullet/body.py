@@ -203,6 +203,7 @@ class BulletBody(Body):
         )  # fmt: skip
 
     def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
+        self.moved = True
         pybullet.resetJointState(self.id, self._indices[index], position, velocity, self._client)
 
     def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
@@ -217,7 +218,7 @@ class BulletBody(Body):
             )
 
     def _put_base(self, com: Pose) -> None:
-        self._base = com
+        self._base, self.moved = com, True
         pybullet.resetBasePositionAndOrientation(self.id, *com, physicsClientId=self._client)
 
     def go_on_from(self, other: "BulletBody") -> None:
