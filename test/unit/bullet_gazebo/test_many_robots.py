@@ -1,4 +1,4 @@
-"""Many robots in one world: neither what a robot costs nor how it moves depends on how many others there are."""
+"""Many robots in one world: neither the cost of one nor how it moves depends on how many others there are."""
 
 import random
 import sys
