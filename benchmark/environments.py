@@ -18,6 +18,7 @@ import numpy as np
 import reporting
 
 import cartpole  # noqa: F401 - registers the environments
+from cartpole.robot import CONTROLLER
 
 IDS = ("cartpole/Balance-v0", "cartpole/Classic-v0", "cartpole/SwingUp-v0")
 VECTOR = IDS[0]
@@ -74,7 +75,7 @@ def robot_alone() -> Callable[[], int]:
 
     def batch() -> int:
         for index in range(BATCH):
-            env.backend.act((0.02 * (index % 2),))
+            env.backend.act({CONTROLLER: 0.02 * (index % 2)})
         return BATCH
 
     return batch
