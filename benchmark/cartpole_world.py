@@ -6,7 +6,9 @@ CART = "stand_cart_position_controller"
 CONTROLLERS = ["joint_state_controller", CART]
 
 
-def add_cartpole(name: str = "cartpole", namespace: str = "/", pos_y: float = 0.0) -> None:
+def add_cartpole(
+    name: str = "cartpole", namespace: str = "/", pos_y: float = 0.0, pos_z: float = 0.0
+) -> None:
     """Spawns a cart-pole and starts its two controllers, in the simulator that is active."""
     loaded = ros_urdf.urdf_load_from_pkg(
         "cartpole_gazebo", "cartpole_v1.urdf", "robot_description", folder="/robots", ns=namespace
@@ -14,7 +16,7 @@ def add_cartpole(name: str = "cartpole", namespace: str = "/", pos_y: float = 0.
         "cartpole_controller", "joint_position_control.yaml", ns=namespace
     )
     spawned, text = ros_gazebo.gazebo_spawn_urdf_param(
-        "robot_description", model_name=name, robot_namespace=namespace, pos_y=pos_y
+        "robot_description", model_name=name, robot_namespace=namespace, pos_y=pos_y, pos_z=pos_z
     )
     if not (
         loaded and spawned and ros_controllers.spawn_controllers_srv(CONTROLLERS, ns=namespace)

@@ -60,6 +60,7 @@ class ControlledRobot:
         self._watched = [index for name, index in indices.items() if name not in moved]
         self._others = [index for name, index in indices.items() if name not in hardware.joints]
         self._watch = StabilityWatch(model, hardware, manager, tell)
+        self._knows = False  # the state that the next tick begins with
         self.review_gains()
         manager.on_change = self.review_gains
         self.read()
@@ -69,6 +70,7 @@ class ControlledRobot:
         """Looks for gains that the step of the physics can't follow: when they change, or the step does."""
         self._fast = FAST / self.model.time_step
         self._slow = -self._fast
+        self._knows = False
         self._watch.review(self._control_period / NANOSECONDS)
 
     def read(self) -> None:
@@ -87,9 +89,21 @@ class ControlledRobot:
         if not calm:
             self._contain(states)
 
+    def read_ahead(self) -> None:
+        """Reads what the next tick would begin with, and so spares it that, unless something moves the robot
+        in between: whoever steps wants the state after each call, and calls may be of one tick."""
+        self.model.body.moved = False
+        self.read()
+        self._knows = True
+
     def update(self, now: int, dt: float) -> None:
         """Reads, and updates the controllers if it is their turn; `now` [ns], `dt` [s] is the step."""
-        self.read()
+        if self._knows:
+            self._knows = False
+            if self.model.body.moved:
+                self.read()
+        else:
+            self.read()
         if self._control_period:
             self._update_in_time(now, round(dt * NANOSECONDS))
         else:

@@ -56,6 +56,7 @@ class Simulator:
         self.relatch = relatch
         self.now = 0  # [ns] of simulated time
         self.robots: list[ControlledRobot] = []
+        self._robots_of: dict[Model, list[ControlledRobot]] = {}
         self._robots_version = 0
         self.applied = AppliedForces()
         # Called with `now` before each physics step.
@@ -162,7 +163,7 @@ class Simulator:
             if until is not None and until():
                 break
         for robot in self.robots:
-            robot.read()
+            robot.read_ahead()
         return passed
 
     def step(self, ticks: int) -> None:
@@ -184,7 +185,7 @@ class Simulator:
                 self._tick()
         with self.lock:
             for robot in self.robots:
-                robot.read()
+                robot.read_ahead()
 
     def await_holds(self) -> None:
         """Waits until nobody holds time; for those who step, in whose lock others go on meanwhile."""
@@ -196,11 +197,16 @@ class Simulator:
         # Its controllers may start before time moves on.
         robot.joints_moved(self.now, relatch=False)
         self.robots.append(robot)
+        self._robots_of.setdefault(robot.model, []).append(robot)
         self._robots_version += 1
 
     def remove_robot(self, robot: ControlledRobot) -> None:
         """Ends control of a robot; the caller holds the lock."""
         self.robots.remove(robot)
+        same = self._robots_of[robot.model]
+        same.remove(robot)
+        if not same:
+            del self._robots_of[robot.model]
         self._robots_version += 1
 
     def set_joint_positions(self, model: Model, positions: Mapping[str, float]) -> None:
@@ -265,9 +271,8 @@ class Simulator:
                 robot.joints_moved(self.now, relatch=False)
 
     def _joints_moved(self, model: Model) -> None:
-        for robot in self.robots:
-            if robot.model is model:
-                robot.joints_moved(self.now, self.relatch)
+        for robot in self._robots_of.get(model, ()):
+            robot.joints_moved(self.now, self.relatch)
 
     def reset(self, everything: bool) -> None:
         """Resets the world, or the simulation with `everything`; the caller holds the lock."""

@@ -47,11 +47,12 @@ class JointHandle:
     def clamped(self, position: float) -> float:
         """Returns `position` within the limits of a revolute or prismatic joint."""
         limits = self.limits
-        if limits.lower is None or limits.upper is None:
+        lower, upper = limits.lower, limits.upper
+        if lower is None or upper is None:
             return position
-        if position < limits.lower:
-            return limits.lower
-        return min(position, limits.upper)
+        if position < lower:
+            return lower
+        return upper if upper < position else position
 
     def way_to(self, position: float) -> float:
         """Returns the way from here to `position` [rad, m] (docs/contract/ros_control.md 3.2).

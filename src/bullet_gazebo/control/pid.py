@@ -110,12 +110,13 @@ class Pid:
             bounds = (gains.i_min / gains.i, gains.i_max / gains.i)
             self.i_error = max(min(bounds), min(max(bounds), self.i_error))
         i_term = gains.i * self.i_error
-        if not gains.antiwindup:
-            i_term = max(gains.i_min, min(gains.i_max, i_term))
-        self.output = gains.p * error + i_term + gains.d * rate
+        if not gains.antiwindup:  # min() and max() written out: to call them cost a third of a PID
+            i_term = i_term if i_term < gains.i_max else gains.i_max
+            i_term = i_term if i_term > gains.i_min else gains.i_min
+        self.output = output = gains.p * error + i_term + gains.d * rate
         if self.sink is not None and self.listeners() > 0:
             self.sink(self._sample(i_term, dt))
-        return self.output
+        return output
 
     def _sample(self, i_term: float, dt: float) -> PidSample:
         gains = self.gains

@@ -49,6 +49,8 @@ class Body(ABC):
     """Whether the damping of joints acts on their velocity after the step, not before it."""
     joint_names: tuple[str, ...]
     link_names: tuple[str, ...]
+    moved = True
+    """Whether something but time has moved it since this was set to False."""
 
     @abstractmethod
     def joint_states(self) -> Sequence[Sequence[float]]:

@@ -72,7 +72,7 @@ class World:
             self.engine.remove(body)
             raise
         self.models[name] = model
-        self._index()
+        self._index(model)
         model.number = self.version
         return model
 
@@ -83,7 +83,8 @@ class World:
             KeyError: if there is none.
         """
         self.engine.remove(self.models.pop(name).body)
-        self._index()
+        self._entities, self._joints = {}, {}
+        self._index(*self.models.values())
 
     def model(self, name: str) -> Model | None:
         """Returns what the name look-up finds, if it is a model (docs/contract/gazebo.md 2.0)."""
@@ -177,12 +178,11 @@ class World:
             if body is not model.body:
                 model.go_on_in(body)
 
-    def _index(self) -> None:
-        """After a model came or went: maps plain and scoped names to what a depth-first walk from the world's
-        root finds first."""
+    def _index(self, *models: Model) -> None:
+        """After models came or went: maps plain and scoped names to what a depth-first walk from the world's
+        root finds first. What came last is found last, so it takes no look at the others."""
         self.version += 1
-        self._entities, self._joints = {}, {}
-        for model in self.models.values():
+        for model in models:
             self._entities.setdefault(model.name, Entity("model", model, model.name))
             for link in model.link_names:
                 self._enter(Entity("link", model, link), f"{model.name}::{link}")

@@ -39,7 +39,7 @@ class EffortGroupPosition(Controller):
     def command_all(self, values: Sequence[float]) -> None:
         check_length(self, values, len(self._loops))
         for loop, value in zip(self._loops, values, strict=True):
-            loop.set_point = value
+            loop.command(value)
 
     def starting(self, now: int) -> None:
         for loop in self._loops:

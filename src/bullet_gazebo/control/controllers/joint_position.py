@@ -25,15 +25,16 @@ class EffortJointPosition(PidJoint):
         return self._loop.set_point
 
     def command(self, value: float) -> None:
-        self._loop.set_point = value
+        self._loop.command(value)
 
     def starting(self, now: int) -> None:
         self._loop.hold()
 
     def update(self, now: int, dt: float) -> None:
-        target, error = self._loop.update(dt)
+        error = self._loop.update(dt)
         if self._report.due():
-            self._report.send(now, dt, target, self.joint.position, self.joint.velocity, error)
+            joint = self.joint
+            self._report.send(now, dt, self._loop.target, joint.position, joint.velocity, error)
 
 
 class VelocityJointPosition(EffortJointPosition):

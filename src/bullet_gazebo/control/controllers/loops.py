@@ -16,28 +16,31 @@ REPORT_EVERY = 10  # updates
 class PositionLoop:
     """Holds a joint at its set-point [rad, m] (docs/contract/ros_control.md 3.2)."""
 
-    __slots__ = ("_compute", "_straight", "joint", "pid", "set_point")
+    __slots__ = ("_straight", "joint", "pid", "set_point", "target")
 
     def __init__(self, joint: JointHandle, pid: Pid) -> None:
         self.joint = joint
         self.pid = pid
-        self.set_point = 0.0
-        self._compute = pid.compute
         self._straight = joint.kind == "prismatic"
+        self.command(0.0)
+
+    def command(self, set_point: float) -> None:
+        """Takes a new set-point, and clamps it: here, not on each tick."""
+        self.set_point = set_point
+        self.target = self.joint.clamped(set_point)
 
     def hold(self) -> None:
         """Makes the joint's present position the set-point."""
-        self.set_point = self.joint.clamped(self.joint.position)
+        self.command(self.joint.clamped(self.joint.position))
         self.pid.clear()
 
-    def update(self, dt: float) -> tuple[float, float]:
-        """Commands the joint; returns the clamped set-point and the error [rad, m]."""
-        joint = self.joint
-        target = joint.clamped(self.set_point)
+    def update(self, dt: float) -> float:
+        """Commands the joint; returns the error [rad, m]: the way to the clamped set-point."""
+        joint, target = self.joint, self.target
         # The short way for a rail: this runs on every tick.
         error = target - joint.position if self._straight else joint.way_to(target)
-        joint.command = self._compute(error, dt)
-        return target, error
+        joint.command = self.pid.compute(error, dt)
+        return error
 
 
 class StateReport:

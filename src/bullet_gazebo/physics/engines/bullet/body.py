@@ -65,10 +65,13 @@ class BulletBody(Body):
         self._states: Callable[[], Sequence[Sequence[float]]] = tuple  # of a body without joints
         if self._indices:
             self._states = partial(pybullet.getJointStates, body, self._indices, client)
-        self._efforts = partial(
-            pybullet.setJointMotorControlArray, body, self._indices, pybullet.TORQUE_CONTROL,
-            physicsClientId=client,
+        # All by position, though torques need neither targets nor gains: PyBullet takes half as long again
+        # to look for names.
+        unused = [0.0] * len(self._indices)
+        self._torques = partial(
+            pybullet.setJointMotorControlArray, body, self._indices, pybullet.TORQUE_CONTROL, unused, unused
         )  # fmt: skip
+        self._unused = unused
         self._base = pose.compose(self._com)  # where the centre of mass was put last
         if not is_plane(description):
             self.reset_base(pose)
@@ -135,7 +138,8 @@ class BulletBody(Body):
         return self._states()
 
     def apply_efforts(self, efforts: Sequence[float]) -> None:
-        self._efforts(forces=efforts)
+        unused = self._unused
+        self._torques(efforts, unused, unused, self._client)
 
     def add_effort(self, index: int, effort: float) -> None:
         # The engine sums torques up until the step, and forgets them then.
@@ -199,6 +203,7 @@ class BulletBody(Body):
         )  # fmt: skip
 
     def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
+        self.moved = True
         pybullet.resetJointState(self.id, self._indices[index], position, velocity, self._client)
 
     def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
@@ -213,7 +218,7 @@ class BulletBody(Body):
             )
 
     def _put_base(self, com: Pose) -> None:
-        self._base = com
+        self._base, self.moved = com, True
         pybullet.resetBasePositionAndOrientation(self.id, *com, physicsClientId=self._client)
 
     def go_on_from(self, other: "BulletBody") -> None:

@@ -164,12 +164,13 @@ class MujocoBody(Body):
             self._state.speeds.pop(place, None)
 
     def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
+        self.moved = True
         self._qpos[self._q[index]] = position
         self._qvel[self._v[index]] = velocity
         self._state.stale = True
 
     def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
-        self._state.stale = True
+        self._state.stale = self.moved = True
         orientation = wxyz(pose.orientation)
         if self._free is None:
             self.pose = pose
