@@ -51,7 +51,7 @@ def test_importing_the_package_loads_no_engine_no_ros_and_no_torch():
     [
         (
             {"backend": "gazebo"},
-            "there is no backend 'gazebo'; there are bullet, mujoco, ros, ros-realtime",
+            "there is no backend 'gazebo'; there are bullet, mujoco, ros, ros-own, ros-realtime",
         ),
         ({"engine": "mujoco"}, "no option 'engine'"),
         ({"sensor_noize": 0.1}, "did you mean 'sensor_noise'"),

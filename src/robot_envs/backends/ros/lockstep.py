@@ -9,11 +9,12 @@ from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldRespons
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.ros.bring_up import STEP_SERVICE, full_name, ready
-from robot_envs.backends.ros.messages import JointReader, ask_for, place, pose_of, told
 from robot_envs.backends.ros.own_simulator import OwnSimulator
 from robot_envs.backends.ros.service import ServiceClient
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.backends.ros.variation import RosVariation
+from robot_envs.backends.ros.wire.messages import JointReader, ask_for, place, pose_of, told
+from robot_envs.backends.ros.wire.step_request import StepRequest
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
@@ -51,7 +52,7 @@ class LockstepWorld:
         )
         moved = [f"{robot.model}::{name}" for robot, name in scene.moved.values()]
         self._begin = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=moved)
-        self._advance = StepWorldRequest(ticks=ticks)
+        self._advance = StepRequest(ticks)
         self._look = StepWorldRequest()
         self._step.timeout += time_of(ticks)
         self._full = {
@@ -79,8 +80,8 @@ class LockstepWorld:
         ask_for(self._look, query)
         if query != StateQuery() and its_turn:  # otherwise its reset tells what isn't there
             self._call(self._look)  # no ticks: it only looks
-        for request in (self._begin, self._advance):
-            ask_for(request, query)
+        ask_for(self._begin, query)
+        self._advance.ask_for(query)
         self._query = query
 
     def reset(self, initial: InitialState) -> WorldState:
@@ -121,8 +122,7 @@ class LockstepWorld:
                 numbers.append(command)
             else:
                 numbers += command
-        self._advance.controllers = [self._full[name] for name in commands]
-        self._advance.commands = numbers
+        self._advance.command(tuple([self._full[name] for name in commands]), numbers)
         with self._simulator:
             self._step.begin(self._advance)
         self._pending = commands
