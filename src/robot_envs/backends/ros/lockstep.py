@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import genpy
-from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
+from bullet_gazebo_msgs.srv import StepWorldRequest, StepWorldResponse
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.ros.bring_up import STEP_SERVICE, full_name, ready
@@ -14,6 +14,7 @@ from robot_envs.backends.ros.service import ServiceClient
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.backends.ros.variation import RosVariation
 from robot_envs.backends.ros.wire.messages import JointReader, ask_for, place, pose_of, told
+from robot_envs.backends.ros.wire.step_answer import StepKind
 from robot_envs.backends.ros.wire.step_request import StepRequest
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
@@ -48,7 +49,7 @@ class LockstepWorld:
         self.scene, self._turn = scene, turn
         self._simulator = OwnSimulator()
         self._step = ServiceClient(
-            STEP_SERVICE, StepWorld, persistent=True, timeout=timeout, polls=True
+            STEP_SERVICE, StepKind(), persistent=True, timeout=timeout, polls=True
         )
         moved = [f"{robot.model}::{name}" for robot, name in scene.moved.values()]
         self._begin = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=moved)
