@@ -74,5 +74,6 @@ class Turn:
         if self._holder is not who:
             raise SimulatorError(
                 "another environment of this process has moved the same robot since this one's reset(); "
-                "over ROS use them one after the other, each beginning with reset()"
+                "over ROS use them one after the other, each beginning with reset(), or each in a simulator "
+                'of its own: backend="ros-own"'
             )
