@@ -130,10 +130,14 @@ class PrivateSimulator:
             self._process.wait(ENDING)
         self._bury()
 
-    def post_mortem(self) -> str:
-        """Ends one that has failed, and says how it ended, and what it has said last."""
+    def post_mortem(self, hangs: bool) -> str:
+        """Ends one that has failed, and says how it ended, and what it has said last.
+
+        Args:
+            hangs: it won't end by itself.
+        """
         try:
-            self._process.wait(FALLING)
+            self._process.wait(0.0 if hangs else FALLING)
             how = f"{_told(self._process.returncode)}, "
         except subprocess.TimeoutExpired:
             how = ""

@@ -21,7 +21,7 @@ from robot_envs.backends.ros.own_world.simulator import PrivateSimulator
 from robot_envs.backends.ros.simulator_world import physics_step
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.backends.world_files import world_models
-from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault
+from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, SimulatorHangs
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
@@ -209,7 +209,8 @@ class RestartingWorld:
     def _ended(self, error: Exception) -> str:
         """Ends a simulator that failed; returns what happened."""
         self._disconnect()
-        return f"{self._simulator} failed: {error}; {self._simulator.post_mortem()}"
+        end = self._simulator.post_mortem(isinstance(error, SimulatorHangs))
+        return f"{self._simulator} failed: {error}; {end}"
 
     def _disconnect(self) -> None:
         if self._world is not None:
