@@ -18,7 +18,7 @@ LONGEST = 0.001  # [s]; what takes longer is slept for
 SHORTEST = 0.00005  # [s]; for waits that were next to nothing
 RECENT = 4  # waits that tell how long the next one may be
 LOST = 0.0001  # [s] between two looks: somebody else had the core, or Python's lock
-FIRST_REST, LONGEST_REST = 8, 1024  # waits that aren't polled after another one has had the core
+FIRST_REST, LONGEST_REST = 8, 1024  # waits that aren't polled after a poll that was in vain
 FORGIVEN = 8  # polls that were worth it, after which the next rest is half as long again
 
 
@@ -26,9 +26,10 @@ class AdaptivePoll:
     """Polls before a thread sleeps; one for each end of a connection.
 
     Each wait lies between `before` and `after`. It is polled for twice as long as the longest of the last few
-    took, unless one of them took longer than LONGEST: so nothing is polled where nothing comes, and neither
-    while more threads want to run on this machine than it has cores. The core is offered to others between
-    two looks. When one keeps it, waits to come are slept for: eight, and twice as many each time.
+    took, unless one of them took longer than LONGEST: so nothing is polled where nothing comes. Neither is it
+    while more threads want to run on this machine than this process may use cores. The core is offered to
+    others between two looks. When one keeps it, or nothing has come in time, waits to come are slept for:
+    eight, and twice as many each time.
     """
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
@@ -36,7 +37,8 @@ class AdaptivePoll:
         self._clock = clock
         self._waits = deque([math.inf] * RECENT, maxlen=RECENT)  # [s]
         self._begin = 0.0  # [s]
-        self._rest = 0.0 if is_wanted() else math.inf
+        self._cores = 0 if is_off() else cores()
+        self._rest = 0
         self._next_rest = FIRST_REST
         self._worth = 0  # polls, since a rest was made shorter
         self.looks = 0  # that have been taken: for who wants to know what polling costs
@@ -52,7 +54,7 @@ class AdaptivePoll:
             self._rest -= 1
             return
         expected = max(self._waits)
-        if expected > LONGEST or is_crowded():
+        if expected > LONGEST or self._cores < 2 or running() > self._cores:
             return
         end = begin + max(SHORTEST, min(2.0 * expected, LONGEST))
         looked = begin
@@ -60,13 +62,11 @@ class AdaptivePoll:
             self.looks += 1
             found = ready()
             now = self._clock()
-            if now - looked > LOST:
+            if now - looked > LOST or (now >= end and not found):
                 self._give_up()
                 return
             if found:
                 self._count_worth()
-                return
-            if now >= end:
                 return
             looked = now
             os.sched_yield()
@@ -87,21 +87,25 @@ class AdaptivePoll:
             self._next_rest = max(self._next_rest // 2, FIRST_REST)
 
 
-def is_wanted() -> bool:
-    """Whether this process may poll at all: it may use several cores, and nobody has switched it off."""
-    return os.environ.get(SWITCH, "1") != "0" and len(os.sched_getaffinity(0)) > 1
+def is_off() -> bool:
+    """Whether somebody has switched it off for this process."""
+    return os.environ.get(SWITCH) == "0"
 
 
-def is_crowded() -> bool:
-    """Whether more threads want to run than this machine has cores, the one that asks among them.
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0))
 
-    Where that can't be told it counts as crowded.
+
+def running() -> float:
+    """How many threads of this machine run or want to, the one that asks among them.
+
+    In a container, too, it is those of the whole machine. Where that can't be told it is infinity.
     """
     try:
-        running = os.pread(_load_file(), 128, 0).split()[3].partition(b"/")[0]
-        return int(running) > (os.cpu_count() or 1)
+        return int(os.pread(_load_file(), 128, 0).split()[3].partition(b"/")[0])
     except (OSError, ValueError, IndexError):
-        return True
+        return math.inf
 
 
 @cache

@@ -142,7 +142,11 @@ def _request(
 ) -> StepWorldRequest:
     values: list[float] = []
     for command in commands.values():
-        values += command if isinstance(command, Sequence) else [command]
+        # Nearly always; whether it is a Sequence takes longer to tell.
+        if isinstance(command, float):
+            values.append(command)
+        else:
+            values += command if isinstance(command, Sequence) else [command]
     return StepWorldRequest(
         ticks=ticks,
         controllers=list(commands),

@@ -3,6 +3,7 @@
 Nothing is timed: clocks tell what the tests say.
 """
 
+import math
 import os
 
 import pytest
@@ -43,13 +44,13 @@ class Waits:
 
 
 @pytest.fixture(autouse=True)
-def cores(monkeypatch):
-    """A machine with two cores, on which nothing else runs; a test changes what it likes."""
-    machine = {"cores": {0, 1}, "crowded": False}
+def machine(monkeypatch):
+    """Two cores, on which nothing else runs; a test changes what it likes."""
+    state = {"cores": 2, "running": 2}
     monkeypatch.delenv(polling.SWITCH, raising=False)
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _process: machine["cores"])
-    monkeypatch.setattr(polling, "is_crowded", lambda: machine["crowded"])
-    return machine
+    monkeypatch.setattr(polling, "cores", lambda: state["cores"])
+    monkeypatch.setattr(polling, "running", lambda: state["running"])
+    return state
 
 
 def test_waits_are_polled_once_it_is_known_that_they_are_short():
@@ -62,10 +63,10 @@ def test_what_does_not_come_is_polled_for_twice_the_longest_of_the_last_and_neve
     waits = Waits()
     waits.warm_up()
     assert waits.wait(10.0) == pytest.approx(2 * BRIEF / LOOK, abs=1)
-    assert [waits.wait(BRIEF) for _ in range(RECENT)] == [
-        0
-    ] * RECENT  # after a long one nobody polls
-    waits.wait(0.9 * LONGEST)
+    assert [waits.wait(BRIEF) for _ in range(FIRST_REST)] == [0] * FIRST_REST
+    waits.poll = AdaptivePoll(lambda: waits.now)
+    for _ in range(RECENT):
+        waits.wait(0.9 * LONGEST)
     assert waits.wait(10.0) == pytest.approx(LONGEST / LOOK, abs=1)
 
 
@@ -79,12 +80,16 @@ def test_waits_of_no_length_are_polled_too():
     assert [waits.wait(0.0) for _ in range(RECENT + 2)][-2:] == [1, 1]
 
 
-def test_who_loses_the_core_sleeps_for_longer_and_longer():
+@pytest.mark.parametrize("sign", ["nothing came", "the core was lost"])
+def test_who_polls_in_vain_sleeps_for_longer_and_longer(sign):
     waits = Waits()
     waits.warm_up()
     rests = []
     for _ in range(10):
-        assert waits.wait(BRIEF, look=2 * polling.LOST) == 1
+        if sign == "nothing came":
+            assert waits.wait(LONGEST) > 1
+        else:
+            assert waits.wait(BRIEF, look=2 * polling.LOST) == 1
         rests.append(0)
         while not waits.wait(BRIEF):
             rests[-1] += 1
@@ -95,38 +100,39 @@ def test_who_loses_the_core_sleeps_for_longer_and_longer():
     assert [bool(waits.wait(BRIEF)) for _ in range(FIRST_REST + 1)] == [False] * FIRST_REST + [True]
 
 
-def test_nothing_is_polled_while_more_threads_want_to_run_than_there_are_cores(cores):
+@pytest.mark.parametrize(("cores", "running"), [(2, 3), (4, 4), (4, 5), (64, 65), (2, math.inf)])
+def test_nothing_is_polled_while_more_threads_want_to_run_than_there_are_cores(
+    machine, cores, running
+):
+    machine["cores"] = cores
     waits = Waits()
     waits.warm_up()
-    for crowded in (True, False, True, False):
-        cores["crowded"] = crowded
-        assert [bool(waits.wait(BRIEF)) for _ in range(100)] == [not crowded] * 100
+    for others in (running, 2, running, 2):
+        machine["running"] = others
+        assert [bool(waits.wait(BRIEF)) for _ in range(100)] == [others <= cores] * 100
 
 
-def test_it_can_be_switched_off_and_needs_a_second_core(cores, monkeypatch):
-    cores["cores"] = {1}
-    alone = Waits()
-    cores["cores"] = {0, 1}
-    monkeypatch.setenv(polling.SWITCH, "0")
-    off = Waits()
-    monkeypatch.setenv(polling.SWITCH, "1")
-    on = Waits()
-    polled = [sum(waits.wait(BRIEF) for _ in range(2000)) > 0 for waits in (alone, off, on)]
+def test_it_can_be_switched_off_and_needs_a_second_core(machine, monkeypatch):
+    polled = []
+    for cores, switch in ((1, "1"), (2, "0"), (2, "1")):
+        machine["cores"] = cores
+        machine["running"] = 1
+        monkeypatch.setenv(polling.SWITCH, switch)
+        waits = Waits()
+        polled.append(sum(waits.wait(BRIEF) for _ in range(2000)) > 0)
     assert polled == [False, False, True]
 
 
 def test_the_kernel_tells_how_many_threads_want_to_run(monkeypatch):
     monkeypatch.undo()
-    for cores, crowded in ((10_000, False), (0, True)):
-        monkeypatch.setattr(os, "cpu_count", lambda cores=cores: cores or None)
-        monkeypatch.setattr(os, "pread", lambda *_where: b"0.10 0.20 0.30 2/345 678\n")
-        assert polling.is_crowded() is crowded
-    monkeypatch.undo()
-    monkeypatch.setattr(os, "cpu_count", lambda: 10_000_000)
-    assert not polling.is_crowded()  # the file as this machine has it
-    for text in (b"", b"0.1 0.2 0.3 nonsense 5\n"):
+    assert 1 <= polling.running() < 1e6  # in the file as this machine has it
+    for text, running in (
+        (b"0.10 0.20 0.30 2/345 678\n", 2),
+        (b"", math.inf),
+        (b"0.1 0.2 0.3 nonsense 5\n", math.inf),
+    ):
         monkeypatch.setattr(os, "pread", lambda *_where, text=text: text)
-        assert polling.is_crowded()
+        assert polling.running() == running
 
 
 def test_calls_are_the_same_with_polling_and_an_end_is_told_at_once():

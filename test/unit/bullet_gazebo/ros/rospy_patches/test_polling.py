@@ -38,8 +38,9 @@ class Served:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.polls: list[AdaptivePoll] = []
         self.handled: list[TCPROSTransport] = []
-        monkeypatch.setattr(general, "is_wanted", lambda: True)
-        monkeypatch.setattr(general, "is_crowded", lambda: False)
+        monkeypatch.delenv(general.SWITCH, raising=False)
+        monkeypatch.setattr(general, "cores", lambda: 2)
+        monkeypatch.setattr(general, "running", lambda: 2)
         monkeypatch.setattr(polling, "AdaptivePoll", self._make)
         monkeypatch.setattr(
             ServiceImpl, "handle", lambda _self, transport, _header: self.handled.append(transport)
