@@ -47,6 +47,7 @@ COMMANDS = {
     "benchmark": _Command(
         "benchmarking", "train several seeds, or a suite; table per seed, curves"
     ),
+    "jobs": _Command("listing", "how the trainings of a benchmark or a sweep are getting on"),
 }
 PACKAGE = "rl_workbench.tools.commands"
 

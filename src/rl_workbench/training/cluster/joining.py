@@ -4,29 +4,34 @@ import contextlib
 import logging
 import os
 import secrets
-import shutil
 import signal
 import tempfile
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.extras import need
 from rl_workbench.training.cluster.address import AUTO, LOCAL, check_address, without_auto
 from rl_workbench.training.cluster.nodes import Cluster
+from rl_workbench.training.cluster.obituary import obituary
+from rl_workbench.training.cluster.scratch import scratch_folder
 from rl_workbench.training.run.progress import warn
 
 STORE = 128 * 2**20  # [bytes] of a local cluster's object store, which jobs hardly use
 SOCKETS = 107  # [bytes] in the path of a socket, at most
-SESSION = len("/ray_12345678/session_2000-01-01_00-00-00_000000_1234567/sockets/plasma_store")
+SESSION = len("/ray_1234567_12345678/session_2000-01-01_00-00-00_000000_1234567/sockets/plasma_store")
 # What Ray reads as it is imported: nothing is sent home, nothing is told but errors, `uv` isn't looked for.
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
     "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
+    "RAY_DEDUP_LOGS_SKIP_REGEX": ".",  # what its daemons say of workers and nodes that die: pages
 }
 PATIENCE = 60.0  # [s] until every node has started a worker that answers
+LOST = (
+    "this process was ended from outside, as by kill -9, or by Ray, since its node on this machine is lost; "
+    "the same command goes on"
+)
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -47,6 +52,7 @@ def joined(address: str, say: Callable[[str], None] = warn) -> Iterator[Cluster]
     for name, value in QUIET.items():
         os.environ.setdefault(name, value)
     with contextlib.ExitStack() as stack:
+        stack.enter_context(obituary(LOST))
         ray = _started(stack) if address == LOCAL else _found(without_auto(address))
         stack.callback(ray.shutdown)
         cluster = Cluster(ray, say)
@@ -61,8 +67,7 @@ def _started(stack: contextlib.ExitStack) -> Any:
     place = tempfile.gettempdir()
     if len(os.fsencode(place)) + SESSION > SOCKETS:
         place = "/tmp"
-    folder = Path(tempfile.mkdtemp(prefix="ray_", dir=place))
-    stack.callback(shutil.rmtree, folder, ignore_errors=True)
+    folder = stack.enter_context(scratch_folder("ray", place))
     own = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(32), "RAY_worker_niceness": "0"}
     stack.enter_context(_environment(own))
     return _init(
@@ -97,6 +102,8 @@ def _init(what: str, **options: Any) -> Any:
     except (RuntimeError, ValueError, OSError, ray.exceptions.RayError) as error:
         ray.shutdown()
         text = " ".join(str(error).split())
+        if isinstance(error, ConnectionError):  # what answers speaks as a head does
+            text += "; it answers, but its token (RAY_AUTH_TOKEN, ray get-auth-token) may be another"
         raise WorkbenchError(f"can't join {what}: {text}") from error
     finally:
         for number, handler in before.items():  # Ray's own would leave out what ours save

@@ -14,7 +14,7 @@ class Node:
     """A machine of the cluster."""
 
     id: str
-    name: str  # its address, for the user
+    name: str  # for the user: its address, and the beginning of its id
     cpus: int
 
 
@@ -54,7 +54,8 @@ class Cluster:
                 self._known.add(id)
                 cpus = int(each["Resources"].get("CPU", 0))
                 answer = self._look.options(label_selector=only(id)).remote(self._packages)
-                self._asked[answer] = Node(id, each["NodeManagerAddress"], cpus)
+                name = f"{each['NodeManagerAddress']} ({id[:4]})"
+                self._asked[answer] = Node(id, name, cpus)
         if self._asked:
             asked = list(self._asked)
             answered, _ = self.ray.wait(asked, num_returns=len(asked), timeout=patience)
@@ -64,7 +65,7 @@ class Cluster:
     def _take(self, node: Node, answer: Any) -> None:
         problem = self._problem(answer)
         if problem:
-            self._say(f"node {node.name} ({node.id[:8]}) is left out: {problem}")
+            self._say(f"node {node.name} is left out: {problem}")
         else:
             self.nodes[node.id] = node
 

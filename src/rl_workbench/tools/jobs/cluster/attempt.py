@@ -1,11 +1,8 @@
 """What a node does: one attempt at a job. It runs in a worker of Ray's, and the training as a process of its own."""
 
-import contextlib
 import fcntl
 import os
-import shutil
 import sys
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -15,11 +12,11 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.jobs.cluster.parcels import Inbox, Outbox, Parcel
 from rl_workbench.tools.jobs.job import Ending, Job, command, environment, log_of
 from rl_workbench.tools.jobs.process import TrainingProcess
+from rl_workbench.training.cluster.scratch import scratch_folder
 
 LOOK_EVERY = 0.5  # [s] at the training's files
 GROWTH_EVERY = 5.0  # [s] at least between two parcels of tables alone
-TIME_TO_SAVE = 5.0  # [s] after being stopped
-ABANDONED_AFTER = 60.0  # [s] since it was made
+TIME_TO_SAVE = 2.0  # [s] after being stopped; it can be resumed from its last checkpoint anyway
 TOKEN = ".seen_by_nodes"
 
 
@@ -63,7 +60,7 @@ def attempt(
     elif luggage is None:
         yield Ending(lost=f"its node doesn't see {home.folder}")
     else:
-        with _scratch() as place:
+        with scratch_folder("rl_workbench") as place:
             folder = place / job.folder.name
             inbox = Inbox(folder, log_of(folder))
             for each in luggage:
@@ -130,31 +127,3 @@ def _followed(process: TrainingProcess, outbox: Outbox | None) -> Iterator[Told]
         process.stop()
         if not process.wait(TIME_TO_SAVE):
             process.kill()
-
-
-@contextlib.contextmanager
-def _scratch() -> Iterator[Path]:
-    """A folder on this node alone, for one attempt. Those that killed attempts left behind are removed."""
-    prefix = f"rl_workbench_{os.getuid()}_"
-    for left in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
-        _remove_abandoned(left)
-    with tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True) as name:
-        descriptor = os.open(name, os.O_RDONLY)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-            yield Path(name)
-        finally:
-            os.close(descriptor)
-
-
-def _remove_abandoned(folder: Path) -> None:
-    """Removes it if nobody holds it; one that was only just made will be held in a moment."""
-    with contextlib.suppress(OSError):  # another's, or gone meanwhile
-        descriptor = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            status = os.fstat(descriptor)
-            if status.st_uid == os.getuid() and time.time() - status.st_mtime > ABANDONED_AFTER:
-                shutil.rmtree(folder)
-        finally:
-            os.close(descriptor)
