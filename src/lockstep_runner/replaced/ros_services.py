@@ -6,6 +6,7 @@ import io
 import select
 import threading
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import rospy
 import rospy.impl.tcpros_service
@@ -60,18 +61,24 @@ def install(runner: Runner) -> None:
 
 
 def _let_time_pass_with(runner: Runner, kind: type[ServiceClient]) -> None:
-    """The same for the calls of ros_utils, whose connections are its own affair."""
-    call = kind.__call__
+    """The same for those of ros_utils, whose connections are its own affair; a call is begun and ended."""
+    begin, end = kind.begin, kind.end
+    requests: WeakKeyDictionary[ServiceClient, tuple[Any, ...]] = WeakKeyDictionary()
 
-    def calling(self: ServiceClient, *request: Any) -> Any:
-        if self.name == ADVANCE:  # ours
-            return call(self, *request)
-        runner.before_call(self.name)
-        answer = call(self, *request)
-        runner.called(self.name, lambda: repr(request).encode())
+    def beginning(self: ServiceClient, *request: Any) -> None:
+        if self.name != ADVANCE:  # which is ours
+            runner.before_call(self.name)
+            requests[self] = request
+        begin(self, *request)
+
+    def ending(self: ServiceClient) -> Any:
+        answer = end(self)
+        if self.name != ADVANCE:
+            runner.called(self.name, lambda: repr(requests[self]).encode())
         return answer
 
-    kind.__call__ = calling  # type: ignore[method-assign]
+    kind.begin = beginning  # type: ignore[method-assign]
+    kind.end = ending  # type: ignore[method-assign]
 
 
 def _drop_if_broken(proxy: ServiceProxy) -> None:
