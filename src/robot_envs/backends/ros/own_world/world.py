@@ -230,8 +230,10 @@ class RestartingWorld:
                 self._asked(lambda world: world.vary(self._variation))
             if self._journal.initial is not None:
                 self._asked(self._repeat)
-        except BaseException:  # Ctrl-C, too
+        except BaseException as error:
             self._disconnect()
+            if not isinstance(error, RobotEnvError):  # Ctrl-C: nobody asks what became of it
+                self._simulator.begin_end()
             raise
 
     def _repeat(self, world: LockstepWorld) -> None:
