@@ -9,8 +9,8 @@ from robot_envs.world_state import WorldState
 BEYOND = 1e9  # [rad, m, rad/s, m/s, N m, N]; no joint of a world of metres and seconds gets there
 
 
-def check(state: WorldState, expected: int) -> None:
-    """Makes sure that a state is finite, within bounds, and of the time that was asked for.
+def checked(state: WorldState, expected: int) -> WorldState:
+    """Returns a state, once it is sure that it is finite, within bounds, and of the time that was asked for.
 
     Args:
         state: as the simulator tells it.
@@ -35,3 +35,4 @@ def check(state: WorldState, expected: int) -> None:
                 f"the joint '{name}' is {'out of all bounds' if finite else 'not finite'}: position "
                 f"{position:g}, velocity {velocity:g}, effort {effort:g}"
             )
+    return state

@@ -15,8 +15,9 @@ from robot_envs.backends.ros.bring_up import bring_up
 from robot_envs.backends.ros.lockstep import LockstepWorld
 from robot_envs.backends.ros.objects import Objects
 from robot_envs.backends.ros.own_world import memory
-from robot_envs.backends.ros.own_world.health import check
+from robot_envs.backends.ros.own_world.health import checked
 from robot_envs.backends.ros.own_world.journal import Journal, merged
+from robot_envs.backends.ros.own_world.replay import repeat
 from robot_envs.backends.ros.own_world.simulator import PrivateSimulator
 from robot_envs.backends.ros.simulator_world import physics_step
 from robot_envs.backends.ros.turn import Turn
@@ -137,7 +138,7 @@ class RestartingWorld:
             SimulatorError: if it is refused, or two simulators fail.
         """
         self._journal.clear()
-        state = self._carry_out(lambda world: _checked(world.reset(initial), 0))
+        state = self._carry_out(lambda world: checked(world.reset(initial), 0))
         self._journal.begin(initial, state)
         return state
 
@@ -161,7 +162,7 @@ class RestartingWorld:
         """
         self._need_episode()
         then = (self._journal.steps + 1) * self._step
-        state = self._carry_out(lambda world: _checked(world.act(commands), then))
+        state = self._carry_out(lambda world: checked(world.act(commands), then))
         self._journal.add(commands, state)
         return state
 
@@ -229,27 +230,12 @@ class RestartingWorld:
             if not self._variation.is_nominal:
                 self._asked(lambda world: world.vary(self._variation))
             if self._journal.initial is not None:
-                self._asked(self._repeat)
-        except BaseException:  # Ctrl-C, too
+                self._asked(lambda world: repeat(world, self._journal, self._step))
+        except BaseException as error:
             self._disconnect()
+            if not isinstance(error, RobotEnvError):  # Ctrl-C: nobody asks what became of it
+                self._simulator.begin_end()
             raise
-
-    def _repeat(self, world: LockstepWorld) -> None:
-        """Plays the episode once more.
-
-        Raises:
-            SimulatorFault: if it comes to another state.
-        """
-        journal = self._journal
-        assert journal.initial is not None
-        state = _checked(world.reset(journal.initial), 0)
-        for count, commands in enumerate(journal.commands(), 1):
-            state = _checked(world.act(commands), count * self._step)
-        if repr(state) != repr(journal.last):  # tells all bits of a number, and -0.0 from 0.0
-            raise SimulatorFault(
-                f"the same reset and {journal.steps} steps lead to another state, as where a plugin draws "
-                f"random numbers: {_first_difference(state, journal.last)}"
-            )
 
     def close(self) -> None:
         """Ends the simulator; may be called twice."""
@@ -260,18 +246,6 @@ class RestartingWorld:
         self._journal.clear()
         self._simulator.begin_end()
         side_by_side.wait_for_end(self._simulator.end)
-
-
-def _checked(state: WorldState, expected: int) -> WorldState:
-    check(state, expected)
-    return state
-
-
-def _first_difference(state: WorldState, last: WorldState | None) -> str:
-    for name, here, there in zip(WorldState._fields, state, last or (), strict=False):
-        if repr(here) != repr(there):
-            return f"{name} {here!r}, and not {there!r}"
-    return "nothing"
 
 
 def _warn(text: str) -> None:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from robot_envs.backends.ros.own_world import memory
-from robot_envs.backends.ros.own_world.health import check
+from robot_envs.backends.ros.own_world.health import checked
 from robot_envs.backends.ros.own_world.journal import Journal, merged
 from robot_envs.backends.side_by_side import Place, connect, next_place, side_by_side, wait_for_end
 from robot_envs.errors import RobotEnvError, SimulatorFault
@@ -41,7 +41,7 @@ def test_a_variation_leaves_what_it_does_not_name() -> None:
 
 
 def test_what_can_be_is_fine() -> None:
-    check(state(-1e6, 1e6, 1e6, time=0.3), 300_000_000)
+    assert checked(state(-1e6, 1e6, 1e6, time=0.3), 300_000_000)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_what_can_be_is_fine() -> None:
 )
 def test_what_cannot_be_is_a_fault(answer: WorldState, told: str) -> None:
     with pytest.raises(SimulatorFault, match=told):
-        check(answer, 0)
+        checked(answer, 0)
 
 
 def test_more_than_there_is_memory_for_is_refused(monkeypatch, tmp_path) -> None:
