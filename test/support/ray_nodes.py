@@ -1,5 +1,6 @@
-"""A cluster of Ray's on this machine: every node with processes, a port and a folder of its own, to be killed."""
+"""A cluster of Ray's on this machine: every node with processes, ports and a folder of its own, to be killed."""
 
+import contextlib
 import os
 import shutil
 import signal
@@ -8,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 STORE = 80 * 2**20  # [bytes], hardly more than Ray's least
@@ -16,7 +17,6 @@ PATIENCE = 180.0  # [s], on a busy machine
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",
     "RAY_AUTH_MODE": "disabled",
-    "RAY_enable_open_telemetry": "0",
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
 }
 
@@ -40,7 +40,7 @@ def in_session(session: int) -> list[int]:
     return found
 
 
-def wait_until(condition, what: str, patience: float = PATIENCE) -> None:
+def wait_until(condition: Callable[[], object], what: str, patience: float = PATIENCE) -> None:
     until = time.monotonic() + patience
     while not condition():
         assert time.monotonic() < until, f"waited for {what}"
@@ -73,17 +73,15 @@ class RayNode:
         )
 
     def workers(self) -> list[int]:
-        """Its processes that do a job."""
-        return [pid for pid in in_session(self.process.pid) if "ray::attempt" in title(pid) or "ray::train" in title(pid)]
+        """Its processes that do a job, and the trainings that these have begun."""
+        return [pid for pid in in_session(self.process.pid) if title(pid).startswith("ray::train")]
 
     def kill(self) -> None:
         """Ends all of its processes at once, as the loss of a machine would."""
         while found := in_session(self.process.pid):
             for pid in found:
-                try:
+                with contextlib.suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGKILL)
-                except ProcessLookupError:
-                    pass
         self.process.wait()
         self.log.close()
 
@@ -105,12 +103,7 @@ class RayCluster:
     def __init__(self) -> None:
         self.port = free_port()
         self.address = f"127.0.0.1:{self.port}"
-        self.nodes: list[RayNode] = []
-
-    def start(self) -> None:
-        """The head, which is a node as well."""
-        head = RayNode(["--head", f"--port={self.port}", "--include-dashboard=false"])
-        self.nodes.append(head)
+        self.nodes = [RayNode(["--head", f"--port={self.port}", "--include-dashboard=false"])]
         wait_until(self._answers, "the head of the cluster")
 
     def _answers(self) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rl_workbench.tools.commands.shared import number
+from rl_workbench.tools.jobs.ledger import settle
 from rl_workbench.tools.jobs.machines import CARRIED, SHARED, Machines, ThisMachine
 from rl_workbench.training.cluster.flag import add_ray_flag
 from rl_workbench.training.run.interrupt import Interrupt
@@ -34,6 +35,7 @@ def machines_for(
     Raises:
         WorkbenchError: if there is no such cluster.
     """
+    settle(folder)
     if arguments.ray is None:
         yield ThisMachine(arguments.jobs or 1, arguments.program)
         return

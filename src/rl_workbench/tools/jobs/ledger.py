@@ -9,12 +9,23 @@ from pathlib import Path
 
 from rl_workbench.tools.jobs.job import Job
 from rl_workbench.tools.jobs.runner import Watch
+from rl_workbench.tools.runs.runs import read_leniently
 from rl_workbench.training.run.files import as_json, write_file
 
 NAME = "jobs.json"
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
-WRITTEN_AFTER = 2.0  # [s] at most until a change can be read
+WRITTEN_AFTER = 0.5  # [s] at most until a change can be read
 ALIVE = 20.0  # [s] at most between two writings, as long as somebody runs the jobs
+
+
+def settle(folder: Path) -> None:
+    """Nothing runs yet, whatever a command that was killed has left written."""
+    content = read_leniently(folder / NAME)
+    running = [each for each in content.get("jobs", []) if each.get("state") == RUNNING]
+    for each in running:
+        each["state"] = WAITING
+    if running:
+        write_file(folder / NAME, as_json(content))
 
 
 @dataclass

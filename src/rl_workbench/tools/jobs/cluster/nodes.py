@@ -127,12 +127,12 @@ class RayNodes:
         self._update()
         result, self._refused = self._refused, []
         for each in self._ready(0.0 if result else seconds):
-            ending = self._take(each)
-            progressed(each.job, each.node)
-            if ending:
+            if ending := self._take(each):
                 self._running.remove(each)
                 each.held.close()
                 result.append((each.job, ending))
+        for each in self._running:  # where folders are shared, nobody tells of files
+            progressed(each.job, each.node)
         return result
 
     def _update(self) -> None:

@@ -1,0 +1,132 @@
+"""`--ray` with a real cluster of three nodes on this machine, of which workers, nodes and the driver are killed."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from ray_nodes import QUIET, RayCluster, in_session, title, wait_until
+
+from rl_workbench.tools.jobs.states import JobState, read_states
+
+pytestmark = [pytest.mark.extras("ray"), pytest.mark.slow, pytest.mark.xdist_group("ray")]
+
+# Long enough to be killed in the middle, on any machine; a checkpoint every few milliseconds.
+PARAMS = ["total_timesteps=5000", "learning_starts=50", "batch_size=8", "hidden_sizes=8",
+          "eval_frequency=1000", "eval_episodes=1", "confirm_episodes=1",
+          "checkpoint_frequency=100"]  # fmt: skip
+
+
+def benchmark(out: Path, *flags: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "rl_workbench", "benchmark", f"--out={out}", "--seeds=2",
+               "--episodes=2", *flags, "--params", *PARAMS]  # fmt: skip
+    return subprocess.Popen(
+        command,
+        env={**os.environ, **QUIET},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def finished(process: subprocess.Popen[str], code: int = 0) -> str:
+    said, _ = process.communicate()
+    assert process.returncode == code, said
+    return said
+
+
+def state(out: Path, seed: int) -> JobState:
+    """Of a job; as if it waited, before there is a list of them."""
+    if not (out / "jobs.json").exists():
+        return JobState("", "", "waiting", 0, 0, "", 0, "")
+    return read_states(out)[seed]
+
+
+def is_half_done(out: Path, seed: int) -> bool:
+    found = state(out, seed)
+    assert found.state != "failed", found
+    return found.state == "running" and found.step >= 300
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Iterator[bytes]:
+    """Of a benchmark that nobody disturbs, without Ray."""
+    out = tmp_path_factory.mktemp("undisturbed")
+    finished(benchmark(out, "--jobs=2"))
+    return (out / "results.md").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[RayCluster]:
+    """Two nodes of which each has room for a job, and one where our package isn't found."""
+    cluster = RayCluster()
+    try:
+        cluster.add()
+        cluster.add(without=["PYTHONPATH"])
+        yield cluster
+    finally:
+        cluster.close()
+
+
+def trainings(out: Path) -> list[int]:
+    """The processes that train into a folder."""
+    every = [int(each.name) for each in Path("/proc").iterdir() if each.name.isdigit()]
+    return [pid for pid in every if f"--run-dir={out}" in title(pid) or f"--resume={out}" in title(pid)]
+
+
+def test_what_is_killed_changes_no_byte_of_the_table(
+    cluster: RayCluster, table: bytes, tmp_path: Path
+) -> None:
+    """A worker, a whole node; each node has a folder of its own, and everything is carried home."""
+    driver = benchmark(tmp_path, f"--ray={cluster.address}", "--folders=carried")
+    try:
+        wait_until(lambda: is_half_done(tmp_path, 0), "a training")
+        os.kill(cluster.nodes[0].workers()[0], signal.SIGKILL)
+        wait_until(lambda: cluster.nodes[1].workers(), "a job on the second node")
+        cluster.nodes[1].kill()
+        said = finished(driver)
+    finally:
+        driver.kill()
+    assert "is left out: Python finds no package rl_workbench there" in said
+    assert "2 nodes of Ray's with 2 cores; folders are carried home" in said
+    assert "lost, and tried again: its worker died" in said
+    assert "(raylet)" not in said, "Ray's own words are pages"
+    assert (tmp_path / "results.md").read_bytes() == table
+    assert max(state(tmp_path, seed).attempts for seed in range(2)) > 1
+
+
+def test_a_benchmark_whose_own_process_is_killed_or_stopped_goes_on(
+    cluster: RayCluster, table: bytes, tmp_path: Path
+) -> None:
+    """The nodes write into the one folder, which they are found to share."""
+    flag = f"--ray={cluster.address}"
+    driver = benchmark(tmp_path, flag)
+    try:
+        wait_until(lambda: is_half_done(tmp_path, 0), "a training")
+        second = finished(benchmark(tmp_path, flag), 1)
+        assert second == f"rl-workbench: another benchmark is running in {tmp_path}\n"
+    finally:
+        driver.kill()
+    assert "ended from outside" in finished(driver, -signal.SIGKILL)
+    wait_until(lambda: not trainings(tmp_path), "the end of its trainings", 10.0)
+
+    driver = benchmark(tmp_path, flag)
+    try:
+        wait_until(lambda: is_half_done(tmp_path, 0) or is_half_done(tmp_path, 1), "a training")
+        driver.send_signal(signal.SIGINT)
+        said = finished(driver, 130)
+    finally:
+        driver.kill()
+    assert "interrupted; the same command goes on" in said
+    wait_until(lambda: not trainings(tmp_path), "the end of its trainings", 10.0)
+    assert not in_session(driver.pid)
+    assert {state(tmp_path, seed).state for seed in range(2)} <= {"stopped", "waiting", "done"}
+
+    said = finished(benchmark(tmp_path, flag))
+    assert f"all see {tmp_path}" in said
+    assert (tmp_path / "results.md").read_bytes() == table
+    assert [state(tmp_path, seed).state for seed in range(2)] == ["done", "done"]
