@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What one worker and two come to, measured; and what 8, 64 and 512 would, foretold from measured times.
 
-    ./ws extras python3 benchmark/scaling.py [--backend bullet|ros-own] [--env-id MODULE:ID]
+    ./ws extras python3 benchmark/scaling.py [--backend bullet|ros-own] [--env-id ID]
                                              [--job-seconds 60] [--out FOLDER]
 
 Measures on this machine, with a local cluster of Ray's: a worker's step, an actor's call that carries an
@@ -47,7 +47,7 @@ def row(workers: int, rolled: Foretold, start: float, done: Foretold) -> str:
 def main() -> None:
     chosen = reporting.options(
         __doc__ or "",
-        env_id="cartpole:cartpole/SwingUp-v0",
+        env_id="cartpole/SwingUp-v0",
         backend="bullet",
         job_seconds=60.0,
     )
