@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Any
 
 
-def options(description: str, **defaults: int | float) -> argparse.Namespace:
+def options(description: str, **defaults: int | float | str) -> argparse.Namespace:
     """Parses the command line: `--out` and a number for each of `defaults`."""
     parser = argparse.ArgumentParser(
         description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--out", type=Path, default=Path("runs/benchmark"), help="folder for JSON")
     for name, default in defaults.items():
-        parser.add_argument(f"--{name}", type=type(default), default=default)
+        flag = f"--{name.replace('_', '-')}"
+        parser.add_argument(flag, type=type(default), default=default)
     return parser.parse_args()
 
 
