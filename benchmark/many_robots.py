@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Many robots in one world, against the engine's bare steps of the same robots.
 
-    ./ws python3 benchmark/many_robots.py [--out FOLDER] [--rounds 5] [--seconds 0.3]
+    ./ws python3 benchmark/many_robots.py [--out FOLDER] [--rounds 5] [--seconds 0.2]
 
 Cart-poles with their two controllers on Gazebo's ground plane, two metres from each other. Ratios are of one
 run: what is compared is measured by turns, and each figure is the median over rounds. In this process it is
@@ -161,7 +161,7 @@ def show(title: str, rates: dict[int, dict[str, float]]) -> None:
 
 
 def main() -> None:
-    chosen = reporting.options(__doc__ or "", rounds=5, seconds=0.3)
+    chosen = reporting.options(__doc__ or "", rounds=5, seconds=0.2)
     urdf = ros_urdf.urdf_parse_from_pkg("cartpole_gazebo", "cartpole_v1.urdf", "/robots") or ""
     ticks = in_process(urdf, chosen.rounds, chosen.seconds)
     show("in this process", ticks)
