@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,10 +15,14 @@ from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.record import CONFIG_RECORD, read_record
 from rl_workbench.training.options.run_options import RunOptions
 from rl_workbench.training.options.showing import ShowingOptions
+from rl_workbench.training.rollouts.player import Pool
 
 # May be changed when resuming.
 EXTENDING = ("total_timesteps", "episodes", "stop_at_length", "stop_at_return", "device")
 RECORDED_AS = {"n_envs": "num_envs"}  # of trainings of earlier versions, which can be gone on with
+
+
+MakePool = Callable[["TrainingOptions"], Pool]
 
 
 class TrainingOptions(NamedTuple):
@@ -29,6 +33,7 @@ class TrainingOptions(NamedTuple):
     hyperparameters: Any  # an instance of the kind's dataclass
     resume: Path | None = None
     showing: ShowingOptions = ShowingOptions()
+    make_pool: MakePool | None = None  # of the workers that play its rollouts; None: none, it does
 
     def record(self) -> dict[str, Any]:
         """All settings as plain values, for config.json and checkpoints."""

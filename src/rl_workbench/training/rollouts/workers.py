@@ -1,0 +1,189 @@
+"""Workers on the machines of a cluster, by Ray: each plays in an environment beside it.
+
+An answer is a whole episode or a long fragment of one, since each costs half a millisecond on the way. A
+worker that is lost, with its machine or alone, is made anew and plays its part again: it is sent all that
+its part depends on, so what it plays is the same to the bit.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import ray
+from ray.exceptions import ObjectStoreFullError, OutOfDiskError, RayError, RayTaskError
+from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.environments.checked import EnvironmentFailure
+from rl_workbench.training.options.training_options import TrainingOptions
+from rl_workbench.training.rollouts.fingerprint import fingerprint
+from rl_workbench.training.rollouts.worker import Failure, Worker
+from rl_workbench.training.run.algorithm import Say
+
+POLL = 0.1  # [s] between two looks for an interruption
+PATIENCE = 15.0  # [s] after which the user hears that workers wait for processors
+GRACE = 3.0  # [s] that environments have to close in
+ATTEMPTS = 5  # of workers at the same part, before the part is taken for the cause
+
+
+class WorkerTraceback(Exception):
+    """The cause of an error, as the worker tells of it."""
+
+
+class Workers:
+    """As many workers as a training has environments, spread over the cluster that was joined.
+
+    Args:
+        options: of the training, as the workers need them.
+        say: is told of workers that are lost.
+
+    Raises:
+        WorkbenchError: if the cluster has fewer processors than there are workers, or they can't be started.
+    """
+
+    def __init__(self, options: TrainingOptions, say: Say) -> None:
+        self._record, self._count, self._say = options.record(), options.run.num_envs, say
+        room = int(ray.cluster_resources().get("CPU", 0))
+        if room < self._count:
+            raise WorkbenchError(
+                f"num_envs {self._count} takes as many processors, and the cluster has {room}: "
+                f"--num-envs {max(room, 1)}, or more machines"
+            )
+        self._nodes: list[str] = []  # where each worker is
+        self._actors: list[Any] = []
+        for index in range(self._count):
+            self._nodes.append("")
+            self._actors.append(self._start(index, processors=1))
+        self._playing: dict[Any, int] = {}
+        self._check_kinds(self._begun())
+
+    def _start(self, index: int, processors: int) -> Any:
+        """A worker on the machine that has most processors without one.
+
+        Args:
+            index: of its environment.
+            processors: that it has for itself; 0: it makes do with what there is.
+        """
+        nodes = {each["NodeID"]: each["Resources"] for each in ray.nodes() if each["Alive"]}
+        before, self._nodes[index] = self._nodes[index], ""
+
+        def free(name: str) -> tuple[float, bool]:
+            return nodes[name].get("CPU", 0.0) - self._nodes.count(name), name != before
+
+        chosen = self._nodes[index] = max(sorted(nodes), key=free)
+        place = NodeAffinitySchedulingStrategy(chosen, soft=False)
+        actor = ray.remote(Worker).options(num_cpus=processors, scheduling_strategy=place)
+        return actor.remote(self._record, index)
+
+    def _begun(self) -> list[str]:
+        """The fingerprints of the machines, once all workers have begun."""
+        waiting = [actor.fingerprint.remote() for actor in self._actors]
+        _, missing = ray.wait(waiting, num_returns=self._count, timeout=PATIENCE)
+        if missing:
+            self._say(f"waiting for {len(missing)} of {self._count} workers: processors are taken")
+        try:
+            found: list[str] = ray.get(waiting)
+        except RayError as error:
+            self.close()
+            raise WorkbenchError(f"a worker can't be started: {first_line(error)}") from error
+        return found
+
+    def _check_kinds(self, kinds: Sequence[str]) -> None:
+        others = [index for index, each in enumerate(kinds) if each != fingerprint()]
+        if others:
+            self._say(
+                f"workers {', '.join(map(str, others))} compute to other bits than this machine, by their "
+                "processors or NumPy: the same seed gives the same weights on machines of one kind only"
+            )
+
+    def play(
+        self, policy: Any, states: Sequence[Any], should_stop: Callable[[], bool]
+    ) -> list[Any] | None:
+        """Has each worker play its part.
+
+        Args:
+            policy: for all of them.
+            states: of each, see `Player.play`.
+            should_stop: is asked all the time.
+
+        Returns:
+            What each player gave, in the order of the workers, whichever came first; None if told to stop: then
+            they can only be closed.
+
+        Raises:
+            WorkbenchError: if an environment fails, or the cluster can't go on.
+        """
+        with _told_of_stores():
+            shared = ray.put(policy)
+            found: dict[int, Any] = {}
+            lost = [0] * self._count
+            for index in range(self._count):
+                self._ask(index, shared, states[index])
+            while self._playing:
+                if should_stop():
+                    return None
+                ready, _ = ray.wait(list(self._playing), timeout=POLL)
+                for reference in ready:
+                    index = self._playing.pop(reference)
+                    try:
+                        found[index] = self._checked(index, ray.get(reference))
+                    except (RayTaskError, ObjectStoreFullError, OutOfDiskError):
+                        raise
+                    except RayError as error:
+                        lost[index] += 1
+                        self._replace(index, error, lost[index])
+                        self._ask(index, shared, states[index])
+        return [found[index] for index in range(self._count)]
+
+    def _ask(self, index: int, policy: Any, state: Any) -> None:
+        self._playing[self._actors[index].play.remote(policy, state)] = index
+
+    def _checked(self, index: int, answer: Any) -> Any:
+        if not isinstance(answer, Failure):
+            return answer
+        kind = EnvironmentFailure if answer.is_environments else WorkbenchError
+        text = f"environment {index}, of 0 to {self._count - 1}: {answer.text}"
+        raise kind(text) from WorkerTraceback(answer.trace)
+
+    def _replace(self, index: int, error: RayError, attempts: int) -> None:
+        """Has another worker in the place of one that is lost."""
+        if attempts == ATTEMPTS:
+            raise WorkbenchError(
+                f"worker {index} was lost {attempts} times at the same part: {first_line(error)}"
+            ) from error
+        self._say(f"worker {index} is lost ({first_line(error)}): another one plays its part again")
+        ray.kill(self._actors[index])  # it may only have been out of reach
+        self._actors[index] = self._start(index, processors=0)
+
+    def close(self) -> None:
+        """Ends all workers, those that aren't playing with their environments closed."""
+        busy = set(self._playing.values())
+        idle = [actor for index, actor in enumerate(self._actors) if index not in busy]
+        ray.wait([each.close.remote() for each in idle], num_returns=len(idle), timeout=GRACE)
+        for actor in self._actors:
+            ray.kill(actor)
+
+
+@contextmanager
+def _told_of_stores() -> Iterator[None]:
+    """Tells in one line what Ray tells in many.
+
+    Raises:
+        WorkbenchError: if an object store or its disk is full, or a worker has failed.
+    """
+    try:
+        yield
+    except (ObjectStoreFullError, OutOfDiskError) as error:
+        raise WorkbenchError(
+            f"the cluster's object store is full ({first_line(error)}): `ray start --object-store-memory` "
+            "makes a larger one, shorter fragments need less"
+        ) from error
+    except RayTaskError as error:
+        raise WorkbenchError(f"a worker has failed: {first_line(error.cause)}") from error
+
+
+def first_line(error: BaseException) -> str:
+    """The beginning of what an error tells."""
+    lines = str(error).strip().splitlines()
+    return lines[0].rstrip(".: ") if lines else type(error).__name__
