@@ -15,7 +15,8 @@ from ray.exceptions import ObjectStoreFullError, OutOfDiskError, RayError, RayTa
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.environments.checked import EnvironmentFailure
+from rl_workbench.training.cluster.nodes import Cluster
+from rl_workbench.training.environments.checked import EnvironmentFailure, told
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.rollouts.fingerprint import fingerprint
 from rl_workbench.training.rollouts.worker import Failure, Worker
@@ -32,44 +33,54 @@ class WorkerTraceback(Exception):
 
 
 class Workers:
-    """As many workers as a training has environments, spread over the cluster that was joined.
+    """As many workers as a training has environments, spread over a cluster; see `Pool`.
 
     Args:
+        cluster: that was joined.
         options: of the training, as the workers need them.
         say: is told of workers that are lost.
 
     Raises:
-        WorkbenchError: if the cluster has fewer processors than there are workers, or they can't be started.
+        WorkbenchError: if the cluster has fewer processors than there are workers, or an environment can't be
+            made.
     """
 
-    def __init__(self, options: TrainingOptions, say: Say) -> None:
-        self._record, self._count, self._say = options.record(), options.run.num_envs, say
-        room = int(ray.cluster_resources().get("CPU", 0))
-        if room < self._count:
+    def __init__(self, cluster: Cluster, options: TrainingOptions, say: Say) -> None:
+        self._cluster, self._say = cluster, say
+        self._record, self._count = options.record(), options.run.num_envs
+        if cluster.cpus < self._count:
             raise WorkbenchError(
-                f"num_envs {self._count} takes as many processors, and the cluster has {room}: "
-                f"--num-envs {max(room, 1)}, or more machines"
+                f"num_envs {self._count} takes as many processors, and the cluster has {cluster.cpus}: "
+                f"--num-envs {max(cluster.cpus, 1)}, or more machines"
             )
-        self._nodes: list[str] = []  # where each worker is
-        self._actors: list[Any] = []
-        for index in range(self._count):
-            self._nodes.append("")
-            self._actors.append(self._start(index, processors=1))
+        self._nodes = [""] * self._count  # where each worker is
         self._playing: dict[Any, int] = {}
-        self._check_kinds(self._begun())
+        self._actors: list[Any] = []
+        try:
+            for index in range(self._count):
+                self._actors.append(self._start(index, processors=1))
+            self._check_kinds(self._begun())
+        except BaseException:  # Ctrl-C as well
+            self.close()
+            raise
 
     def _start(self, index: int, processors: int) -> Any:
-        """A worker on the machine that has most processors without one.
+        """A worker on the node that has most processors without one.
 
         Args:
             index: of its environment.
             processors: that it has for itself; 0: it makes do with what there is.
-        """
-        nodes = {each["NodeID"]: each["Resources"] for each in ray.nodes() if each["Alive"]}
-        before, self._nodes[index] = self._nodes[index], ""
 
-        def free(name: str) -> tuple[float, bool]:
-            return nodes[name].get("CPU", 0.0) - self._nodes.count(name), name != before
+        Raises:
+            WorkbenchError: if there is no node any more.
+        """
+        nodes = self._cluster.nodes
+        before, self._nodes[index] = self._nodes[index], ""
+        if not nodes:
+            raise WorkbenchError("no node of the cluster can be used any more")
+
+        def free(name: str) -> tuple[int, bool]:
+            return nodes[name].cpus - self._nodes.count(name), name != before
 
         chosen = self._nodes[index] = max(sorted(nodes), key=free)
         place = NodeAffinitySchedulingStrategy(chosen, soft=False)
@@ -77,17 +88,13 @@ class Workers:
         return actor.remote(self._record, index)
 
     def _begun(self) -> list[str]:
-        """The fingerprints of the machines, once all workers have begun."""
-        waiting = [actor.fingerprint.remote() for actor in self._actors]
-        _, missing = ray.wait(waiting, num_returns=self._count, timeout=PATIENCE)
-        if missing:
-            self._say(f"waiting for {len(missing)} of {self._count} workers: processors are taken")
-        try:
-            found: list[str] = ray.get(waiting)
-        except RayError as error:
-            self.close()
-            raise WorkbenchError(f"a worker can't be started: {first_line(error)}") from error
-        return found
+        """The fingerprints of the machines, once all environments have been made."""
+        with _told_of_stores():
+            waiting = [actor.begin.remote() for actor in self._actors]
+            _, missing = ray.wait(waiting, num_returns=self._count, timeout=PATIENCE)
+            if missing:
+                self._say(f"waiting for {len(missing)} of {self._count} workers")
+            return [self._checked(index, each) for index, each in enumerate(ray.get(waiting))]
 
     def _check_kinds(self, kinds: Sequence[str]) -> None:
         others = [index for index, each in enumerate(kinds) if each != fingerprint()]
@@ -100,20 +107,7 @@ class Workers:
     def play(
         self, policy: Any, states: Sequence[Any], should_stop: Callable[[], bool]
     ) -> list[Any] | None:
-        """Has each worker play its part.
-
-        Args:
-            policy: for all of them.
-            states: of each, see `Player.play`.
-            should_stop: is asked all the time.
-
-        Returns:
-            What each player gave, in the order of the workers, whichever came first; None if told to stop: then
-            they can only be closed.
-
-        Raises:
-            WorkbenchError: if an environment fails, or the cluster can't go on.
-        """
+        """See `Pool`."""
         with _told_of_stores():
             shared = ray.put(policy)
             found: dict[int, Any] = {}
@@ -154,6 +148,7 @@ class Workers:
             ) from error
         self._say(f"worker {index} is lost ({first_line(error)}): another one plays its part again")
         ray.kill(self._actors[index])  # it may only have been out of reach
+        self._cluster.update()
         self._actors[index] = self._start(index, processors=0)
 
     def close(self) -> None:
@@ -180,7 +175,9 @@ def _told_of_stores() -> Iterator[None]:
             "makes a larger one, shorter fragments need less"
         ) from error
     except RayTaskError as error:
-        raise WorkbenchError(f"a worker has failed: {first_line(error.cause)}") from error
+        raise WorkbenchError(f"a worker has failed: {told(error.cause)}") from error
+    except RayError as error:
+        raise WorkbenchError(f"a worker can't be started: {first_line(error)}") from error
 
 
 def first_line(error: BaseException) -> str:
