@@ -142,7 +142,7 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOption
 def _joined(
     options: TrainingOptions, robot: RobotOptions, given: dict[str, Any]
 ) -> TrainingOptions:
-    if robot.headless and options.showing.gui:
+    if robot.headless and options.session.gui:
         raise WorkbenchError("--headless: not with --gui")
     run = options.run
     for key in ("realtime", "rviz"):
@@ -214,7 +214,7 @@ def session(
         name,
         argv,
         realtime=backend == "ros-realtime",
-        gui=options.showing.gui and shows_itself(options),
+        gui=options.session.gui and shows_itself(options),
         seed=options.run.seed,
         rviz=robot.rviz,
         curves=folder,

@@ -5,7 +5,6 @@ worker that is lost, with its machine or alone, is made anew and plays its part 
 its part depends on, so what it plays is the same to the bit.
 """
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any

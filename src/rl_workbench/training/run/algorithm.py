@@ -16,8 +16,8 @@ import gymnasium
 import numpy as np
 
 from rl_workbench.training.environments.checked import CheckedEnvironment
-from rl_workbench.training.environments.making import make_environment
 from rl_workbench.training.environments.elsewhere import Elsewhere
+from rl_workbench.training.environments.making import make_environment
 from rl_workbench.training.environments.several import close_all, make_several, own_robot
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.scalar_log import ScalarLog

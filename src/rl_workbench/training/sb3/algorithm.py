@@ -53,9 +53,7 @@ class SB3Training(Algorithm):
         env: one of them, or of their kind.
     """
 
-    def __init__(
-        self, options: TrainingOptions, model: Any, env: gymnasium.Env[Any, Any]
-    ) -> None:
+    def __init__(self, options: TrainingOptions, model: Any, env: gymnasium.Env[Any, Any]) -> None:
         self._run, self._name, self._model, self.env = options.run, options.kind.name, model, env
         self._is_given_up = False  # the episode under way, whose robot was moved
 
@@ -104,7 +102,9 @@ class SB3Training(Algorithm):
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """See `Algorithm.load_state_dict`."""
         if FRAGMENTS in state:
-            raise WorkbenchError("it was begun with --ray: it goes on with --ray, on whatever cluster")
+            raise WorkbenchError(
+                "it was begun with --ray: it goes on with --ray, on whatever cluster"
+            )
         restore(self._model, state, self._run.seed)
 
     def environment_state(self) -> None:

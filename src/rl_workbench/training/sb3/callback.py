@@ -115,7 +115,7 @@ def _first(seen: Any) -> Any:
 
 
 def ended(info: Mapping[str, Any]) -> tuple[float, int, bool | None]:
-    """Return, length [steps] and success of an episode, from its last info, that Monitor has counted it in."""
+    """Return, length [steps] and success of an episode, from its last info, where Monitor put them."""
     return float(info["episode"]["r"]), int(info["episode"]["l"]), succeeded(info)
 
 

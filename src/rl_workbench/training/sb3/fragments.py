@@ -35,7 +35,7 @@ class Ended(NamedTuple):
 class Fragment(NamedTuple):
     """One environment's part of a rollout."""
 
-    arrays: dict[str, Any]  # of the buffer by name, each (n_steps, 1, ...); observations may be a dict of them
+    arrays: dict[str, Any]  # of the buffer by name, (n_steps, 1, ...); observations may be a dict
     ended: list[Ended]
     was_cut: bool  # the episode under way before couldn't be brought back
     state: dict[str, Any]  # from which the next fragment goes on
@@ -80,7 +80,7 @@ class FragmentPlayer(Player):
         return Fragment(arrays, self._told.ended, was_cut, self._state())
 
     def _go_to(self, state: dict[str, Any] | None) -> bool:
-        """Brings the environment to where a fragment ended; returns whether it had to begin another episode."""
+        """Brings the environment to where a fragment ended; returns whether its episode had to be cut off."""
         was_cut = False
         if state is None or self._done != state["fragments"]:
             self._begin()

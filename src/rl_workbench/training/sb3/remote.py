@@ -174,7 +174,9 @@ class FragmentCallback(FrameCallback):
         for index, fragment in enumerate(fragments):
             if fragment.was_cut:
                 tell(f"environment {index} doesn't repeat itself: its episode was cut off")
-        ended = [(each.step, index, each) for index, one in enumerate(fragments) for each in one.ended]
+        ended = [
+            (each.step, index, each) for index, one in enumerate(fragments) for each in one.ended
+        ]
         for step, _, episode in sorted(ended):
             model.num_timesteps = before + (step + 1) * count
             self._tell(episode.total_reward, episode.length, episode.success)
