@@ -13,21 +13,20 @@ class PoolHere:
 
     Args:
         options: of the training.
-        order: in which the players play, by their numbers; as they are counted if there is none.
+        backwards: whether the last one plays first.
         lost: in which rounds all players are lost before they play, counted from 0 on.
     """
 
     def __init__(
         self,
         options: TrainingOptions,
-        order: Sequence[int] | None = None,
+        backwards: bool = False,
         lost: Callable[[int], bool] = lambda rounds: False,
     ) -> None:
         self._record, self._lost = options.record(), lost
-        self._order = order or range(options.run.num_envs)
+        self._order = range(options.run.num_envs)[:: -1 if backwards else 1]
         self._workers: dict[int, Worker] = {}
         self._rounds = 0
-        self.told: list[Any] = []  # what the policy was in each round
 
     def play(
         self, policy: Any, states: Sequence[Any], should_stop: Callable[[], bool]
@@ -37,6 +36,7 @@ class PoolHere:
         own, found = random_states(), {}
         for index in self._order:
             if should_stop():
+                restore_random_states(own)
                 return None
             worker = self._workers.setdefault(index, Worker(self._record, index))
             found[index] = worker.play(policy, states[index])

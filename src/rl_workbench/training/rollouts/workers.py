@@ -16,6 +16,7 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.cluster.nodes import Cluster
 from rl_workbench.training.environments.checked import EnvironmentFailure, told
+from rl_workbench.training.environments.several import numbered
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.rollouts.fingerprint import fingerprint
 from rl_workbench.training.rollouts.worker import Failure, Worker
@@ -136,8 +137,8 @@ class Workers:
         if not isinstance(answer, Failure):
             return answer
         kind = EnvironmentFailure if answer.is_environments else WorkbenchError
-        text = f"environment {index}, of 0 to {self._count - 1}: {answer.text}"
-        raise kind(text) from WorkerTraceback(answer.trace)
+        with numbered(index, self._count):
+            raise kind(answer.text) from WorkerTraceback(answer.trace)
 
     def _replace(self, index: int, error: RayError, attempts: int) -> None:
         """Has another worker in the place of one that is lost."""

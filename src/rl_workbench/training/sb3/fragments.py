@@ -15,7 +15,7 @@ from rl_workbench.training.environments.repeatable import RepeatableEnvironment
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.rollouts.player import Player
 from rl_workbench.training.run.algorithm import environment_for
-from rl_workbench.training.run.random_states import random_states, restore_random_states, seed_all
+from rl_workbench.training.run.random_states import random_states, restore_random_states
 from rl_workbench.training.sb3.callback import ended
 from rl_workbench.training.sb3.model import model_in
 
@@ -61,6 +61,7 @@ class FragmentPlayer(Player):
         own = options.hyperparameters.own
         self._model: Any = model_in(vector, options._replace(run=run), own)
         self._model.set_logger(Logger(None, []))
+        self._generators = random_states()  # as the model begins with, after its weights
         self._told = _Told()
         self._done: int | None = None  # fragments
 
@@ -92,7 +93,7 @@ class FragmentPlayer(Player):
 
     def _begin(self) -> None:
         model = self._model
-        seed_all(self._seed)
+        restore_random_states(self._generators)
         model.env.seed(self._seed)
         model._setup_learn(model.n_steps, self._told)
 
