@@ -38,7 +38,7 @@ class PoolHere:
             if should_stop():
                 restore_random_states(own)
                 return None
-            worker = self._workers.setdefault(index, Worker(self._record, index))
+            worker = self._workers.setdefault(index, Worker(self._record, index, []))
             found[index] = worker.play(policy, states[index])
             assert not isinstance(found[index], Failure), found[index].trace
         restore_random_states(own)  # each has a process of its own on a cluster

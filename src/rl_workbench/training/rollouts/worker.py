@@ -1,7 +1,9 @@
 """One worker: a process on some machine, with one environment of a training beside it."""
 
+import os
+import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -28,9 +30,11 @@ class Worker:
     Args:
         record: the options of the training.
         index: the number of its environment.
+        paths: where the driver finds modules: as far as they are here, they are looked for there as well.
     """
 
-    def __init__(self, record: dict[str, Any], index: int) -> None:
+    def __init__(self, record: dict[str, Any], index: int, paths: Sequence[str]) -> None:
+        sys.path.extend(path for path in paths if path not in sys.path and os.path.isdir(path))
         torch.set_num_threads(1)  # networks this small only lose by more
         self._options = recorded_options(record, "what the driver sent")
         self._index = index

@@ -5,8 +5,10 @@ worker that is lost, with its machine or alone, is made anew and plays its part 
 its part depends on, so what it plays is the same to the bit.
 """
 
+import contextlib
+import socket
+import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from typing import Any
 
 import ray
@@ -14,7 +16,7 @@ from ray.exceptions import ObjectStoreFullError, OutOfDiskError, RayError, RayTa
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.cluster.nodes import Cluster
+from rl_workbench.training.cluster.nodes import Cluster, Node
 from rl_workbench.training.environments.checked import EnvironmentFailure, told
 from rl_workbench.training.environments.several import numbered
 from rl_workbench.training.options.training_options import TrainingOptions
@@ -24,6 +26,7 @@ from rl_workbench.training.run.algorithm import Say
 
 POLL = 0.1  # [s] between two looks for an interruption
 PATIENCE = 15.0  # [s] after which the user hears that workers wait for processors
+ANSWER = 1.0  # [s] that a node has to answer in
 GRACE = 3.0  # [s] that environments have to close in
 ATTEMPTS = 5  # of workers at the same part, before the part is taken for the cause
 
@@ -74,7 +77,9 @@ class Workers:
         Raises:
             WorkbenchError: if there is no node any more.
         """
-        nodes = self._cluster.nodes
+        if not self._cluster.nodes:
+            self._cluster.update(PATIENCE)
+        nodes = self._answering()
         before, self._nodes[index] = self._nodes[index], ""
         if not nodes:
             raise WorkbenchError("no node of the cluster can be used any more")
@@ -85,7 +90,18 @@ class Workers:
         chosen = self._nodes[index] = max(sorted(nodes), key=free)
         place = NodeAffinitySchedulingStrategy(chosen, soft=False)
         actor = ray.remote(Worker).options(num_cpus=processors, scheduling_strategy=place)
-        return actor.remote(self._record, index)
+        return actor.remote(self._record, index, sys.path)
+
+    def _answering(self) -> dict[str, Node]:
+        """The nodes that can be used, and answer: Ray itself takes some ten seconds to know that one is gone."""
+        found = {}
+        for each in ray.nodes():
+            node = self._cluster.nodes.get(each["NodeID"])
+            place = (each["NodeManagerAddress"], each["NodeManagerPort"])
+            if node is not None:
+                with contextlib.suppress(OSError), socket.create_connection(place, ANSWER):
+                    found[node.id] = node
+        return found
 
     def _begun(self) -> list[str]:
         """The fingerprints of the machines, once all environments have been made."""
@@ -160,7 +176,7 @@ class Workers:
             ray.kill(actor)
 
 
-@contextmanager
+@contextlib.contextmanager
 def _told_of_stores() -> Iterator[None]:
     """Tells in one line what Ray tells in many.
 
