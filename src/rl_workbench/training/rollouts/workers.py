@@ -153,8 +153,9 @@ class Workers:
         if not isinstance(answer, Failure):
             return answer
         kind = EnvironmentFailure if answer.is_environments else WorkbenchError
+        name = self._cluster.nodes[self._nodes[index]].name
         with numbered(index, self._count):
-            raise kind(answer.text) from WorkerTraceback(answer.trace)
+            raise kind(f"on {name}: {answer.text}") from WorkerTraceback(answer.trace)
 
     def _replace(self, index: int, error: RayError, attempts: int) -> None:
         """Has another worker in the place of one that is lost."""
