@@ -105,9 +105,6 @@ def _init(what: str, **options: Any) -> Any:
         if isinstance(error, ConnectionError):  # what answers speaks as a head does
             text += "; it answers, but its token (RAY_AUTH_TOKEN, ray get-auth-token) may be another"
         raise WorkbenchError(f"can't join {what}: {text}") from error
-    else:
-        # Who has lost a worker or a node tells of it in a line; Ray would print the end of their logs as well.
-        ray._private.worker._worker_logs_enabled = False
     finally:
         for number, handler in before.items():  # Ray's own would leave out what ours save
             signal.signal(number, handler)

@@ -93,7 +93,7 @@ class Workers:
         return actor.remote(self._record, index, sys.path)
 
     def _answering(self) -> dict[str, Node]:
-        """The nodes that can be used, and answer: Ray itself takes some ten seconds to know that one is gone."""
+        """The nodes that can be used, and answer: Ray takes some ten seconds to know that one is gone."""
         found = {}
         for each in ray.nodes():
             node = self._cluster.nodes.get(each["NodeID"])
@@ -153,9 +153,10 @@ class Workers:
         if not isinstance(answer, Failure):
             return answer
         kind = EnvironmentFailure if answer.is_environments else WorkbenchError
-        name = self._cluster.nodes[self._nodes[index]].name
+        node = self._cluster.nodes.get(self._nodes[index])
+        place = f"on node {node.name}: " if node else ""
         with numbered(index, self._count):
-            raise kind(f"on {name}: {answer.text}") from WorkerTraceback(answer.trace)
+            raise kind(f"{place}{answer.text}") from WorkerTraceback(answer.trace)
 
     def _replace(self, index: int, error: RayError, attempts: int) -> None:
         """Has another worker in the place of one that is lost."""
