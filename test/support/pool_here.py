@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.rollouts.worker import Failure, Worker
+from rl_workbench.training.rollouts.worker import Failure, Worker, home_of
 from rl_workbench.training.run.random_states import random_states, restore_random_states
 
 
@@ -25,6 +25,7 @@ class PoolHere:
     ) -> None:
         self._record, self._lost = options.record(), lost
         self._order = range(options.run.num_envs)[:: -1 if backwards else 1]
+        self._home = home_of(options.run.env_id)
         self._workers: dict[int, Worker] = {}
         self._rounds = 0
 
@@ -38,7 +39,7 @@ class PoolHere:
             if should_stop():
                 restore_random_states(own)
                 return None
-            worker = self._workers.setdefault(index, Worker(self._record, index, []))
+            worker = self._workers.setdefault(index, Worker(self._record, index, self._home))
             found[index] = worker.play(policy, states[index])
             assert not isinstance(found[index], Failure), found[index].trace
         restore_random_states(own)  # each has a process of its own on a cluster

@@ -3,12 +3,15 @@
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any, NamedTuple
 
+import gymnasium
 import torch
+from gymnasium.envs.registration import EnvSpec, parse_env_id
 
+from rl_workbench.env_ids import without_module
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import recorded_options
 from rl_workbench.training.environments.checked import EnvironmentFailure
@@ -24,17 +27,33 @@ class Failure(NamedTuple):
     trace: str
 
 
+class Home(NamedTuple):
+    """What environments need to be found as they are in the driver's process."""
+
+    paths: list[str]  # of modules, as far as they are on the worker's machine as well
+    specs: list[EnvSpec]  # of the environment: a worker imports its module only if the id names it
+
+
+def home_of(env_id: str) -> Home:
+    """That of this process, where the environment was made before."""
+    kin = parse_env_id(without_module(env_id))[:2]
+    specs = [each for each in gymnasium.registry.values() if (each.namespace, each.name) == kin]
+    return Home(list(sys.path), specs)
+
+
 class Worker:
     """What Ray makes an actor of.
 
     Args:
         record: the options of the training.
         index: the number of its environment.
-        paths: where the driver finds modules: as far as they are here, they are looked for there as well.
+        home: of the driver.
     """
 
-    def __init__(self, record: dict[str, Any], index: int, paths: Sequence[str]) -> None:
-        sys.path.extend(path for path in paths if path not in sys.path and os.path.isdir(path))
+    def __init__(self, record: dict[str, Any], index: int, home: Home) -> None:
+        sys.path.extend(path for path in home.paths if path not in sys.path and os.path.isdir(path))
+        for spec in home.specs:
+            gymnasium.registry.setdefault(spec.id, spec)
         torch.set_num_threads(1)  # networks this small only lose by more
         self._options = recorded_options(record, "what the driver sent")
         self._index = index

@@ -7,7 +7,6 @@ its part depends on, so what it plays is the same to the bit.
 
 import contextlib
 import socket
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -21,7 +20,7 @@ from rl_workbench.training.environments.checked import EnvironmentFailure, told
 from rl_workbench.training.environments.several import numbered
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.rollouts.fingerprint import fingerprint
-from rl_workbench.training.rollouts.worker import Failure, Worker
+from rl_workbench.training.rollouts.worker import Failure, Worker, home_of
 from rl_workbench.training.run.algorithm import Say
 
 POLL = 0.1  # [s] between two looks for an interruption
@@ -56,6 +55,7 @@ class Workers:
                 f"num_envs {self._count} takes as many processors, and the cluster has {cluster.cpus}: "
                 f"--num-envs {max(cluster.cpus, 1)}, or more machines"
             )
+        self._home = home_of(options.run.env_id)
         self._nodes = [""] * self._count  # where each worker is
         self._playing: dict[Any, int] = {}
         self._actors: list[Any] = []
@@ -63,6 +63,10 @@ class Workers:
             for index in range(self._count):
                 self._actors.append(self._start(index, processors=1))
             self._check_kinds(self._begun())
+        except TypeError as error:  # Ray's, of what pickle can't write
+            raise WorkbenchError(
+                f"{options.run.env_id} can't be sent to workers: {first_line(error)}"
+            ) from error
         except BaseException:  # Ctrl-C as well
             self.close()
             raise
@@ -90,7 +94,7 @@ class Workers:
         chosen = self._nodes[index] = max(sorted(nodes), key=free)
         place = NodeAffinitySchedulingStrategy(chosen, soft=False)
         actor = ray.remote(Worker).options(num_cpus=processors, scheduling_strategy=place)
-        return actor.remote(self._record, index, sys.path)
+        return actor.remote(self._record, index, self._home)
 
     def _answering(self) -> dict[str, Node]:
         """The nodes that can be used, and answer: Ray takes some ten seconds to know that one is gone."""
