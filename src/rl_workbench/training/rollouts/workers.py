@@ -203,6 +203,6 @@ def _told_of_stores() -> Iterator[None]:
 
 
 def first_line(error: BaseException) -> str:
-    """The beginning of what an error tells."""
-    lines = str(error).strip().splitlines()
-    return lines[0].rstrip(".: ") if lines else type(error).__name__
+    """The beginning of what an error tells; of one with a traceback the end."""
+    lines = str(error).strip().splitlines() or [type(error).__name__]
+    return lines[-1 if "Traceback" in str(error) else 0].strip(".: ")
