@@ -142,14 +142,15 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOption
 def _joined(
     options: TrainingOptions, robot: RobotOptions, given: dict[str, Any]
 ) -> TrainingOptions:
-    if robot.headless and options.showing.gui:
+    if robot.headless and options.session.gui:
         raise WorkbenchError("--headless: not with --gui")
     run = options.run
     for key in ("realtime", "rviz"):
-        if getattr(robot, key) and run.num_envs > 1:
-            raise WorkbenchError(
-                f"--{key} is of the robot of one simulator: num_envs is 1, not {run.num_envs}"
+        if getattr(robot, key) and (run.num_envs > 1 or options.session.ray):
+            others = (
+                "not with --ray" if options.session.ray else f"num_envs is 1, not {run.num_envs}"
             )
+            raise WorkbenchError(f"--{key} is of the robot of one simulator: {others}")
     recorded = [key for key in given if key not in WINDOWS]
     if options.resume:
         if recorded:
@@ -179,9 +180,10 @@ def needs_session(options: TrainingOptions) -> bool:
 def shows_itself(options: TrainingOptions) -> bool:
     """Whether the robot that is trained is seen in its simulator's window, not on a page beside the training.
 
-    Of several environments each has a simulator of its own; in the session's the policy is evaluated.
+    Of several environments each has a simulator of its own, and so have those of workers; in the session's
+    the policy is evaluated.
     """
-    return needs_session(options) and options.run.num_envs == 1
+    return needs_session(options) and options.run.num_envs == 1 and not options.session.ray
 
 
 def _backend(options: TrainingOptions) -> str:
@@ -214,7 +216,7 @@ def session(
         name,
         argv,
         realtime=backend == "ros-realtime",
-        gui=options.showing.gui and shows_itself(options),
+        gui=options.session.gui and shows_itself(options),
         seed=options.run.seed,
         rviz=robot.rviz,
         curves=folder,

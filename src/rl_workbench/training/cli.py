@@ -2,8 +2,9 @@
 
 import argparse
 import sys
-from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
@@ -13,11 +14,11 @@ from rl_workbench.output import reader_may_go
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm, recorded_kind
 from rl_workbench.training.options.command_line import USAGE, check_flag
 from rl_workbench.training.options.kind import AlgorithmKind
-from rl_workbench.training.options.training_options import TrainingOptions, choose
+from rl_workbench.training.options.training_options import MakePool, TrainingOptions, choose
 from rl_workbench.training.page import page_beside
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
+from rl_workbench.training.run.progress import tell, warn
 
 PROG = "rl-workbench train"
 PROGRAM = (sys.executable, "-m", "rl_workbench")
@@ -114,6 +115,9 @@ def train(
     run = options.run
     try:
         with ExitStack() as holding:
+            if options.session.ray:
+                make_pool = holding.enter_context(_workers(options.session.ray))
+                options = options._replace(make_pool=make_pool)
             if options.resume:
                 folder = options.resume.resolve()
                 holding.enter_context(run_folder.held(folder))
@@ -127,6 +131,21 @@ def train(
     finally:
         interrupt.defer()
     return folder
+
+
+@contextmanager
+def _workers(address: str) -> Iterator[MakePool]:
+    """What makes the workers on a cluster, as long as that is joined.
+
+    Raises:
+        WorkbenchError: if it can't be.
+    """
+    from rl_workbench.training.cluster.joining import joined
+
+    with joined(address) as cluster:
+        from rl_workbench.training.rollouts.workers import Workers  # needs what joining sets
+
+        yield partial(Workers, cluster, say=warn)
 
 
 @reader_may_go()
@@ -167,7 +186,7 @@ def shown(
     options: TrainingOptions, folder: Path, program: tuple[str, ...]
 ) -> AbstractContextManager[None]:
     """The training's page for as long as it is entered, if it is asked for."""
-    return page_beside(folder, program, tell) if options.showing.gui else nullcontext()
+    return page_beside(folder, program, tell) if options.session.gui else nullcontext()
 
 
 def _chosen(

@@ -73,8 +73,8 @@ def test_parameters_and_flags_over_them() -> None:
     assert robot == RobotOptions(backend="bullet", start_noise=0.05)
     empty = {"run_dir": "", "realtime": "", "gui": False, "resume": "", "config": "", "algo": ""}
     assert choose([], empty) == choose([], {})
-    assert choose([], {"gui": True})[0].showing.gui
-    assert not choose(["--no-gui"], {"gui": True})[0].showing.gui
+    assert choose([], {"gui": True})[0].session.gui
+    assert not choose(["--no-gui"], {"gui": True})[0].session.gui
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_every_training_may_be_shown() -> None:
     for given in (["--backend=bullet"], ["--env-id=X-v0"], ["--realtime"]):
         options, robot = choose([*given, "--gui"], {})
         plain = choose(given, {})
-        assert options.showing.gui and options.record() == plain[0].record() and robot == plain[1]
+        assert options.session.gui and options.record() == plain[0].record() and robot == plain[1]
 
 
 def test_what_goes_for_every_environment() -> None:

@@ -78,12 +78,7 @@ def make_several(
     made = [first]
     with ExitStack() as making:
         making.callback(close_all, made)
-        if shares_robot(first):
-            apart = _attribute(first, OWN_ROBOT)
-            if not apart:
-                raise WorkbenchError(
-                    f"{env_id} moves a robot that there is only one of: num_envs is 1, not {count}"
-                )
+        if apart := own_robot(first, env_id, f"num_envs is 1, not {count}"):
             made.pop().close()
             given = {**given, **apart}
         with _side_by_side(first, count - len(made)):
@@ -124,6 +119,25 @@ def _side_by_side(env: gymnasium.Env[Any, Any], count: int) -> Iterator[None]:
 def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:
     """None where it has none."""
     return env.get_wrapper_attr(name) if env.has_wrapper_attr(name) else None
+
+
+def own_robot(env: gymnasium.Env[Any, Any], env_id: str, otherwise: str) -> dict[str, Any]:
+    """The options by which a copy of an environment has a robot of its own; none where it has one anyway.
+
+    Args:
+        env: the environment.
+        env_id: for the error.
+        otherwise: what has to be done where there is but one robot, for the error.
+
+    Raises:
+        WorkbenchError: if there is but one robot.
+    """
+    if not shares_robot(env):
+        return {}
+    apart = _attribute(env, OWN_ROBOT)
+    if not apart:
+        raise WorkbenchError(f"{env_id} moves a robot that there is only one of: {otherwise}")
+    return dict(apart)
 
 
 @contextmanager

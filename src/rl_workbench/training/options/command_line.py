@@ -14,7 +14,7 @@ from rl_workbench.training.options.options import (
     unknown,
     unknown_option,
 )
-from rl_workbench.training.options.showing import ShowingOptions
+from rl_workbench.training.options.session import SessionOptions
 
 USAGE = "{prog} [--help] [--OPTION VALUE ...]"
 DESCRIPTION = """\
@@ -62,7 +62,7 @@ class CommandLine:
         parents: Sequence[argparse.ArgumentParser] = (),
     ) -> None:
         self._options = options
-        self._showing = Options(ShowingOptions)
+        self._session = Options(SessionOptions)
         self._special = ("config", "params", "resume", *(("preset",) if kind.presets else ()))
         is_node = prog.endswith(".py")
         self.parser = argparse.ArgumentParser(
@@ -78,6 +78,7 @@ class CommandLine:
             allow_abbrev=False,
             argument_default=argparse.SUPPRESS,
             parents=list(parents),
+            conflict_handler="resolve",  # commands that train have --ray, too: this is the same
         )
         add = self.parser.add_argument
         add("--config", metavar="FILE", help=f"options in YAML (config/{kind.config})")
@@ -87,39 +88,39 @@ class CommandLine:
         add("--resume", metavar="RUN_DIR", help="go on with an interrupted training")
         defaults = {"exp_name": kind.name, **kind.defaults, "env_id": env_id}
         options.add_flags(self.parser, defaults)
-        self._showing.add_flags(self.parser)
+        self._session.add_flags(self.parser)
 
     def given(
         self, flags: list[str], parameters: dict[str, Any]
-    ) -> tuple[dict[str, Any], dict[str, str], ShowingOptions]:
-        """Options that somebody gave, the texts of --config, --preset and --resume, and what is shown.
+    ) -> tuple[dict[str, Any], dict[str, str], SessionOptions]:
+        """Options that somebody gave, the texts of --config, --preset and --resume, and what holds this time.
 
         Raises:
             SystemExit: with code 2 and a usage line, if a flag is wrong; with 0 after --help.
             WorkbenchError: if a name is unknown or a value wrong anywhere else.
         """
         from_flags = self._read_flags(flags)
-        known = [*self._special, *self._options.names, *self._showing.names]
+        known = [*self._special, *self._options.names, *self._session.names]
         for name in parameters:
             if name not in known:
                 raise WorkbenchError(f"rosparam: {unknown_option(name, known, 'parameter')}")
         special = {name: str(parameters[name]) for name in self._special if parameters.get(name)}
         own = {name: value for name, value in parameters.items() if name in self._options.names}
-        shown = {name: value for name, value in parameters.items() if name in self._showing.names}
-        shown = self._showing.read(shown, "rosparam")
-        shown |= {name: from_flags.pop(name) for name in self._showing.names if name in from_flags}
+        here = {name: value for name, value in parameters.items() if name in self._session.names}
+        here = self._session.read(here, "rosparam")
+        here |= {name: from_flags.pop(name) for name in self._session.names if name in from_flags}
         pairs = [*shlex.split(special.pop("params", "")), *from_flags.pop("params", [])]
         special |= {name: from_flags.pop(name) for name in self._special if name in from_flags}
         listed = self._options.read(key_values(pairs, "--params"), "--params")
         given = listed | self._options.read(own, "rosparam") | from_flags
-        return given, special, ShowingOptions(**shown)
+        return given, special, SessionOptions(**here)
 
     def _read_flags(self, flags: list[str]) -> dict[str, Any]:
         known, strange = self.parser.parse_known_args(flags)
         if strange:
             given = strange[0].partition("=")[0]
             check_flag(self.parser, given)
-            options = (*self._special, *self._options.names, *self._showing.names)
+            options = (*self._special, *self._options.names, *self._session.names)
             names = [flag(name) for name in options]
             self.parser.error(unknown("flag", given, names))
         return vars(known)

@@ -24,6 +24,7 @@ class AlgorithmKind:
         resuming: for --help: what --resume comes to.
         keeps_dict: whether it learns from a Dict of arrays as it is; others get all of its numbers in one
             vector.
+        plays_elsewhere: whether it learns from whole rollouts, which workers on other machines can play.
         learns_in_several: whether it learns in several environments at the same time.
         package: the extra that it needs, as (module, name); None if none.
     """
@@ -40,6 +41,7 @@ class AlgorithmKind:
         "--resume goes on from there,\nto the same bits as a training that was never interrupted"
     )
     keeps_dict: bool = False
+    plays_elsewhere: bool = False
     learns_in_several: bool = False
     package: tuple[str, str] | None = None
 

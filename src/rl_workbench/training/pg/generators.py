@@ -22,6 +22,30 @@ def generator_state(generator: np.random.Generator) -> str:
     return json.dumps(generator.bit_generator.state, default=lambda array: array.tolist())
 
 
+def packed(environments: list[str], actions: list[str]) -> Any:
+    """The states of the environments' generators, and of those of the actions but for the first one's.
+
+    Returns:
+        The one of a single environment, else lists of them.
+    """
+    return {"environments": environments, "actions": actions} if actions else environments[0]
+
+
+def unpacked(state: Any, count: int) -> tuple[list[str], list[str]]:
+    """What `packed` was given.
+
+    Args:
+        state: what it gave.
+        count: of environments.
+
+    Raises:
+        TypeError, ValueError, LookupError: if it gave something else.
+    """
+    if count == 1:
+        return [state], []
+    return sequence(state["environments"], count), sequence(state["actions"], count - 1)
+
+
 class EpisodeGenerators:
     """All generators that episodes draw from: the process's, the environments', and those of the actions.
 
@@ -62,16 +86,9 @@ class EpisodeGenerators:
             generator.bit_generator.state = state
 
     def state(self) -> Any:
-        """Where those of the environments and of the actions are, but for the agent's own.
-
-        Returns:
-            The one of a single environment, else lists of them.
-        """
+        """Where those of the environments and of the actions are, but for the agent's own; see `packed`."""
         environments = [generator_state(each.np_random) for each in self._environments]
-        actions = [generator_state(each) for each in self._actions[1:]]
-        if not actions:
-            return environments[0]
-        return {"environments": environments, "actions": actions}
+        return packed(environments, [generator_state(each) for each in self._actions[1:]])
 
     def load_state(self, state: Any) -> None:
         """Takes over what `state` gave.
@@ -80,10 +97,7 @@ class EpisodeGenerators:
             TypeError, ValueError, LookupError: if it gave something else.
         """
         count = len(self._environments)
-        environments, actions = [state], []
-        if count > 1:
-            environments = sequence(state["environments"], count)
-            actions = sequence(state["actions"], count - 1)
+        environments, actions = unpacked(state, count)
         own = self._own()
         places = [*own[:count], *own[count + 1 :]]
         for generator, text in zip(places, [*environments, *actions], strict=True):

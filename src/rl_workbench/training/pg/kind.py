@@ -34,6 +34,7 @@ REINFORCE = AlgorithmKind(
     config="pg.yaml",
     implementation="rl_workbench.training.pg.algorithm",
     hyperparameters=lambda: ReinforceOptions,
+    plays_elsewhere=True,
     learns_in_several=True,
     defaults={**_EPISODIC, "normalize_observations": True},
 )

@@ -12,6 +12,7 @@ from stable_baselines3.common.logger import Logger
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.training_options import TrainingOptions
+from rl_workbench.training.rollouts.player import Player
 from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
 from rl_workbench.training.run.files import write_atomically
 from rl_workbench.training.run.policy import Policy
@@ -19,7 +20,7 @@ from rl_workbench.training.sb3.callback import FrameCallback, LossWriter
 from rl_workbench.training.sb3.model import checked_of, make_model, repeatable_of
 from rl_workbench.training.sb3.network import greedy_network
 from rl_workbench.training.sb3.options import ON_POLICY
-from rl_workbench.training.sb3.state import check_weights, restore, state_of
+from rl_workbench.training.sb3.state import FRAGMENTS, check_weights, restore, state_of
 
 # What the library raises in the midst of learning: weights or options that are no good.
 _LEARNING = (ArithmeticError, AssertionError, LookupError, RuntimeError, TypeError, ValueError)
@@ -32,7 +33,12 @@ def make(options: TrainingOptions) -> "SB3Training":
         raise WorkbenchError(
             f"{options.kind.name} needs total_timesteps: its schedules depend on them"
         )
-    return SB3Training(options, make_model(options))
+    if options.make_pool is not None:
+        from rl_workbench.training.sb3.remote import make_remote
+
+        return make_remote(options, options.make_pool)
+    model = make_model(options)
+    return SB3Training(options, model, checked_of(model.get_env()))
 
 
 class SB3Training(Algorithm):
@@ -44,12 +50,11 @@ class SB3Training(Algorithm):
     Args:
         options: what the user chose.
         model: with its environments.
+        env: one of them, or of their kind.
     """
 
-    def __init__(self, options: TrainingOptions, model: Any) -> None:
-        self._run, self._name, self._model = options.run, options.kind.name, model
-        self.env = checked_of(model.get_env())
-        self._place = repeatable_of(model.get_env())
+    def __init__(self, options: TrainingOptions, model: Any, env: gymnasium.Env[Any, Any]) -> None:
+        self._run, self._name, self._model, self.env = options.run, options.kind.name, model, env
         self._is_given_up = False  # the episode under way, whose robot was moved
 
     @property
@@ -73,7 +78,7 @@ class SB3Training(Algorithm):
         try:
             self._model.learn(
                 remaining,
-                callback=FrameCallback(frame, self._run.total_timesteps, self._take_loss),
+                callback=self._callback(frame),
                 reset_num_timesteps=False,
             )
         except WorkbenchError:
@@ -82,6 +87,9 @@ class SB3Training(Algorithm):
             self.check_weights()  # torch tells of it in its own words, if at all
             text = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise WorkbenchError(f"{self._name} failed: {text}") from error
+
+    def _callback(self, frame: Frame) -> FrameCallback:
+        return FrameCallback(frame, self._run.total_timesteps, self._take_loss)
 
     def check_weights(self) -> None:
         """See `Algorithm.check_weights`."""
@@ -93,6 +101,10 @@ class SB3Training(Algorithm):
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """See `Algorithm.load_state_dict`."""
+        if FRAGMENTS in state:
+            raise WorkbenchError(
+                "it was begun with --ray: it goes on with --ray, on whatever cluster"
+            )
         restore(self._model, state, self._run.seed)
 
     def environment_state(self) -> None:
@@ -106,16 +118,18 @@ class SB3Training(Algorithm):
 
     def leave_environment(self) -> dict[str, Any] | None:
         """See `Algorithm.leave_environment`."""
-        if not self._place.was_begun:
+        place = repeatable_of(self._model.get_env())
+        if not place.was_begun:
             return None
-        return {"episode": self._place.state_dict(), "generator": self._place.generator}
+        return {"episode": place.state_dict(), "generator": place.generator}
 
     def restore_environment(self, state: dict[str, Any] | None, say: Say) -> None:
         """Repeats the episode under way; says so if it goes another way."""
         if state is None:
             return
-        self._place.generator = state["generator"]
-        self._is_given_up = self._place.load_state_dict(state["episode"]) is None
+        place = repeatable_of(self._model.get_env())
+        place.generator = state["generator"]
+        self._is_given_up = place.load_state_dict(state["episode"]) is None
         if self._is_given_up and len(state["episode"]["actions"]):
             say("the environment doesn't repeat itself: the episode under way is cut off")
 
@@ -131,6 +145,13 @@ class SB3Training(Algorithm):
     def close(self) -> None:
         """Closes all environments."""
         self._model.get_env().close()
+
+
+def make_player(options: TrainingOptions, index: int) -> Player:
+    """What plays in the environment `index`, for a worker; see `Player`."""
+    from rl_workbench.training.sb3.fragments import FragmentPlayer
+
+    return FragmentPlayer(options, index)
 
 
 def load_policy(

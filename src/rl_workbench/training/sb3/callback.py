@@ -1,7 +1,7 @@
 """What Stable-Baselines3's loop tells the frame, and what the frame has it do."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -67,10 +67,7 @@ class FrameCallback(BaseCallback):
     def _on_step(self) -> bool:
         for info in self.locals["infos"]:
             if "episode" in info:
-                total, length = float(info["episode"]["r"]), int(info["episode"]["l"])
-                self._episodes += 1
-                check_finite(f"the return of episode {self._episodes}", total)
-                self._frame.episode_done(total, length, {}, success=succeeded(info))
+                self._tell(*ended(info))
         self._frame.step_done()
         if self._was_given_up():
             self._begin_anew()
@@ -78,6 +75,11 @@ class FrameCallback(BaseCallback):
             self._release()
         # At its full length it ends by itself, and learns from the last rollout.
         return self.num_timesteps >= self._total or not self._frame.is_over()
+
+    def _tell(self, total_reward: float, length: int, success: bool | None) -> None:
+        self._episodes += 1
+        check_finite(f"the return of episode {self._episodes}", total_reward)
+        self._frame.episode_done(total_reward, length, {}, success=success)
 
     def _on_training_end(self) -> None:
         self._release()
@@ -110,6 +112,11 @@ def _first(seen: Any) -> Any:
     if isinstance(seen, dict):
         return {name: np.array(part[0]) for name, part in seen.items()}
     return np.array(seen[0])
+
+
+def ended(info: Mapping[str, Any]) -> tuple[float, int, bool | None]:
+    """Return, length [steps] and success of an episode, from its last info, where Monitor put them."""
+    return float(info["episode"]["r"]), int(info["episode"]["l"]), succeeded(info)
 
 
 def check_finite(name: str, value: float) -> None:

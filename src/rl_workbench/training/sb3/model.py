@@ -63,8 +63,7 @@ def make_model(options: TrainingOptions, acts_in: gymnasium.Env[Any, Any] | None
 
     from rl_workbench.training.sb3.side_by_side import SideBySide
 
-    name, run, settings = options.kind.name, options.run, options.hyperparameters
-    own = settings.own
+    name, run, own = options.kind.name, options.run, options.hyperparameters.own
     vector: DummyVecEnv
     if acts_in is None:
         vector = SideBySide([_watched(env) for env in training_environments(options)])
@@ -77,24 +76,44 @@ def make_model(options: TrainingOptions, acts_in: gymnasium.Env[Any, Any] | None
     try:
         check_fit(name, run.env_id, vector.action_space)
         replay = _hindsight(options, vector) if acts_in is None else {}
+        return model_in(vector, options, own, **replay)
+    except WorkbenchError:
+        if acts_in is None:
+            vector.close()
+        raise
+
+
+def model_in(
+    vector: Any, options: TrainingOptions, own: dict[str, Any], kind: Any = None, **replay: Any
+) -> Any:
+    """A new model in environments that fit it, whoever made them.
+
+    Args:
+        vector: Stable-Baselines3's vector environment.
+        options: of the training.
+        own: the algorithm's own options; emptied.
+        kind: the model's class, if it isn't the algorithm's own.
+        replay: arguments that are the replay buffer's.
+
+    Raises:
+        WorkbenchError: if an option makes no sense.
+    """
+    name, run = options.kind.name, options.run
+    sees_dict = isinstance(vector.observation_space, spaces.Dict)
+    try:
         torch.empty(0, device=run.device)  # where there is none, the model would take the CPU
-        sees_dict = isinstance(vector.observation_space, spaces.Dict)
-        return algorithm_class(name)(
+        return (kind or algorithm_class(name))(
             "MultiInputPolicy" if sees_dict else "MlpPolicy",
             vector,
             seed=run.seed,
             device=run.device,
             policy_kwargs=_network(own),
             **replay,
-            **_translated(settings, own, vector.action_space),
+            **_translated(options.hyperparameters, own, vector.action_space),
         )
-    except WorkbenchError:
-        if acts_in is None:
-            vector.close()
-        raise
     except (TypeError, ValueError, AssertionError, RuntimeError, ArithmeticError) as error:
-        if acts_in is None:
-            vector.close()
+        if isinstance(error, WorkbenchError):
+            raise
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise WorkbenchError(f"{name} can't be made: {text}") from error
 

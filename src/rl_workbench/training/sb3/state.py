@@ -19,6 +19,7 @@ COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_n_calls")
 ENTROPY = "log_ent_coef"  # SAC's, no part of a network
 ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts",
           "ep_start", "ep_length")  # fmt: skip
+FRAGMENTS = "fragments"  # where the environments are of which workers play fragments
 EPISODES = "_current_ep_start"  # of a buffer for hindsight
 
 

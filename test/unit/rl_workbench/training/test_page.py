@@ -118,10 +118,10 @@ def test_it_is_no_setting(name: str) -> None:
     kind = ALGORITHMS[name]
     flags = ["--total-timesteps=10"]
     plain, shown = choose(kind, flags), choose(kind, [*flags, "--gui"])
-    assert shown.showing.gui and not plain.showing.gui
+    assert shown.session.gui and not plain.session.gui
     assert shown.record() == plain.record()
-    assert choose(kind, flags, {"gui": True}).showing.gui
-    assert not choose(kind, [*flags, "--no-gui"], {"gui": "true"}).showing.gui
+    assert choose(kind, flags, {"gui": True}).session.gui
+    assert not choose(kind, [*flags, "--no-gui"], {"gui": "true"}).session.gui
 
 
 @contextmanager

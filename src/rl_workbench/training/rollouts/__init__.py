@@ -1,0 +1,1 @@
+"""Episodes and fragments of them that are played on other machines."""

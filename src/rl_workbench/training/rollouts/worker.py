@@ -1,0 +1,83 @@
+"""One worker: a process on some machine, with one environment of a training beside it."""
+
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import gymnasium
+import torch
+from gymnasium.envs.registration import EnvSpec, parse_env_id
+
+from rl_workbench.env_ids import without_module
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.algorithms import recorded_options
+from rl_workbench.training.environments.checked import EnvironmentFailure
+from rl_workbench.training.rollouts.fingerprint import fingerprint
+from rl_workbench.training.rollouts.player import Player
+
+
+class Failure(NamedTuple):
+    """What a player raised: told as an answer, since Ray would put it into a long text of its own."""
+
+    text: str
+    is_environments: bool
+    trace: str
+
+
+class Home(NamedTuple):
+    """What environments need to be found as they are in the driver's process."""
+
+    paths: list[str]  # of modules, as far as they are on the worker's machine as well
+    specs: list[EnvSpec]  # of the environment: a worker imports its module only if the id names it
+
+
+def home_of(env_id: str) -> Home:
+    """That of this process, where the environment was made before."""
+    kin = parse_env_id(without_module(env_id))[:2]
+    specs = [each for each in gymnasium.registry.values() if (each.namespace, each.name) == kin]
+    return Home(list(sys.path), specs)
+
+
+class Worker:
+    """What Ray makes an actor of.
+
+    Args:
+        record: the options of the training.
+        index: the number of its environment.
+        home: of the driver.
+    """
+
+    def __init__(self, record: dict[str, Any], index: int, home: Home) -> None:
+        sys.path.extend(path for path in home.paths if path not in sys.path and os.path.isdir(path))
+        for spec in home.specs:
+            gymnasium.registry.setdefault(spec.id, spec)
+        torch.set_num_threads(1)  # networks this small only lose by more
+        self._options = recorded_options(record, "what the driver sent")
+        self._index = index
+        self._player: Player | None = None
+
+    def begin(self) -> Any:
+        """Makes the environment; gives the machine's fingerprint, or a Failure."""
+        return self._answer(lambda player: fingerprint())
+
+    def play(self, policy: Any, state: Any) -> Any:
+        """What `Player.play` gives, or a Failure."""
+        return self._answer(lambda player: player.play(policy, state))
+
+    def _answer(self, ask: Callable[[Player], Any]) -> Any:
+        try:
+            if self._player is None:
+                implementation = import_module(self._options.kind.implementation)
+                self._player = implementation.make_player(self._options, self._index)
+            return ask(self._player)
+        except WorkbenchError as error:
+            trace = "".join(traceback.format_exception(error.__cause__ or error))
+            return Failure(str(error), isinstance(error, EnvironmentFailure), trace)
+
+    def close(self) -> None:
+        """Closes the environment."""
+        if self._player is not None:
+            self._player.close()

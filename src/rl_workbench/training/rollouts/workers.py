@@ -1,0 +1,208 @@
+"""Workers on the machines of a cluster, by Ray: each plays in an environment beside it.
+
+An answer is a whole episode or a long fragment of one, since each costs half a millisecond on the way. A
+worker that is lost, with its machine or alone, is made anew and plays its part again: it is sent all that
+its part depends on, so what it plays is the same to the bit.
+"""
+
+import contextlib
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import ray
+from ray.exceptions import ObjectStoreFullError, OutOfDiskError, RayError, RayTaskError
+from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.cluster.nodes import Cluster, Node
+from rl_workbench.training.environments.checked import EnvironmentFailure, told
+from rl_workbench.training.environments.several import numbered
+from rl_workbench.training.options.training_options import TrainingOptions
+from rl_workbench.training.rollouts.fingerprint import fingerprint
+from rl_workbench.training.rollouts.worker import Failure, Worker, home_of
+from rl_workbench.training.run.algorithm import Say
+
+POLL = 0.1  # [s] between two looks for an interruption
+PATIENCE = 15.0  # [s] after which the user hears that workers wait for processors
+ANSWER = 1.0  # [s] that a node has to answer in
+GRACE = 3.0  # [s] that environments have to close in
+ATTEMPTS = 5  # of workers at the same part, before the part is taken for the cause
+
+
+class WorkerTraceback(Exception):
+    """The cause of an error, as the worker tells of it."""
+
+
+class Workers:
+    """As many workers as a training has environments, spread over a cluster; see `Pool`.
+
+    Args:
+        cluster: that was joined.
+        options: of the training, as the workers need them.
+        say: is told of workers that are lost.
+
+    Raises:
+        WorkbenchError: if the cluster has fewer processors than there are workers, or an environment can't be
+            made.
+    """
+
+    def __init__(self, cluster: Cluster, options: TrainingOptions, say: Say) -> None:
+        self._cluster, self._say = cluster, say
+        self._record, self._count = options.record(), options.run.num_envs
+        if cluster.cpus < self._count:
+            raise WorkbenchError(
+                f"num_envs {self._count} takes as many processors, and the cluster has {cluster.cpus}: "
+                f"--num-envs {max(cluster.cpus, 1)}, or more machines"
+            )
+        self._home = home_of(options.run.env_id)
+        self._nodes = [""] * self._count  # where each worker is
+        self._playing: dict[Any, int] = {}
+        self._actors: list[Any] = []
+        try:
+            for index in range(self._count):
+                self._actors.append(self._start(index, processors=1))
+            self._check_kinds(self._begun())
+        except TypeError as error:  # Ray's, of what pickle can't write
+            raise WorkbenchError(
+                f"{options.run.env_id} can't be sent to workers: {first_line(error)}"
+            ) from error
+        except BaseException:  # Ctrl-C as well
+            self.close()
+            raise
+
+    def _start(self, index: int, processors: int) -> Any:
+        """A worker on the node that has most processors without one.
+
+        Args:
+            index: of its environment.
+            processors: that it has for itself; 0: it makes do with what there is.
+
+        Raises:
+            WorkbenchError: if there is no node any more.
+        """
+        if not self._cluster.nodes:
+            self._cluster.update(PATIENCE)
+        nodes = self._answering()
+        before, self._nodes[index] = self._nodes[index], ""
+        if not nodes:
+            raise WorkbenchError("no node of the cluster can be used any more")
+
+        def free(name: str) -> tuple[int, bool]:
+            return nodes[name].cpus - self._nodes.count(name), name != before
+
+        chosen = self._nodes[index] = max(sorted(nodes), key=free)
+        place = NodeAffinitySchedulingStrategy(chosen, soft=False)
+        actor = ray.remote(Worker).options(num_cpus=processors, scheduling_strategy=place)
+        return actor.remote(self._record, index, self._home)
+
+    def _answering(self) -> dict[str, Node]:
+        """The nodes that can be used, and answer: Ray takes some ten seconds to know that one is gone."""
+        found = {}
+        for each in ray.nodes():
+            node = self._cluster.nodes.get(each["NodeID"])
+            place = (each["NodeManagerAddress"], each["NodeManagerPort"])
+            if node is not None:
+                with contextlib.suppress(OSError), socket.create_connection(place, ANSWER):
+                    found[node.id] = node
+        return found
+
+    def _begun(self) -> list[str]:
+        """The fingerprints of the machines, once all environments have been made."""
+        with _told_of_stores():
+            waiting = [actor.begin.remote() for actor in self._actors]
+            _, missing = ray.wait(waiting, num_returns=self._count, timeout=PATIENCE)
+            if missing:
+                self._say(f"waiting for {len(missing)} of {self._count} workers")
+            return [self._checked(index, each) for index, each in enumerate(ray.get(waiting))]
+
+    def _check_kinds(self, kinds: Sequence[str]) -> None:
+        others = [index for index, each in enumerate(kinds) if each != fingerprint()]
+        if others:
+            self._say(
+                f"workers {', '.join(map(str, others))} compute to other bits than this machine, by their "
+                "processors or NumPy: the same seed gives the same weights on machines of one kind only"
+            )
+
+    def play(
+        self, policy: Any, states: Sequence[Any], should_stop: Callable[[], bool]
+    ) -> list[Any] | None:
+        """See `Pool`."""
+        with _told_of_stores():
+            shared = ray.put(policy)
+            found: dict[int, Any] = {}
+            lost = [0] * self._count
+            for index in range(self._count):
+                self._ask(index, shared, states[index])
+            while self._playing:
+                if should_stop():
+                    return None
+                ready, _ = ray.wait(list(self._playing), timeout=POLL)
+                for reference in ready:
+                    index = self._playing.pop(reference)
+                    try:
+                        found[index] = self._checked(index, ray.get(reference))
+                    except (RayTaskError, ObjectStoreFullError, OutOfDiskError):
+                        raise
+                    except RayError as error:
+                        lost[index] += 1
+                        self._replace(index, error, lost[index])
+                        self._ask(index, shared, states[index])
+        return [found[index] for index in range(self._count)]
+
+    def _ask(self, index: int, policy: Any, state: Any) -> None:
+        self._playing[self._actors[index].play.remote(policy, state)] = index
+
+    def _checked(self, index: int, answer: Any) -> Any:
+        if not isinstance(answer, Failure):
+            return answer
+        kind = EnvironmentFailure if answer.is_environments else WorkbenchError
+        node = self._cluster.nodes.get(self._nodes[index])
+        place = f"on node {node.name}: " if node else ""
+        with numbered(index, self._count):
+            raise kind(f"{place}{answer.text}") from WorkerTraceback(answer.trace)
+
+    def _replace(self, index: int, error: RayError, attempts: int) -> None:
+        """Has another worker in the place of one that is lost."""
+        if attempts == ATTEMPTS:
+            raise WorkbenchError(
+                f"worker {index} was lost {attempts} times at the same part: {first_line(error)}"
+            ) from error
+        self._say(f"worker {index} is lost ({first_line(error)}): another one plays its part again")
+        ray.kill(self._actors[index])  # it may only have been out of reach
+        self._cluster.update()
+        self._actors[index] = self._start(index, processors=0)
+
+    def close(self) -> None:
+        """Ends all workers, those that aren't playing with their environments closed."""
+        busy = set(self._playing.values())
+        idle = [actor for index, actor in enumerate(self._actors) if index not in busy]
+        ray.wait([each.close.remote() for each in idle], num_returns=len(idle), timeout=GRACE)
+        for actor in self._actors:
+            ray.kill(actor)
+
+
+@contextlib.contextmanager
+def _told_of_stores() -> Iterator[None]:
+    """Tells in one line what Ray tells in many.
+
+    Raises:
+        WorkbenchError: if an object store or its disk is full, or a worker has failed.
+    """
+    try:
+        yield
+    except (ObjectStoreFullError, OutOfDiskError) as error:
+        raise WorkbenchError(
+            f"the cluster's object store is full ({first_line(error)}): `ray start --object-store-memory` "
+            "makes a larger one, shorter fragments need less"
+        ) from error
+    except RayTaskError as error:
+        raise WorkbenchError(f"a worker has failed: {told(error.cause)}") from error
+    except RayError as error:
+        raise WorkbenchError(f"a worker can't be started: {first_line(error)}") from error
+
+
+def first_line(error: BaseException) -> str:
+    """The beginning of what an error tells; of one with a traceback the end."""
+    lines = str(error).strip().splitlines() or [type(error).__name__]
+    return lines[-1 if "Traceback" in str(error) else 0].strip(".: ")
