@@ -1,4 +1,4 @@
-"""A cluster of Ray's on this machine: every node with processes, ports and a folder of its own, to be killed."""
+"""A cluster of Ray's on this machine: each node with processes, ports and a folder of its own."""
 
 import contextlib
 import os
@@ -61,7 +61,7 @@ class RayNode:
         environment = {name: value for name, value in os.environ.items() if name not in without}
         ray = Path(sys.executable).with_name("ray")
         command = [sys.executable, str(ray), "start", "--block", "--num-cpus=1", *flags,
-                   f"--temp-dir={self.folder}", f"--object-store-memory={STORE}", "--disable-usage-stats"]  # fmt: skip
+                   f"--temp-dir={self.folder}", f"--object-store-memory={STORE}"]  # fmt: skip
         self.log = (self.folder / "node.log").open("wb")
         self.process = subprocess.Popen(
             command,

@@ -101,7 +101,7 @@ def check_package(variant: Variant) -> None:
     """
     kind = algorithm(variant.algorithm)
     if kind.package:
-        choose(kind, arguments(variant, 0)[2:])
+        choose(kind, training_flags(variant, 0)[2:])
 
 
 def _without_special(name: str, options: dict[str, Any]) -> dict[str, Any]:
@@ -110,7 +110,7 @@ def _without_special(name: str, options: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in options.items() if key not in special}
 
 
-def arguments(variant: Variant, seed: int) -> list[str]:
+def training_flags(variant: Variant, seed: int) -> list[str]:
     """What `workbench.py train` is told for one run, but for its folder."""
     rest = _without_special(variant.algorithm, variant.options)
     special = {key: value for key, value in variant.options.items() if key not in rest}

@@ -20,10 +20,10 @@ from rl_workbench.tools.benchmark.suites import (
     SEEDS,
     Suite,
     Variant,
-    arguments as flags_of,
     check_package,
     make_variant,
     read_suite,
+    training_flags,
 )
 from rl_workbench.tools.commands.machines import add_job_flags, machines_for
 from rl_workbench.tools.commands.shared import number, write_figure
@@ -113,7 +113,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
 
 def _job(variant: Variant, seed: int, folder: Path) -> Job:
     place = folder / variant.name / f"seed_{seed}"
-    return Job(f"{variant.name}, seed {seed}", place, tuple(flags_of(variant, seed)))
+    return Job(f"{variant.name}, seed {seed}", place, tuple(training_flags(variant, seed)))
 
 
 def _suite(arguments: argparse.Namespace) -> Suite:
@@ -209,9 +209,7 @@ def _measured(episodes: int, thresholds: Iterable[float | None]) -> str:
     """How, without anything that depends on when or where."""
     lines = sorted({line for line in thresholds if line is not None})
     solved = "".join(f" Solved: {line:g}." for line in lines)
-    return (
-        f"Best and final: mean return of {episodes} greedy episodes that nothing was chosen by.{solved}"
-    )
+    return f"Best and final: mean return of {episodes} greedy episodes that nothing was chosen by.{solved}"
 
 
 def _machine(where: str) -> str:
@@ -219,9 +217,7 @@ def _machine(where: str) -> str:
     return f"{datetime.date.today().isoformat()}, {about}, {where}."
 
 
-def _content(
-    results: list[RunResult], arguments: argparse.Namespace, where: str
-) -> dict[str, Any]:
+def _content(results: list[RunResult], arguments: argparse.Namespace, where: str) -> dict[str, Any]:
     return {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "versions": run_folder.versions(),

@@ -16,10 +16,10 @@ from rl_workbench.training.run.progress import tell
 def add_job_flags(parser: argparse.ArgumentParser) -> None:
     """Where jobs run, and how many at a time."""
     parser.add_argument("--jobs", type=number(1), metavar="N",
-        help="trainings at a time, each on one core (default 1; with --ray as many as there are cores)")  # fmt: skip
+        help="trainings at a time, each on one core (1; with --ray as many as there are cores)")  # fmt: skip
     add_ray_flag(parser)
     parser.add_argument("--folders", choices=(SHARED, CARRIED),
-        help="with --ray: the nodes share a file system, or Ray carries results home (found out unless given)")  # fmt: skip
+        help="with --ray: seen by all nodes, or carried home by Ray (found out)")  # fmt: skip
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""A job: one training as a command, with its flags, its seed and its folder. It may be run any number of times."""
+"""A job: one training as a command, with its flags, its seed and its folder. It may be run more than once."""
 
 import shutil
 import socket

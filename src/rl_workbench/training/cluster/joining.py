@@ -19,7 +19,9 @@ from rl_workbench.training.run.progress import warn
 
 STORE = 128 * 2**20  # [bytes] of a local cluster's object store, which jobs hardly use
 SOCKETS = 107  # [bytes] in the path of a socket, at most
-SESSION = len("/ray_1234567_12345678/session_2000-01-01_00-00-00_000000_1234567/sockets/plasma_store")
+SESSION = len(
+    "/ray_1234567_12345678/session_2000-01-01_00-00-00_000000_1234567/sockets/plasma_store"
+)
 # What Ray reads as it is imported: nothing is sent home, nothing is told but errors, `uv` isn't looked for.
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",
@@ -68,7 +70,11 @@ def _started(stack: contextlib.ExitStack) -> Any:
     if len(os.fsencode(place)) + SESSION > SOCKETS:
         place = "/tmp"
     folder = stack.enter_context(scratch_folder("ray", place))
-    own = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(32), "RAY_worker_niceness": "0"}
+    own = {
+        "RAY_AUTH_MODE": "token",
+        "RAY_AUTH_TOKEN": secrets.token_hex(32),
+        "RAY_worker_niceness": "0",
+    }
     stack.enter_context(_environment(own))
     return _init(
         "a local cluster",
@@ -103,7 +109,9 @@ def _init(what: str, **options: Any) -> Any:
         ray.shutdown()
         text = " ".join(str(error).split())
         if isinstance(error, ConnectionError):  # what answers speaks as a head does
-            text += "; it answers, but its token (RAY_AUTH_TOKEN, ray get-auth-token) may be another"
+            text += (
+                "; it answers, but its token (RAY_AUTH_TOKEN, ray get-auth-token) may be another"
+            )
         raise WorkbenchError(f"can't join {what}: {text}") from error
     finally:
         for number, handler in before.items():  # Ray's own would leave out what ours save

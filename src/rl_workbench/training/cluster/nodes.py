@@ -95,7 +95,7 @@ def only(node_id: str) -> dict[str, str]:
 
 
 def _looking() -> Callable[[tuple[str, ...]], dict[str, str]]:
-    """What asks a node. Being inside of this function, it travels as a whole: the node may lack our package."""
+    """What asks a node. Inside of a function it travels as a whole: the node may lack our package."""
 
     def look(packages: tuple[str, ...]) -> dict[str, str]:
         try:

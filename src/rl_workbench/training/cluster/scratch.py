@@ -1,4 +1,4 @@
-"""Folders for a while: they go with the block, and what a killed process left behind goes with the next one."""
+"""Folders for a while: each goes with its block, and what killed processes left goes with the next one."""
 
 import contextlib
 import fcntl

@@ -1,4 +1,4 @@
-"""`--ray` with a real cluster of three nodes on this machine, of which workers, nodes and the driver are killed."""
+"""`--ray` with a real cluster of three nodes on this machine; workers, nodes and the driver are killed."""
 
 import os
 import signal
@@ -75,7 +75,9 @@ def cluster() -> Iterator[RayCluster]:
 def trainings(out: Path) -> list[int]:
     """The processes that train into a folder."""
     every = [int(each.name) for each in Path("/proc").iterdir() if each.name.isdigit()]
-    return [pid for pid in every if f"--run-dir={out}" in title(pid) or f"--resume={out}" in title(pid)]
+    return [
+        pid for pid in every if f"--run-dir={out}" in title(pid) or f"--resume={out}" in title(pid)
+    ]
 
 
 def test_what_is_killed_changes_no_byte_of_the_table(
@@ -86,7 +88,7 @@ def test_what_is_killed_changes_no_byte_of_the_table(
     try:
         wait_until(lambda: is_half_done(tmp_path, 0), "a training")
         os.kill(cluster.nodes[0].workers()[0], signal.SIGKILL)
-        wait_until(lambda: cluster.nodes[1].workers(), "a job on the second node")
+        wait_until(cluster.nodes[1].workers, "a job on the second node")
         cluster.nodes[1].kill()
         said = finished(driver)
     finally:

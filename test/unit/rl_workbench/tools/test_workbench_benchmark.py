@@ -19,11 +19,11 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.benchmark.results import RunResult, examine
 from rl_workbench.tools.benchmark.suites import (
     CONFIG,
-    arguments,
     check_package,
     default_file,
     make_variant,
     read_suite,
+    training_flags,
 )
 from rl_workbench.tools.benchmark.tables import RESULTS_SUMMARY, grouped, summary_table
 from rl_workbench.tools.commands import benchmarking
@@ -63,7 +63,7 @@ def suites(tmp_path: Path) -> Path:
 
 def job(folder: Path, seed: int = 0, **options: object) -> Job:
     variant = make_variant("test", "quick", {**QUICK, **options})
-    return Job(f"quick, seed {seed}", folder / f"seed_{seed}", tuple(arguments(variant, seed)))
+    return Job(f"quick, seed {seed}", folder / f"seed_{seed}", tuple(training_flags(variant, seed)))
 
 
 def examined(one: Job) -> RunResult:
@@ -87,7 +87,8 @@ def test_a_suite_gives_tables_with_every_seed_and_every_failure(
     assert cli.main(command) == 0
     said = capsys.readouterr().out
     assert re.search(
-        r"of 2, 1 failed\] broken, seed 0: ended with exit code 1, .*unknown environment 'NoSuch-v0'", said
+        r"of 2, 1 failed\] broken, seed 0: ended with exit code 1, .*unknown environment 'NoSuch-v0'",
+        said,
     )
     rows = {row["variant"]: row for row in json.loads((out / "results.json").read_text())["runs"]}
     assert rows["plain"]["steps"] == 300 and rows["plain"]["best"] is not None
@@ -375,7 +376,9 @@ def test_every_training_has_a_master_of_its_own(tmp_path: Path, monkeypatch) -> 
     told = run(jobs, 2)
     masters = {one.log.read_text().strip() for one in jobs}
     assert len(masters) == 2 and all(each.startswith("http://127.0.0.1:") for each in masters)
-    assert all("ended with exit code 0" in told.endings[one.name] for one in jobs), "it left nothing"
+    assert all("ended with exit code 0" in told.endings[one.name] for one in jobs), (
+        "it left nothing"
+    )
 
 
 def test_no_further_job_begins_after_ctrl_c(tmp_path: Path, monkeypatch) -> None:
@@ -396,7 +399,7 @@ def test_no_further_job_begins_after_ctrl_c(tmp_path: Path, monkeypatch) -> None
 
 def test_the_training_is_told_all_of_its_options(tmp_path: Path) -> None:
     variant = make_variant("t", "wide", {"preset": "tutorial", "hidden_sizes": [64, 32]})
-    flags = tuple(arguments(variant, 1))
+    flags = tuple(training_flags(variant, 1))
     told = command(Job("wide", tmp_path / "run", flags), tmp_path / "run", PROGRAM)[3:]
     assert told[:4] == ["train", f"--run-dir={tmp_path / 'run'}", "--algo", "dqn"]
     assert {"--preset=tutorial", "--seed=1", "--exp-name=wide"} <= set(told)

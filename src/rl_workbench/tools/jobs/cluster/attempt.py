@@ -1,4 +1,4 @@
-"""What a node does: one attempt at a job. It runs in a worker of Ray's, and the training as a process of its own."""
+"""What a node does: one attempt at a job, in a worker of Ray's; the training is a process of its own."""
 
 import fcntl
 import os
@@ -32,7 +32,6 @@ class Began(NamedTuple):
     """An attempt has begun."""
 
     node: str  # its id
-    is_carried: bool
 
 
 Told = Began | Parcel | Ending
@@ -52,7 +51,7 @@ def attempt(
 
     node = ray.get_runtime_context().get_node_id()
     is_shared = sees(home) if home.is_shared is None else home.is_shared
-    yield Began(node, not is_shared)
+    yield Began(node)
     # Where Python is may differ between machines.
     words = [sys.executable, *program[1:]]
     if is_shared:

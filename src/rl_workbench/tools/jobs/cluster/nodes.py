@@ -9,7 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.tools.jobs.cluster.attempt import TOKEN, Began, Home, attempt, is_told_of_locks, sees
+from rl_workbench.tools.jobs.cluster.attempt import (
+    TOKEN,
+    Began,
+    Home,
+    attempt,
+    is_told_of_locks,
+    sees,
+)
+from rl_workbench.tools.jobs.cluster.faults import in_a_line
 from rl_workbench.tools.jobs.cluster.parcels import Inbox, Outbox
 from rl_workbench.tools.jobs.job import Ending, Job
 from rl_workbench.tools.jobs.machines import CARRIED, SHARED, Progressed
@@ -78,7 +86,9 @@ class RayNodes:
     def about(self) -> str:
         """See Machines."""
         nodes = self._cluster.nodes.values()
-        count = f"{len(nodes)} node{'s' * (len(nodes) > 1)} of Ray's with {self._cluster.cpus} cores"
+        count = (
+            f"{len(nodes)} node{'s' * (len(nodes) > 1)} of Ray's with {self._cluster.cpus} cores"
+        )
         at_once = f", {self._at_once} at a time" if self._at_once else ""
         return f"{count}{at_once}; {self._about_folders()}"
 
@@ -120,7 +130,9 @@ class RayNodes:
         try:
             return [self._ray.put(parcel) for parcel in parcels]
         except self._ray.exceptions.RayError as error:
-            raise WorkbenchError(f"{job.folder} finds no room in Ray's object store: {_line(error)}") from error
+            raise WorkbenchError(
+                f"{job.folder} finds no room in Ray's object store: {in_a_line(error)}"
+            ) from error
 
     def wait(self, seconds: float, progressed: Progressed) -> list[tuple[Job, Ending]]:
         """See Machines."""
@@ -164,7 +176,7 @@ class RayNodes:
             except StopIteration:
                 return Ending(lost="its node told nothing more")
             except self._ray.exceptions.RayError as error:
-                return Ending(lost=_line(error), span=(each.began, time.time()))
+                return Ending(lost=in_a_line(error), span=(each.began, time.time()))
             if isinstance(told, Ending):
                 self._is_packed |= "doesn't see" in told.lost
                 return told
@@ -196,11 +208,15 @@ class RayNodes:
         (self._home.folder / TOKEN).unlink(missing_ok=True)
 
     def _those_that_do_not_see(self) -> list[str]:
-        """The names of nodes that can't write into the folder of the jobs; warns of locks that they don't see."""
+        """The names of nodes that don't see the folder of the jobs; warns of locks that aren't told."""
         nodes = list(self._cluster.nodes.values())
         look = self._ray.remote(num_cpus=0)(_look)
         asked = [look.options(label_selector=only(node.id)).remote(self._home) for node in nodes]
-        return [node.name for node, answer in zip(nodes, asked, strict=True) if not self._sees(node, answer)]
+        return [
+            node.name
+            for node, answer in zip(nodes, asked, strict=True)
+            if not self._sees(node, answer)
+        ]
 
     def _sees(self, node: Node, answer: Any) -> bool:
         try:
@@ -218,26 +234,3 @@ class RayNodes:
 def _look(home: Home) -> tuple[bool, bool]:
     is_seen = sees(home)
     return is_seen, is_seen and is_told_of_locks(home)
-
-
-# What a user can make use of; Ray's own texts are pages.
-_LINES = {
-    "NodeDiedError": "its node died",
-    "WorkerCrashedError": "its worker died",
-    "LocalRayletDiedError": "the raylet of its node died",
-    "OutOfMemoryError": "its node had no memory left",
-    "OutOfDiskError": "its node's disk is full, and so is Ray's object store",
-    "ObjectStoreFullError": "the object store of its node is full",
-    "ObjectLostError": "what it told was lost with its node",
-    "OwnerDiedError": "what it told was lost with its node",
-    "TaskCancelledError": "it was stopped",
-}
-
-
-def _line(error: Exception) -> str:
-    """An error of Ray's in a line."""
-    for kind in type(error).__mro__:
-        if kind.__name__ in _LINES:
-            return _LINES[kind.__name__]
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return lines[-1] if lines else type(error).__name__

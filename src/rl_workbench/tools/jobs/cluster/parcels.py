@@ -93,7 +93,7 @@ class Outbox:
 
     def _changed(self, opened: contextlib.ExitStack) -> list[tuple[str, BinaryIO, _Version]]:
         """Held open, they stay what they are, whatever is put in their place meanwhile."""
-        result = []
+        result: list[tuple[str, BinaryIO, _Version]] = []
         for name, path in self._files():
             if _grows(name):
                 continue
@@ -118,18 +118,21 @@ class Outbox:
             begin, tail = self._lengths.get(name, 0), self._grown.get(name, b"")
             length = os.fstat(file.fileno()).st_size
             file.seek(begin - len(tail))
-            if file.read(len(tail)) != tail:  # it was cut back, and has grown otherwise
-                begin = 0
-            if length == begin and name in self._lengths:
+            is_same = file.read(len(tail)) == tail
+            if is_same and length == begin and name in self._lengths:
                 return
-            yield from _pieces(name, file, begin, length, grows=True)
+            if is_same:
+                yield from _pieces(name, file, begin, length, grows=True)
+            else:  # it was cut back, and has grown otherwise: replaced as a whole, it is never too short
+                yield from _pieces(name, file, 0, length, grows=False)
             file.seek(max(0, length - TAIL))
             self._grown[name] = file.read(length - file.tell())
             self._lengths[name] = length
 
     def _forget(self, name: str) -> None:
-        for each in (self._sent, self._grown, self._lengths):
-            each.pop(name, None)  # type: ignore[attr-defined]
+        self._sent.pop(name, None)
+        self._grown.pop(name, None)
+        self._lengths.pop(name, None)
 
 
 class Inbox:
