@@ -113,6 +113,7 @@ GROUPS = {
     "packages": of("rosrun cartpole new_robot.py"),
     "tests": of("test", "rostest", "check", "shell", "tensorboard"),
     "window": of("rosrun gazebo_ros gzclient"),
+    "clusters": of("ray"),
     "gains": of("rosrun dynamic_reconfigure dynparam set"),
 }
 
@@ -179,6 +180,16 @@ def test_the_workbench_takes_it(command: Command, only_parsing: None, monkeypatc
         assert arguments[0] in suites or arguments[0] == "SUITE"
     with pytest.raises(Parsed):
         workbench.main([name, *arguments])
+
+
+@pytest.mark.extras("ray")
+@pytest.mark.parametrize("command", GROUPS["clusters"], ids=str)
+def test_ray_takes_it(command: Command) -> None:
+    from ray.scripts.scripts import cli
+
+    name, *arguments = command.words[1:]
+    if cli.commands[name].make_context(name, arguments).params.get("block"):
+        pytest.fail("the terminal would be taken")
 
 
 @pytest.mark.parametrize("command", GROUPS["policies"], ids=str)
