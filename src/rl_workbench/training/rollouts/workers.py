@@ -6,8 +6,11 @@ its part depends on, so what it plays is the same to the bit.
 """
 
 import contextlib
+import math
 import socket
+import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import ray
@@ -16,7 +19,7 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.cluster.nodes import Cluster, Node
-from rl_workbench.training.environments.checked import EnvironmentFailure, told
+from rl_workbench.training.environments.checked import EnvironmentFailure
 from rl_workbench.training.environments.several import numbered
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.rollouts.fingerprint import fingerprint
@@ -62,11 +65,7 @@ class Workers:
         try:
             for index in range(self._count):
                 self._actors.append(self._start(index, processors=1))
-            self._check_kinds(self._begun())
-        except TypeError as error:  # Ray's, of what pickle can't write
-            raise WorkbenchError(
-                f"{options.run.env_id} can't be sent to workers: {first_line(error)}"
-            ) from error
+            self._check_kinds(self._gather(self._beginning, self._slow()) or [])
         except BaseException:  # Ctrl-C as well
             self.close()
             raise
@@ -79,7 +78,7 @@ class Workers:
             processors: that it has for itself; 0: it makes do with what there is.
 
         Raises:
-            WorkbenchError: if there is no node any more.
+            WorkbenchError: if there is no node any more, or the environment is registered with what can't travel.
         """
         if not self._cluster.nodes:
             self._cluster.update(PATIENCE)
@@ -94,7 +93,10 @@ class Workers:
         chosen = self._nodes[index] = max(sorted(nodes), key=free)
         place = NodeAffinitySchedulingStrategy(chosen, soft=False)
         actor = ray.remote(Worker).options(num_cpus=processors, scheduling_strategy=place)
-        return actor.remote(self._record, index, self._home)
+        try:
+            return actor.remote(self._record, index, self._home)
+        except TypeError as error:  # of what pickle can't write
+            raise WorkbenchError(f"the environment can't be sent: {_line_of(error)}") from error
 
     def _answering(self) -> dict[str, Node]:
         """The nodes that can be used, and answer: Ray takes some ten seconds to know that one is gone."""
@@ -107,33 +109,58 @@ class Workers:
                     found[node.id] = node
         return found
 
-    def _begun(self) -> list[str]:
-        """The fingerprints of the machines, once all environments have been made."""
-        with _told_of_stores():
-            waiting = [actor.begin.remote() for actor in self._actors]
-            _, missing = ray.wait(waiting, num_returns=self._count, timeout=PATIENCE)
-            if missing:
-                self._say(f"waiting for {len(missing)} of {self._count} workers")
-            return [self._checked(index, each) for index, each in enumerate(ray.get(waiting))]
+    def _beginning(self, index: int) -> Callable[[], Any]:
+        begin: Callable[[], Any] = self._actors[index].begin.remote
+        return begin
+
+    def _slow(self) -> Callable[[], bool]:
+        """To be asked while workers begin: says once that they are waited for; nobody tells to stop."""
+        until = time.monotonic() + PATIENCE
+
+        def waiting() -> bool:
+            nonlocal until
+            if time.monotonic() > until:
+                until = math.inf
+                self._say(f"waiting for {len(self._playing)} of {self._count} workers to begin")
+            return False
+
+        return waiting
 
     def _check_kinds(self, kinds: Sequence[str]) -> None:
-        others = [index for index, each in enumerate(kinds) if each != fingerprint()]
+        mine = fingerprint()
+        others = [str(number) for number, each in enumerate(kinds, 1) if each != mine]
         if others:
             self._say(
-                f"workers {', '.join(map(str, others))} compute to other bits than this machine, by their "
-                "processors or NumPy: the same seed gives the same weights on machines of one kind only"
+                f"workers {', '.join(others)} compute to other bits than this machine, by their processors "
+                "or NumPy: the same seed gives the same weights on machines of one kind only"
             )
 
     def play(
         self, policy: Any, states: Sequence[Any], should_stop: Callable[[], bool]
     ) -> list[Any] | None:
         """See `Pool`."""
-        with _told_of_stores():
+        with _told():
             shared = ray.put(policy)
-            found: dict[int, Any] = {}
-            lost = [0] * self._count
+
+        def asking(index: int) -> Callable[[], Any]:
+            return partial(self._actors[index].play.remote, shared, states[index])
+
+        return self._gather(asking, should_stop)
+
+    def _gather(
+        self, asking: Callable[[int], Callable[[], Any]], should_stop: Callable[[], bool]
+    ) -> list[Any] | None:
+        """What all workers answer; one that is lost is replaced, and its successor asked the same.
+
+        Args:
+            asking: makes of a worker's number what asks it, and gives Ray's reference to the answer.
+            should_stop: is asked all the time.
+        """
+        found: dict[int, Any] = {}
+        lost = [0] * self._count
+        with _told():
             for index in range(self._count):
-                self._ask(index, shared, states[index])
+                self._playing[asking(index)()] = index
             while self._playing:
                 if should_stop():
                     return None
@@ -147,11 +174,8 @@ class Workers:
                     except RayError as error:
                         lost[index] += 1
                         self._replace(index, error, lost[index])
-                        self._ask(index, shared, states[index])
+                        self._playing[asking(index)()] = index
         return [found[index] for index in range(self._count)]
-
-    def _ask(self, index: int, policy: Any, state: Any) -> None:
-        self._playing[self._actors[index].play.remote(policy, state)] = index
 
     def _checked(self, index: int, answer: Any) -> Any:
         if not isinstance(answer, Failure):
@@ -164,11 +188,12 @@ class Workers:
 
     def _replace(self, index: int, error: RayError, attempts: int) -> None:
         """Has another worker in the place of one that is lost."""
+        name = f"worker {index + 1} of {self._count}"
         if attempts == ATTEMPTS:
             raise WorkbenchError(
-                f"worker {index} was lost {attempts} times at the same part: {first_line(error)}"
+                f"{name} was lost {attempts} times at the same part: {_line_of(error)}"
             ) from error
-        self._say(f"worker {index} is lost ({first_line(error)}): another one plays its part again")
+        self._say(f"{name} is lost ({_line_of(error)}): another one plays its part again")
         ray.kill(self._actors[index])  # it may only have been out of reach
         self._cluster.update()
         self._actors[index] = self._start(index, processors=0)
@@ -177,32 +202,33 @@ class Workers:
         """Ends all workers, those that aren't playing with their environments closed."""
         busy = set(self._playing.values())
         idle = [actor for index, actor in enumerate(self._actors) if index not in busy]
-        ray.wait([each.close.remote() for each in idle], num_returns=len(idle), timeout=GRACE)
+        if idle:
+            ray.wait([each.close.remote() for each in idle], num_returns=len(idle), timeout=GRACE)
         for actor in self._actors:
             ray.kill(actor)
 
 
 @contextlib.contextmanager
-def _told_of_stores() -> Iterator[None]:
+def _told() -> Iterator[None]:
     """Tells in one line what Ray tells in many.
 
     Raises:
-        WorkbenchError: if an object store or its disk is full, or a worker has failed.
+        WorkbenchError: if an object store and its disk are full, or a worker has failed.
     """
     try:
         yield
-    except (ObjectStoreFullError, OutOfDiskError) as error:
-        raise WorkbenchError(
-            f"the cluster's object store is full ({first_line(error)}): `ray start --object-store-memory` "
-            "makes a larger one, shorter fragments need less"
-        ) from error
-    except RayTaskError as error:
-        raise WorkbenchError(f"a worker has failed: {told(error.cause)}") from error
     except RayError as error:
-        raise WorkbenchError(f"a worker can't be started: {first_line(error)}") from error
+        cause = error.cause if isinstance(error, RayTaskError) else error
+        text = f"a worker has failed: {_line_of(cause)}"
+        if isinstance(error, ObjectStoreFullError | OutOfDiskError):
+            text = (
+                f"the cluster's object store is full ({_line_of(cause)}): `ray start "
+                "--object-store-memory` makes a larger one, shorter fragments need less"
+            )
+        raise WorkbenchError(text) from error
 
 
-def first_line(error: BaseException) -> str:
-    """The beginning of what an error tells; of one with a traceback the end."""
+def _line_of(error: BaseException) -> str:
+    """What an error tells, in a line: of one with a traceback its end."""
     lines = str(error).strip().splitlines() or [type(error).__name__]
     return lines[-1 if "Traceback" in str(error) else 0].strip(".: ")
