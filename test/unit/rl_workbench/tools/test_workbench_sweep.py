@@ -1,6 +1,8 @@
 """The search for options: ranges, trials that fail or fall behind, a search that is ended and goes on."""
 
+import errno
 import json
+import os
 import signal
 import sqlite3
 from collections.abc import Callable, Iterator
@@ -13,8 +15,10 @@ import yaml
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.jobs.job import Ending, Job
+from rl_workbench.tools.jobs.ledger import Ledger
 from rl_workbench.tools.jobs.machines import Progressed
 from rl_workbench.tools.jobs.runner import Runner
+from rl_workbench.tools.jobs.states import read_states
 from rl_workbench.tools.sweep.ranges import Range, read_ranges
 from rl_workbench.tools.sweep.study import Pruner, Study
 from rl_workbench.tools.sweep.sweep import Search, Sweep, write_results
@@ -325,3 +329,27 @@ def test_a_folder_of_another_search_is_refused(
     (tmp_path / "study" / "sweep.json").write_text("{}")
     assert command("dqn") == 1
     assert "other options, ranges or seeds" in capsys.readouterr().err
+
+
+def test_a_disk_that_is_full_is_one_line(
+    tmp_path: Path, command: Callable[..., int], monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    from optuna.storages.journal import JournalFileBackend
+
+    def refuse(self: Any, logs: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(JournalFileBackend, "append_logs", refuse)
+    assert command("dqn") == 1
+    assert f"can't write to {tmp_path}/study: No space left on device" in capsys.readouterr().err
+
+
+def test_jobs_of_earlier_calls_stay_in_the_list(tmp_path: Path) -> None:
+    one, two = (Job(name, tmp_path / name, ()) for name in ("one", "two"))
+    for job in (one, two, one):
+        ledger = Ledger(tmp_path)
+        ledger.began(job, "here")
+        ledger.ended(job, "")
+        ledger.close()
+    found = [(each.name, each.state, each.attempts) for each in read_states(tmp_path)]
+    assert sorted(found) == [("one", "done", 2), ("two", "done", 1)]
