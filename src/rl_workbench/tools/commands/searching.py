@@ -1,8 +1,10 @@
 """sweep: many trainings, in search of options."""
 
 import argparse
+import contextlib
 import json
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +80,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     pruner = Pruner(arguments.pruner, usual.eval_frequency, usual.total_timesteps)
     check_writable(sweep.folder / RECORD)
     at_once = arguments.jobs or (1 if arguments.ray is None else None)
-    with run_folder.held(sweep.folder, "another search"):
+    with run_folder.held(sweep.folder, "another search"), _told_of_the_disk(sweep.folder):
         _claim(sweep, arguments.seed)
         study = Study(sweep.folder, ranges, arguments.seed, pruner)
         search = Search(
@@ -91,6 +93,19 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         write_results(sweep, study)
         if interrupt.requested():
             tell("interrupted; the same command goes on")
+
+
+@contextlib.contextmanager
+def _told_of_the_disk(folder: Path) -> Iterator[None]:
+    """Optuna writes in its folder, too.
+
+    Raises:
+        WorkbenchError: if the disk refuses.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise WorkbenchError(f"can't write to {folder}: {error.strerror}") from error
 
 
 def _run_options(sweep: Sweep, values: dict[str, Any]) -> RunOptions:

@@ -4,7 +4,7 @@ import os
 import socket
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from rl_workbench.tools.jobs.job import Job
@@ -45,7 +45,8 @@ class Ledger(Watch):
 
     Args:
         folder: of the ledger; the jobs' own lie in it.
-        jobs: those that are known from the beginning.
+        jobs: those that are known from the beginning; none: they come up as others end, and those of
+            earlier calls stay.
 
     Raises:
         WorkbenchError: if the disk refuses, as each method does.
@@ -53,6 +54,7 @@ class Ledger(Watch):
 
     def __init__(self, folder: Path, jobs: Sequence[Job] = ()) -> None:
         self._folder = folder
+        self._earlier = {} if jobs else _written_before(folder)
         self._entries: dict[Job, Entry] = {}
         for job in jobs:
             self._entry(job)
@@ -101,7 +103,9 @@ class Ledger(Watch):
     def _entry(self, job: Job) -> Entry:
         if job not in self._entries:
             place = os.path.relpath(job.folder, self._folder)
-            self._entries[job] = Entry(job.name, place, DONE if job.is_done() else WAITING)
+            state = DONE if job.is_done() else WAITING
+            before = self._earlier.pop(place, Entry(job.name, place))
+            self._entries[job] = replace(before, state=state)
         return self._entries[job]
 
     def _change(self, job: Job, state: str, note: str) -> None:
@@ -112,7 +116,17 @@ class Ledger(Watch):
     def _write(self) -> None:
         content = {
             "host": socket.gethostname(),
-            "jobs": [asdict(entry) for entry in self._entries.values()],
+            "jobs": [asdict(entry) for entry in (*self._earlier.values(), *self._entries.values())],
         }
         write_file(self._folder / NAME, as_json(content))
         self._written, self._is_changed = time.monotonic(), False
+
+
+def _written_before(folder: Path) -> dict[str, Entry]:
+    """The entries by their folders; none if there are none, or they can't be read."""
+    found = read_leniently(folder / NAME).get("jobs")
+    try:
+        entries = [Entry(**each) for each in found] if isinstance(found, list) else []
+    except TypeError:
+        return {}
+    return {entry.folder: entry for entry in entries}

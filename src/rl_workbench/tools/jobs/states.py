@@ -94,6 +94,8 @@ def _state(folder: Path, entry: Entry, is_alive: bool) -> JobState:
         state, line = DONE, told(summary)
     elif state == FAILED:
         line = entry.note
+    elif state == DONE:
+        line = "ended early: the rest wasn't needed any more"
     elif state == RUNNING and not is_alive or state == WAITING and step:
         state = STOPPED if not is_alive else WAITING
     return JobState(entry.name, entry.folder, state, step, steps, entry.node, entry.attempts, line)

@@ -1,6 +1,8 @@
 """The search for options: ranges, trials that fail or fall behind, a search that is ended and goes on."""
 
+import errno
 import json
+import os
 import signal
 import sqlite3
 from collections.abc import Callable, Iterator
@@ -13,8 +15,10 @@ import yaml
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.jobs.job import Ending, Job
+from rl_workbench.tools.jobs.ledger import Ledger
 from rl_workbench.tools.jobs.machines import Progressed
 from rl_workbench.tools.jobs.runner import Runner
+from rl_workbench.tools.jobs.states import read_states
 from rl_workbench.tools.sweep.ranges import Range, read_ranges
 from rl_workbench.tools.sweep.study import Pruner, Study
 from rl_workbench.tools.sweep.sweep import Search, Sweep, write_results
@@ -24,8 +28,14 @@ from rl_workbench.training.run.interrupt import Interrupt
 
 pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.extras("optuna", "stable_baselines3")]
 RANGES = {"x": Range(-10.0, 10.0, False, ()), "kind": Range(0, 0, False, ("a", "b"))}
-EVERY, STEPS = 100, 500
+EVERY, STEPS = 100, 400
 Curve = Callable[[int, float], float]  # of a seed and x: the return that it comes to
+
+
+@pytest.fixture(autouse=True)
+def no_waiting_for_disks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each line of a journal is put on the disk, which takes long on a busy machine; no power is cut here."""
+    monkeypatch.setattr(os, "fsync", lambda descriptor: None)
 
 
 def parabola(seed: int, x: float) -> float:
@@ -120,10 +130,10 @@ def states(folder: Path) -> list[str]:
 
 
 def test_it_finds_the_best_and_writes_it_down(tmp_path: Path) -> None:
-    search(tmp_path, 40)
+    search(tmp_path, 25)
     best = yaml.safe_load((tmp_path / "best.yaml").read_text())["Some-v0"]
     assert best["x"] == pytest.approx(3.0, abs=1.5)
-    assert len(trials(tmp_path)) == 40
+    assert len(trials(tmp_path)) == 25
 
 
 def test_a_study_is_gone_on_with_as_if_it_had_been_one(tmp_path: Path) -> None:
@@ -325,3 +335,28 @@ def test_a_folder_of_another_search_is_refused(
     (tmp_path / "study" / "sweep.json").write_text("{}")
     assert command("dqn") == 1
     assert "other options, ranges or seeds" in capsys.readouterr().err
+
+
+def test_a_disk_that_is_full_is_one_line(
+    tmp_path: Path, command: Callable[..., int], monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    from optuna.storages.journal import JournalFileBackend
+
+    def refuse(self: Any, logs: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(JournalFileBackend, "append_logs", refuse)
+    assert command("dqn") == 1
+    assert f"can't write to {tmp_path}/study: No space left on device" in capsys.readouterr().err
+
+
+def test_jobs_of_earlier_calls_stay_in_the_list(tmp_path: Path) -> None:
+    one, two = (Job(name, tmp_path / name, ()) for name in ("one", "two"))
+    for job in (one, two, one):
+        ledger = Ledger(tmp_path)
+        ledger.began(job, "here")
+        ledger.ended(job, "")
+        ledger.close()
+    found = [(each.name, each.state, each.attempts) for each in read_states(tmp_path)]
+    assert sorted(found) == [("one", "done", 2), ("two", "done", 1)]
+    assert all("ended early" in each.line for each in read_states(tmp_path))
