@@ -63,9 +63,7 @@ class OneRobot(Clients):
             first = client.reset({"cart_pole": 0.1, "stand_cart": 0.05}, {"cart_pole": -0.5})
             self.assertEqual(first.joint_states.position, (0.1, 0.05))
             self.assertEqual(first.joint_states.velocity, (-0.5, 0.0))
-            runs.append(
-                [client.step(8, {CART: 0.02 * n}).joint_states.position for n in range(20)]
-            )
+            runs.append([client.step(8, {CART: 0.02 * n}).joint_states.position for n in range(20)])
         self.assertEqual(runs[0], runs[1])
         self.assertEqual(client.reset(everything=True).sim_time, 0.0)
         self.assertEqual(

@@ -78,7 +78,8 @@ class Workers:
             processors: that it has for itself; 0: it makes do with what there is.
 
         Raises:
-            WorkbenchError: if there is no node any more, or the environment is registered with what can't travel.
+            WorkbenchError: if there is no node any more, or the environment is registered with what can't
+                travel.
         """
         if not self._cluster.nodes:
             self._cluster.update(PATIENCE)
