@@ -1,10 +1,11 @@
 """A pool of players in this process, which may lose some of them, and has them play in any order."""
 
+import pickle
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.rollouts.worker import Failure, Worker, home_of
+from rl_workbench.training.rollouts.worker import Failure, Home, Worker
 from rl_workbench.training.run.random_states import random_states, restore_random_states
 
 
@@ -25,7 +26,7 @@ class PoolHere:
     ) -> None:
         self._record, self._lost = options.record(), lost
         self._order = range(options.run.num_envs)[:: -1 if backwards else 1]
-        self._home = home_of(options.run.env_id)
+        self._home = Home([], pickle.dumps([]))
         self._workers: dict[int, Worker] = {}
         self._rounds = 0
 

@@ -1,6 +1,7 @@
 """One worker: a process on some machine, with one environment of a training beside it."""
 
 import os
+import pickle
 import sys
 import traceback
 from collections.abc import Callable
@@ -11,8 +12,9 @@ import gymnasium
 import torch
 from gymnasium.envs.registration import EnvSpec, parse_env_id
 
-from rl_workbench.env_ids import without_module
+from rl_workbench.env_ids import module_of, without_module
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.extras import finding_modules
 from rl_workbench.training.algorithms import recorded_options
 from rl_workbench.training.environments.checked import EnvironmentFailure
 from rl_workbench.training.rollouts.fingerprint import fingerprint
@@ -28,17 +30,18 @@ class Failure(NamedTuple):
 
 
 class Home(NamedTuple):
-    """What environments need to be found as they are in the driver's process."""
+    """What it takes to find an environment as the driver finds it."""
 
     paths: list[str]  # of modules, as far as they are on the worker's machine as well
-    specs: list[EnvSpec]  # of the environment: a worker imports its module only if the id names it
+    specs: bytes  # a pickled list: how it is registered, by what a worker may not import
 
 
-def home_of(env_id: str) -> Home:
-    """That of this process, where the environment was made before."""
+def kin_of(env_id: str) -> list[EnvSpec]:
+    """How all versions of an environment are registered here; none if its id names what does so."""
+    if module_of(env_id):
+        return []
     kin = parse_env_id(without_module(env_id))[:2]
-    specs = [each for each in gymnasium.registry.values() if (each.namespace, each.name) == kin]
-    return Home(list(sys.path), specs)
+    return [each for each in gymnasium.registry.values() if (each.namespace, each.name) == kin]
 
 
 class Worker:
@@ -52,8 +55,7 @@ class Worker:
 
     def __init__(self, record: dict[str, Any], index: int, home: Home) -> None:
         sys.path.extend(path for path in home.paths if path not in sys.path and os.path.isdir(path))
-        for spec in home.specs:
-            gymnasium.registry.setdefault(spec.id, spec)
+        self._specs = home.specs
         torch.set_num_threads(1)  # networks this small only lose by more
         self._options = recorded_options(record, "what the driver sent")
         self._index = index
@@ -70,12 +72,22 @@ class Worker:
     def _answer(self, ask: Callable[[Player], Any]) -> Any:
         try:
             if self._player is None:
+                self._register()
                 implementation = import_module(self._options.kind.implementation)
                 self._player = implementation.make_player(self._options, self._index)
             return ask(self._player)
         except WorkbenchError as error:
             trace = "".join(traceback.format_exception(error.__cause__ or error))
             return Failure(str(error), isinstance(error, EnvironmentFailure), trace)
+
+    def _register(self) -> None:
+        try:
+            specs: list[EnvSpec] = pickle.loads(self._specs)
+        except (ImportError, AttributeError) as error:
+            text = f"can't find what registers {self._options.run.env_id}: {error}; {finding_modules()}"
+            raise WorkbenchError(text) from error
+        for spec in specs:
+            gymnasium.registry.setdefault(spec.id, spec)
 
     def close(self) -> None:
         """Closes the environment."""

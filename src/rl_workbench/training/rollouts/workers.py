@@ -7,13 +7,16 @@ its part depends on, so what it plays is the same to the bit.
 
 import contextlib
 import math
+import pickle
 import socket
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
 import ray
+from ray import cloudpickle
 from ray.exceptions import ObjectStoreFullError, OutOfDiskError, RayError, RayTaskError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
@@ -23,7 +26,7 @@ from rl_workbench.training.environments.checked import EnvironmentFailure
 from rl_workbench.training.environments.several import numbered
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.rollouts.fingerprint import fingerprint
-from rl_workbench.training.rollouts.worker import Failure, Worker, home_of
+from rl_workbench.training.rollouts.worker import Failure, Home, Worker, kin_of
 from rl_workbench.training.run.algorithm import Say
 
 POLL = 0.1  # [s] between two looks for an interruption
@@ -58,7 +61,7 @@ class Workers:
                 f"num_envs {self._count} takes as many processors, and the cluster has {cluster.cpus}: "
                 f"--num-envs {max(cluster.cpus, 1)}, or more machines"
             )
-        self._home = home_of(options.run.env_id)
+        self._home = _home_of(options.run.env_id)
         self._nodes = [""] * self._count  # where each worker is
         self._playing: dict[Any, int] = {}
         self._actors: list[Any] = []
@@ -78,8 +81,7 @@ class Workers:
             processors: that it has for itself; 0: it makes do with what there is.
 
         Raises:
-            WorkbenchError: if there is no node any more, or the environment is registered with what can't
-                travel.
+            WorkbenchError: if there is no node any more.
         """
         if not self._cluster.nodes:
             self._cluster.update(PATIENCE)
@@ -94,10 +96,7 @@ class Workers:
         chosen = self._nodes[index] = max(sorted(nodes), key=free)
         place = NodeAffinitySchedulingStrategy(chosen, soft=False)
         actor = ray.remote(Worker).options(num_cpus=processors, scheduling_strategy=place)
-        try:
-            return actor.remote(self._record, index, self._home)
-        except TypeError as error:  # of what pickle can't write
-            raise WorkbenchError(f"the environment can't be sent: {_line_of(error)}") from error
+        return actor.remote(self._record, index, self._home)
 
     def _answering(self) -> dict[str, Node]:
         """The nodes that can be used, and answer: Ray takes some ten seconds to know that one is gone."""
@@ -227,6 +226,18 @@ def _told() -> Iterator[None]:
                 "--object-store-memory` makes a larger one, shorter fragments need less"
             )
         raise WorkbenchError(text) from error
+
+
+def _home_of(env_id: str) -> Home:
+    """That of this process, where the environment was made before.
+
+    Raises:
+        WorkbenchError: if it is registered with what can't travel.
+    """
+    try:
+        return Home(list(sys.path), cloudpickle.dumps(kin_of(env_id)))
+    except (TypeError, ValueError, AttributeError, pickle.PicklingError) as error:
+        raise WorkbenchError(f"{env_id} can't be sent to workers: {_line_of(error)}") from error
 
 
 def _line_of(error: BaseException) -> str:

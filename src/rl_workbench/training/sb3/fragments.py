@@ -103,7 +103,7 @@ class FragmentPlayer(Player):
         if self._place.load_state_dict(state["episode"]) is None:
             model._last_obs, model._last_episode_starts = model.env.reset(), np.ones(1, bool)
             return True
-        model._last_obs = _apply(np.array, state["last"])
+        model._last_obs = _apply(lambda part: part.numpy().copy(), state["last"])
         model._last_episode_starts = np.array([state["begins"]])
         return False
 
