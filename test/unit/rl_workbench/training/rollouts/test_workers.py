@@ -24,7 +24,6 @@ PATIENCE = 120.0  # [s], on a busy machine
 def cluster() -> Iterator[RayCluster]:
     made = RayCluster()
     try:
-        made.start()
         logs = [node.folder / "node.log" for node in (*made.nodes, made.add(), made.add())]
         wait_until(lambda: all("runtime started" in log.read_text() for log in logs), "three nodes")
         yield made
