@@ -1,5 +1,7 @@
 """A job: one training as a command, with its flags, its seed and its folder. It may be run more than once."""
 
+import contextlib
+import random
 import shutil
 import socket
 from collections.abc import Sequence
@@ -12,6 +14,7 @@ from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.checkpoints import LAST
 from rl_workbench.training.run.files import as_json, write_file
 
+MASTERS = range(20000, 32768)  # ports; those above are the kernel's to give, those below Ray's
 # One core each; the networks are too small to gain by more.
 ONE_CORE = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
@@ -74,8 +77,15 @@ def command(job: Job, folder: Path, program: Sequence[str]) -> list[str]:
 
 def environment() -> dict[str, str]:
     """What a training has of its own: one core, and the address of a master, since robots can't share one."""
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return {**ONE_CORE, "ROS_MASTER_URI": f"http://127.0.0.1:{probe.getsockname()[1]}"}
+    return {**ONE_CORE, "ROS_MASTER_URI": f"http://127.0.0.1:{_free_port()}"}
+
+
+def _free_port() -> int:
+    """One that the kernel gives to nobody who asks for any: it is needed only after some seconds."""
+    while True:
+        port = random.SystemRandom().choice(MASTERS)
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            return port
 
 
 def add_cost(job: Job, ending: Ending) -> None:

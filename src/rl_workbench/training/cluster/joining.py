@@ -5,6 +5,7 @@ import logging
 import os
 import secrets
 import signal
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -70,12 +71,7 @@ def _started(stack: contextlib.ExitStack) -> Any:
     if len(os.fsencode(place)) + SESSION > SOCKETS:
         place = "/tmp"
     folder = stack.enter_context(scratch_folder("ray", place))
-    own = {
-        "RAY_AUTH_MODE": "token",
-        "RAY_AUTH_TOKEN": secrets.token_hex(32),
-        "RAY_worker_niceness": "0",
-    }
-    stack.enter_context(_environment(own))
+    _keep_for_oneself()
     return _init(
         "a local cluster",
         address=LOCAL,
@@ -84,6 +80,14 @@ def _started(stack: contextlib.ExitStack) -> Any:
         include_dashboard=False,
         _temp_dir=str(folder),
     )
+
+
+def _keep_for_oneself() -> None:
+    """A local cluster obeys nobody else on this machine. Ray reads this once, as it is imported."""
+    if "ray" not in sys.modules:
+        os.environ.setdefault("RAY_AUTH_MODE", "token")
+        os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))
+    os.environ.setdefault("RAY_worker_niceness", "0")
 
 
 def _found(address: str) -> Any:
@@ -117,18 +121,3 @@ def _init(what: str, **options: Any) -> Any:
         for number, handler in before.items():  # Ray's own would leave out what ours save
             signal.signal(number, handler)
     return ray
-
-
-@contextlib.contextmanager
-def _environment(own: dict[str, str]) -> Iterator[None]:
-    """Adds to this process's environment, which a local cluster inherits."""
-    before = {name: os.environ.get(name) for name in own}
-    os.environ.update(own)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
