@@ -1,10 +1,11 @@
 """Trainings whose rollouts are played on a cluster of three nodes, of which some are killed."""
 
+import contextlib
 import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -61,13 +62,24 @@ class Driver:
         wait_until(lambda: len(waiting()) == count, f"{count} environments at {gate}", PATIENCE)
         return waiting()
 
-    def ends(self) -> int:
-        return self.process.wait(PATIENCE)
-
     def kill(self) -> None:
         for pid in in_session(self.process.pid):
-            os.kill(pid, signal.SIGKILL)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
         self.process.wait()
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[[Sequence[str]], Driver]]:
+    """Starts drivers, none of which outlives its test."""
+    with contextlib.ExitStack() as ending:
+
+        def started(arguments: Sequence[str]) -> Driver:
+            driver = Driver(arguments, tmp_path / "log")
+            ending.callback(driver.kill)
+            return driver
+
+        yield started
 
 
 def workers(cluster: RayCluster) -> list[int]:
@@ -84,7 +96,7 @@ def is_gone(pid: int) -> bool:
 
 
 def test_episodes_come_to_the_same_bits_whoever_is_lost(
-    cluster: RayCluster, tmp_path: Path
+    cluster: RayCluster, start: Callable[..., Driver], tmp_path: Path
 ) -> None:
     options = {"env_id": "gated:Gated-v0", "env_kwargs": f"gates={tmp_path}", "num_envs": 3, "episodes": 45,
                "batch_episodes": 2, "value_epochs": 2, "eval_frequency": 0, "eval_episodes": 2}  # fmt: skip
@@ -98,7 +110,7 @@ def test_episodes_come_to_the_same_bits_whoever_is_lost(
         f"--ray={cluster.address}",
         *flags(options),
     ]
-    driver = Driver(given, tmp_path / "log")
+    driver = start(given)
     at_gate = driver.at_gate(gates[0], 3)
     beside = [
         [pid for pid in in_session(node.process.pid) if pid in at_gate] for node in cluster.nodes
@@ -110,8 +122,7 @@ def test_episodes_come_to_the_same_bits_whoever_is_lost(
     driver.at_gate(gates[1], 1)  # new processes count from 1 again
     playing = workers(cluster)
     assert len(playing) == 3
-    driver.process.send_signal(signal.SIGINT)
-    assert driver.ends() == 130, driver.log.read_text()
+    driver.kill()
     wait_until(lambda: all(map(is_gone, playing)), "the workers to end", PATIENCE)
     gates[1].unlink()
     told = driver.log.read_text()
@@ -122,27 +133,27 @@ def test_episodes_come_to_the_same_bits_whoever_is_lost(
     assert_same_run(here, elsewhere)
 
 
-def test_fragments_come_to_the_same_bits_after_the_drivers_death(
-    cluster: RayCluster, tmp_path: Path
+def test_fragments_come_to_the_same_bits_after_ctrl_c(
+    cluster: RayCluster, start: Callable[..., Driver], tmp_path: Path
 ) -> None:
     gate, folder = tmp_path / "40", tmp_path / "elsewhere"
     gate.touch()
     options = {"env_id": "gated:Gated-v0", "env_kwargs": f"gates={tmp_path}", "num_envs": 2, "n_steps": 512,
                "total_timesteps": 5120, "net_arch": "8", "batch_size": 512, "n_epochs": 2,
                "eval_frequency": 0, "eval_episodes": 2, "checkpoint_frequency": 1}  # fmt: skip
-    ray = f"--ray={cluster.address}"
-    driver = Driver(
-        ["--algo", "ppo", f"--run-dir={folder}", ray, *flags(options)], tmp_path / "log"
-    )
+    given = ["--algo", "ppo", f"--run-dir={folder}", f"--ray={cluster.address}", *flags(options)]
+    driver = start(given)
     driver.at_gate(gate, 1)
     playing = workers(cluster)
     assert len(playing) == 2
-    driver.kill()
+    driver.process.send_signal(signal.SIGINT)
+    assert driver.process.wait(PATIENCE) == 130, driver.log.read_text()
     wait_until(lambda: all(map(is_gone, playing)), "the workers to end", PATIENCE)
     steps = [int(path.stem[5:]) for path in (folder / "checkpoints").iterdir()]
     assert 0 < max(steps) < 5120 and not any(each % 1024 for each in steps), "between rollouts"
     gate.unlink()
-    assert Driver(["--resume", str(folder), ray], driver.log).ends() == 0, driver.log.read_text()
+    going_on = choose(recorded_kind(folder), ["--resume", str(folder)])
+    run(going_on._replace(make_pool=PoolHere), folder)
     here = run(options_of("ppo", options)._replace(make_pool=PoolHere), tmp_path / "here")
     for name in ("last.pt", "best.pt"):
         assert_same(checkpoint(here, name), checkpoint(folder, name), name)
