@@ -144,9 +144,11 @@ def _solved(run: Run) -> tuple[int, float | None] | None:
 def _seconds_until(run: Run, until: float) -> float | None:
     """How long it had trained until a time of the clock, without the pauses of its benchmark."""
     began, spans = run.config.get("began"), cost_of(run.folder).get("spans", [])
+    if began is None:
+        return None
     pauses = [
         following - ended
         for (_, ended), (following, _) in zip(spans[:-1], spans[1:], strict=True)
-        if following <= until
+        if began <= ended and following <= until  # before that nothing was kept
     ]
-    return None if began is None else round(until - began - sum(pauses), 1)
+    return round(until - began - sum(pauses), 1)

@@ -231,7 +231,8 @@ def test_pauses_are_no_part_of_the_seconds_to_solve(tmp_path: Path) -> None:
     with (one.folder / "scalars.csv").open("a") as file:
         file.write("300,eval/mean_reward,475.0,1200.0\n")
     assert examined(one).solved_seconds == 200.0
-    spans = [[1000.0, 1050.0], [1150.0, 1300.0], [2000.0, 2100.0]]
+    before = [700.0, 750.0]  # killed before its first checkpoint, it was begun anew
+    spans = [before, [1000.0, 1050.0], [1150.0, 1300.0], [2000.0, 2100.0]]
     cost_file(one.folder).write_text(json.dumps({"spans": spans}))
     row = examined(one)
     assert (row.solved_step, row.solved_seconds) == (300, 100.0)
