@@ -9,12 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.runs import SUMMARY, cost_file, cost_of, read_leniently
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.checkpoints import LAST
 from rl_workbench.training.run.files import as_json, write_file
 
-MASTERS = range(20000, 32768)  # ports; those above are the kernel's to give, those below Ray's
+MASTERS = range(
+    30000, 32768
+)  # ports; those above are the kernel's to give, those below `ws`'s and Ray's
 # One core each; the networks are too small to gain by more.
 ONE_CORE = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
@@ -82,10 +85,10 @@ def environment() -> dict[str, str]:
 
 def _free_port() -> int:
     """One that the kernel gives to nobody who asks for any: it is needed only after some seconds."""
-    while True:
-        port = random.SystemRandom().choice(MASTERS)
+    for port in random.SystemRandom().sample(MASTERS, len(MASTERS)):
         with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
             return port
+    raise WorkbenchError("no port is free for a ROS master")
 
 
 def add_cost(job: Job, ending: Ending) -> None:

@@ -12,7 +12,7 @@ from rl_workbench.training.run.checkpoints import LAST
 from rl_workbench.training.run.interrupt import Interrupt
 
 LOOK_EVERY = 0.2  # [s] at the user's Ctrl-C
-TIME_TO_SAVE = 7.0  # [s] after it
+TIME_TO_SAVE = 4.0  # [s] after it
 MOST_LOST = 8  # attempts in a row that were lost before a new checkpoint
 LONGEST_PAUSE = 30.0  # [s] between two attempts at a job
 
@@ -90,8 +90,8 @@ class Runner:
                 for watch in self._watches:
                     watch.skipped(job)
                 continue
-            self._running.add(job)
             node = self._machines.start(job)
+            self._running.add(job)
             for watch in self._watches:
                 watch.began(job, node)
         return False

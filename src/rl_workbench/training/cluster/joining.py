@@ -33,7 +33,7 @@ QUIET = {
 PATIENCE = 60.0  # [s] until every node has started a worker that answers
 LOST = (
     "this process was ended from outside, as by kill -9, or by Ray, since its node on this machine is lost; "
-    "the same command goes on"
+    "what was saved is not lost"
 )
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -85,8 +85,7 @@ def _started(stack: contextlib.ExitStack) -> Any:
 def _keep_for_oneself() -> None:
     """A local cluster obeys nobody else on this machine. Ray reads this once, as it is imported."""
     if "ray" not in sys.modules:
-        os.environ.setdefault("RAY_AUTH_MODE", "token")
-        os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))
+        os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
     os.environ.setdefault("RAY_worker_niceness", "0")
 
 
@@ -101,6 +100,7 @@ def _init(what: str, **options: Any) -> Any:
 
     Raises:
         WorkbenchError: if it can't be.
+        KeyboardInterrupt: if the user ends the process meanwhile.
     """
     import ray
 
@@ -109,7 +109,12 @@ def _init(what: str, **options: Any) -> Any:
         ray.init(
             log_to_driver=False, logging_level=logging.ERROR, configure_logging=False, **options
         )
-    except (RuntimeError, ValueError, OSError, ray.exceptions.RayError) as error:
+    except SystemExit as error:  # by a handler of Ray's, that is in force meanwhile
+        ray.shutdown()
+        signal.signal(signal.SIGTERM, before[signal.SIGTERM])
+        signal.raise_signal(signal.SIGTERM)
+        raise KeyboardInterrupt from error
+    except Exception as error:  # Ray raises that itself, where a node is too slow to start
         ray.shutdown()
         text = " ".join(str(error).split())
         if isinstance(error, ConnectionError):  # what answers speaks as a head does

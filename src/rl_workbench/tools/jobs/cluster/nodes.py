@@ -28,7 +28,7 @@ from rl_workbench.training.run.files import as_text, write_file
 from rl_workbench.training.run.progress import warn
 
 UPDATE_EVERY = 5.0  # [s] of which nodes there are
-PATIENCE = 60.0  # [s] for a node's answer
+PATIENCE = 60.0  # [s] for a node's answer, and for a node where none is left
 AT_A_TIME = 2  # parcels of an attempt that wait in the object store
 MOST_TAKEN = 64  # parcels of an attempt before the others' turn
 
@@ -81,7 +81,7 @@ class RayNodes:
         )(attempt)
         self._blind = self._those_that_do_not_see() if is_shared is None else []
         self._is_packed = is_shared is False or bool(self._blind)
-        self._updated = time.monotonic()
+        self._updated = self._had_nodes = time.monotonic()
 
     def about(self) -> str:
         """See Machines."""
@@ -149,11 +149,14 @@ class RayNodes:
 
     def _update(self) -> None:
         if time.monotonic() - self._updated > UPDATE_EVERY:
-            before = bool(self._cluster.nodes)
             self._cluster.update()
             self._updated = time.monotonic()
-            if before and not self._cluster.nodes:
-                warn("no node is left that can be used; waiting for one")
+            if self._cluster.nodes:
+                self._had_nodes = self._updated
+            elif self._updated - self._had_nodes > PATIENCE:
+                raise WorkbenchError(
+                    f"for {PATIENCE:.0f} s the cluster has had no node that can be used; the same command goes on"
+                )
 
     def _ready(self, seconds: float) -> list[_Attempt]:
         """Those of which there is something to be taken, once there is one or the time is up."""
