@@ -38,7 +38,7 @@ IMPORTED = [
     "rl_workbench.training.cli",
     "rl_workbench.training.run.training",
     "rl_workbench.training.dqn.algorithm",
-    "rl_workbench.training.pg.algorithm",
+    "rl_workbench.training.pg.making",
     "torch._dynamo",
     "torch.utils.tensorboard",
     "matplotlib.pyplot",

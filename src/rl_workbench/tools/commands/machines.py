@@ -8,7 +8,7 @@ from pathlib import Path
 from rl_workbench.tools.commands.shared import number
 from rl_workbench.tools.jobs.ledger import settle
 from rl_workbench.tools.jobs.machines import CARRIED, SHARED, Machines, ThisMachine
-from rl_workbench.training.cluster.flag import add_ray_flag
+from rl_workbench.training.options.ray_flag import add_ray_flag
 from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell
 

@@ -4,7 +4,7 @@ it goes on."""
 from dataclasses import dataclass
 
 from rl_workbench.option import option
-from rl_workbench.training.cluster.flag import HELP
+from rl_workbench.training.options.ray_flag import HELP
 
 
 @dataclass(frozen=True)

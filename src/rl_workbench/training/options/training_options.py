@@ -15,7 +15,7 @@ from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.record import CONFIG_RECORD, read_record
 from rl_workbench.training.options.run_options import RunOptions
 from rl_workbench.training.options.session import SessionOptions
-from rl_workbench.training.rollouts.player import Pool
+from rl_workbench.training.player import Pool
 
 # May be changed when resuming.
 EXTENDING = ("total_timesteps", "episodes", "stop_at_length", "stop_at_return", "device")

@@ -14,27 +14,11 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
 from rl_workbench.training.environments.making import discrete_actions, is_continuous
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.pg.collecting import Agent, EpisodeSource, LocalEpisodes
-from rl_workbench.training.rollouts.player import Player
-from rl_workbench.training.run.algorithm import Algorithm, Frame, Say, in_its_environments
+from rl_workbench.training.pg.collecting import Agent, EpisodeSource
+from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
 from rl_workbench.training.run.checkpoints import fitting
 from rl_workbench.training.run.files import save_tensors
 from rl_workbench.training.run.policy import Policy
-
-
-def make(options: TrainingOptions) -> "PolicyGradientTraining":
-    """A new training; see `make_algorithm`."""
-    if options.make_pool is not None:
-        from rl_workbench.training.pg.remote import make_remote
-
-        return make_remote(options, options.make_pool)
-
-    def learning_in(envs: list[gymnasium.Env[Any, Any]]) -> PolicyGradientTraining:
-        agent = make_agent(options, envs[0])
-        source = LocalEpisodes(envs, agent, options.run.seed)
-        return PolicyGradientTraining(options, envs[0], agent, source)
-
-    return in_its_environments(options, learning_in)
 
 
 def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
@@ -64,13 +48,6 @@ def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
         )
     scale = settings.observation_scale or (1.0,) * size
     return ReinforceAgent(run.seed, scale, settings, actions, run.num_envs)
-
-
-def make_player(options: TrainingOptions, index: int) -> Player:
-    """What plays in the environment `index`, for a worker; see `Player`."""
-    from rl_workbench.training.pg.remote import EpisodePlayer
-
-    return EpisodePlayer(options, index)
 
 
 def load_policy(

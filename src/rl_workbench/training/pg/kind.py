@@ -32,7 +32,7 @@ REINFORCE = AlgorithmKind(
     about="a policy by REINFORCE with a fitted baseline and generalised advantages\n"
     "in any Gymnasium environment with single or continuous actions",
     config="pg.yaml",
-    implementation="rl_workbench.training.pg.algorithm",
+    implementation="rl_workbench.training.pg.making",
     hyperparameters=lambda: ReinforceOptions,
     plays_elsewhere=True,
     learns_in_several=True,
@@ -44,7 +44,7 @@ REINFORCE_DOCUMENT = AlgorithmKind(
     "in an environment with 4 observations and 2 actions",
     config="pg.yaml",
     section="reinforce-document {env_id}",
-    implementation="rl_workbench.training.pg.algorithm",
+    implementation="rl_workbench.training.pg.making",
     hyperparameters=lambda: DocumentOptions,
     defaults=_EPISODIC,
 )

@@ -16,7 +16,7 @@ from rl_workbench.training.options.training_options import MakePool, TrainingOpt
 from rl_workbench.training.pg.algorithm import PolicyGradientTraining, make_agent
 from rl_workbench.training.pg.episodes import run_episode
 from rl_workbench.training.pg.generators import action_generator, generator_state, packed, unpacked
-from rl_workbench.training.rollouts.player import Player, Pool
+from rl_workbench.training.player import Player, Pool
 from rl_workbench.training.run.algorithm import environment_for, environments_elsewhere
 from rl_workbench.training.run.random_states import seed_all
 

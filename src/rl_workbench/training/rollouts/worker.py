@@ -17,8 +17,8 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.extras import finding_modules
 from rl_workbench.training.algorithms import recorded_options
 from rl_workbench.training.environments.checked import EnvironmentFailure
+from rl_workbench.training.player import Player
 from rl_workbench.training.rollouts.fingerprint import fingerprint
-from rl_workbench.training.rollouts.player import Player
 
 
 class Failure(NamedTuple):

@@ -12,12 +12,11 @@ from stable_baselines3.common.logger import Logger
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.rollouts.player import Player
 from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
 from rl_workbench.training.run.files import write_atomically
 from rl_workbench.training.run.policy import Policy
 from rl_workbench.training.sb3.callback import FrameCallback, LossWriter
-from rl_workbench.training.sb3.model import checked_of, make_model, repeatable_of
+from rl_workbench.training.sb3.model import make_model, repeatable_of
 from rl_workbench.training.sb3.network import greedy_network
 from rl_workbench.training.sb3.options import ON_POLICY
 from rl_workbench.training.sb3.state import FRAGMENTS, check_weights, restore, state_of
@@ -25,20 +24,6 @@ from rl_workbench.training.sb3.state import FRAGMENTS, check_weights, restore, s
 # What the library raises in the midst of learning: weights or options that are no good.
 _LEARNING = (ArithmeticError, AssertionError, LookupError, RuntimeError, TypeError, ValueError)
 MODEL = "model.zip"  # Stable-Baselines3's own form, for its own load()
-
-
-def make(options: TrainingOptions) -> "SB3Training":
-    """A new training; see `make_algorithm`."""
-    if not options.run.total_timesteps:
-        raise WorkbenchError(
-            f"{options.kind.name} needs total_timesteps: its schedules depend on them"
-        )
-    if options.make_pool is not None:
-        from rl_workbench.training.sb3.remote import make_remote
-
-        return make_remote(options, options.make_pool)
-    model = make_model(options)
-    return SB3Training(options, model, checked_of(model.get_env()))
 
 
 class SB3Training(Algorithm):
@@ -145,13 +130,6 @@ class SB3Training(Algorithm):
     def close(self) -> None:
         """Closes all environments."""
         self._model.get_env().close()
-
-
-def make_player(options: TrainingOptions, index: int) -> Player:
-    """What plays in the environment `index`, for a worker; see `Player`."""
-    from rl_workbench.training.sb3.fragments import FragmentPlayer
-
-    return FragmentPlayer(options, index)
 
 
 def load_policy(

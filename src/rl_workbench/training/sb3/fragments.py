@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from rl_workbench.training.environments.repeatable import RepeatableEnvironment
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.rollouts.player import Player
+from rl_workbench.training.player import Player
 from rl_workbench.training.run.algorithm import environment_for
 from rl_workbench.training.run.random_states import random_states, restore_random_states
 from rl_workbench.training.sb3.callback import ended

@@ -17,7 +17,7 @@ def _kind(name: str) -> AlgorithmKind:
         "but a new episode and other random numbers",
         config="sb3.yaml",
         section=f"{name} {{env_id}}",
-        implementation="rl_workbench.training.sb3.algorithm",
+        implementation="rl_workbench.training.sb3.making",
         hyperparameters=partial(options_class, name),
         keeps_dict=True,
         plays_elsewhere=name in ON_POLICY,

@@ -13,7 +13,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import sequence
 from rl_workbench.training.environments.elsewhere import Elsewhere
 from rl_workbench.training.options.training_options import MakePool, TrainingOptions
-from rl_workbench.training.rollouts.player import Pool
+from rl_workbench.training.player import Pool
 from rl_workbench.training.run.algorithm import Frame, Say, environments_elsewhere
 from rl_workbench.training.run.checkpoints import fitting
 from rl_workbench.training.run.progress import tell

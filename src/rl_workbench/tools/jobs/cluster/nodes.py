@@ -155,7 +155,8 @@ class RayNodes:
                 self._had_nodes = self._updated
             elif self._updated - self._had_nodes > PATIENCE:
                 raise WorkbenchError(
-                    f"for {PATIENCE:.0f} s the cluster has had no node that can be used; the same command goes on"
+                    f"for {PATIENCE:.0f} s the cluster has had no node that can be used; "
+                    "the same command goes on"
                 )
 
     def _ready(self, seconds: float) -> list[_Attempt]:
