@@ -155,7 +155,7 @@ class RayNodes:
                 self._had_nodes = self._updated
             elif self._updated - self._had_nodes > PATIENCE:
                 raise WorkbenchError(
-                    f"for {PATIENCE:.0f} s the cluster has had no node that can be used; the same command goes on"
+                    f"no node can be used any more, for {PATIENCE:.0f} s now; the same command goes on"
                 )
 
     def _ready(self, seconds: float) -> list[_Attempt]:
