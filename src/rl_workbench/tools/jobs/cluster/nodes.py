@@ -126,7 +126,7 @@ class RayNodes:
         if not (job.folder / LAST).exists():
             return []
         held.enter_context(run_folder.held(job.folder))
-        parcels = Outbox(job.folder, log=None).pack()
+        parcels = Outbox(job.folder, job.folder / TOKEN).pack()
         try:
             return [self._ray.put(parcel) for parcel in parcels]
         except self._ray.exceptions.RayError as error:
@@ -155,8 +155,7 @@ class RayNodes:
                 self._had_nodes = self._updated
             elif self._updated - self._had_nodes > PATIENCE:
                 raise WorkbenchError(
-                    f"for {PATIENCE:.0f} s the cluster has had no node that can be used; "
-                    "the same command goes on"
+                    f"no node can be used any more, for {PATIENCE:.0f} s now; the same command goes on"
                 )
 
     def _ready(self, seconds: float) -> list[_Attempt]:
