@@ -84,7 +84,7 @@ def test_every_option_of_dqn_is_a_flag(empty: str) -> None:
         --start-e 0.9 --end-e 0.1 --exploration-fraction 0.3 --learning-starts 6
         --train-frequency 5 --gradient-steps 4 --no-double --dueling --hidden-sizes 8,9
         --exp-name mine --run-dir out --eval-frequency 0 --checkpoint-frequency 2"""
-    _, run, dqn, resume, _ = choose(DQN, [empty, *text.split()])
+    _, run, dqn, resume, *_ = choose(DQN, [empty, *text.split()])
     assert (run.env_id, run.seed, run.exp_name, run.run_dir) == ("Acrobot-v1", 3, "mine", "out")
     assert (run.eval_frequency, run.checkpoint_frequency, resume) == (0, 2, None)
     assert run.total_timesteps == 20_000
