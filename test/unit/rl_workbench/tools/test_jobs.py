@@ -1,22 +1,18 @@
-"""Jobs without Ray: folders on their way between machines, how they are getting on, addresses of clusters."""
+"""Jobs without Ray: folders on their way between machines, how they are getting on, what is lost."""
 
 import json
 import os
-import socket
-import threading
 from pathlib import Path
 
 import pytest
 import workbench_runs
 
 from rl_workbench import cli
-from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.jobs.cluster import parcels
 from rl_workbench.tools.jobs.cluster.parcels import Inbox, Outbox, Parcel
 from rl_workbench.tools.jobs.job import Job
 from rl_workbench.tools.jobs.ledger import Ledger, settle
 from rl_workbench.tools.jobs.states import read_states
-from rl_workbench.training.cluster.address import check_address
 from rl_workbench.training.run import folder as run_folder
 
 pytestmark = pytest.mark.usefixtures("signals")
@@ -129,7 +125,7 @@ def test_a_half_done_run_travels_to_another_node(tmp_path: Path) -> None:
     home = Node(tmp_path / "home")
     home.learn(100)
     there = tmp_path / "node/run"
-    carry(Outbox(home.folder, tmp_path / "none"), Inbox(there, tmp_path / "log"), there)
+    carry(Outbox(home.folder, log=None), Inbox(there, tmp_path / "log"), there)
     assert tree(there) == tree(home.folder)
 
 
@@ -180,33 +176,3 @@ def test_where_there_are_no_jobs(tmp_path: Path, capsys: pytest.CaptureFixture[s
     (tmp_path / "jobs.json").write_text('{"host": "a", "jobs": [{"nam": 1}]}')
     assert cli.main(["jobs", str(tmp_path)]) == 1
     assert "isn't a list of jobs" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("address", "line"),
-    [
-        ("nonsense", "names a cluster by its head's HOST:PORT"),
-        ("ray://127.0.0.1:10001", "names a cluster by its head's HOST:PORT"),
-        ("127.0.0.1:99999", "names a cluster by its head's HOST:PORT"),
-        ("127.0.0.1:1", "no Ray cluster answers at 127.0.0.1:1: Connection refused"),
-    ],
-)
-def test_an_address_where_no_cluster_is(address: str, line: str) -> None:
-    with pytest.raises(WorkbenchError, match=line):
-        check_address(address)
-
-
-def test_an_address_where_something_else_is() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-
-        def answer() -> None:
-            connection, _ = server.accept()
-            with connection:
-                connection.sendall(b"SSH-2.0-OpenSSH_9.2\r\n")
-                connection.recv(100)
-
-        thread = threading.Thread(target=answer)
-        thread.start()
-        with pytest.raises(WorkbenchError, match="is no Ray cluster's head"):
-            check_address(f"127.0.0.1:{server.getsockname()[1]}")
-        thread.join()

@@ -52,10 +52,10 @@ class Outbox:
 
     Args:
         folder: the run's.
-        log: what its training says.
+        log: what its training says; None: it isn't told.
     """
 
-    def __init__(self, folder: Path, log: Path) -> None:
+    def __init__(self, folder: Path, log: Path | None) -> None:
         self._folder, self._log = folder, log
         self._sent: dict[str, _Version] = {}
         self._grown: dict[str, bytes] = {}  # the last bytes sent of files that grow
@@ -75,7 +75,7 @@ class Outbox:
             whole = self._changed(opened)
             names = {name for name, _ in self._files()}
             growing = [(name, path) for name, path in self._files() if _grows(name)]
-            for name, path in [*growing, (LOG, self._log)]:
+            for name, path in [*growing, *([(LOG, self._log)] if self._log else [])]:
                 yield from self._growth(name, path)
             yield from self._whole(whole)
         for name in [each for each in {**self._sent, **self._lengths} if each not in names | {LOG}]:
