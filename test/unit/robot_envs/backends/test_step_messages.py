@@ -11,7 +11,7 @@ from geometry_msgs.msg import Pose, Twist
 
 from robot_envs.backends.ros.wire.messages import ask_for
 from robot_envs.backends.ros.wire.step_answer import StepKind
-from robot_envs.backends.ros.wire.step_request import StepRequest
+from robot_envs.backends.ros.wire.step_request import MOST_FRAMES, StepRequest
 from robot_envs.world_state import LinkQuery, StateQuery
 
 
@@ -44,6 +44,14 @@ def test_a_requests_bytes_are_genpys():
                 )
                 ours.command(names, genpys.commands)
                 assert written(ours) == written(genpys)
+
+
+def test_a_task_that_commands_others_all_the_time_takes_no_more_memory():
+    ours = StepRequest(8)
+    for number in range(5 * MOST_FRAMES):
+        ours.command((f"/{number}",), [1.0])
+        assert f"/{number}".encode() in written(ours)
+    assert len(ours._frames) <= MOST_FRAMES
 
 
 def test_what_is_no_number_is_refused():

@@ -9,6 +9,7 @@ from bullet_gazebo_msgs.srv import StepWorldRequest
 from robot_envs.backends.ros.wire.messages import ask_for
 from robot_envs.world_state import StateQuery
 
+MOST_FRAMES = 16  # that are kept, as the simulator keeps lists of controllers
 _MARK = -1.2345678987654321e-300  # a command that nobody sends
 
 
@@ -36,6 +37,8 @@ class StepRequest(StepWorldRequest):
         """Writes the message, as its base class would."""
         frame = self._frames.get(self.controllers)
         if frame is None:
+            if len(self._frames) >= MOST_FRAMES:
+                self._frames.clear()  # a task that commands others all the time
             frame = self._frames[self.controllers] = self._frame()
         before, numbers, behind = frame
         buff.write(before + numbers.pack(*self.commands) + behind)
