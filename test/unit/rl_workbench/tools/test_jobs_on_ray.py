@@ -87,6 +87,7 @@ def test_what_is_killed_changes_no_byte_of_the_table(
     driver = benchmark(tmp_path, f"--ray={cluster.address}", "--folders=carried")
     try:
         wait_until(lambda: is_half_done(tmp_path, 0), "a training")
+        wait_until(cluster.nodes[0].workers, "a job on the first node")
         os.kill(cluster.nodes[0].workers()[0], signal.SIGKILL)
         wait_until(cluster.nodes[1].workers, "a job on the second node")
         cluster.nodes[1].kill()
@@ -114,7 +115,7 @@ def test_a_benchmark_whose_own_process_is_killed_or_stopped_goes_on(
     finally:
         driver.kill()
     assert "ended from outside" in finished(driver, -signal.SIGKILL)
-    wait_until(lambda: not trainings(tmp_path), "the end of its trainings", 10.0)
+    wait_until(lambda: not trainings(tmp_path), "the end of its trainings")
 
     driver = benchmark(tmp_path, flag)
     try:
@@ -124,7 +125,7 @@ def test_a_benchmark_whose_own_process_is_killed_or_stopped_goes_on(
     finally:
         driver.kill()
     assert "interrupted; the same command goes on" in said
-    wait_until(lambda: not trainings(tmp_path), "the end of its trainings", 10.0)
+    wait_until(lambda: not trainings(tmp_path), "the end of its trainings")
     assert not in_session(driver.pid)
     assert {state(tmp_path, seed).state for seed in range(2)} <= {"stopped", "waiting", "done"}
 
