@@ -23,8 +23,9 @@ def check_address(address: str) -> None:
     Raises:
         WorkbenchError: if none does.
     """
-    host, separator, port = address.rpartition(":")
-    if not separator or "/" in address or not port.isdigit() or not 0 < int(port) < 2**16:
+    host, _, port = address.rpartition(":")
+    is_port = port.isascii() and port.isdigit() and len(port) <= 5 and 0 < int(port) < 2**16
+    if not host or "/" in address or not is_port:
         raise WorkbenchError(
             f"--ray names a cluster by its head's HOST:PORT ({EXAMPLE}), or is {LOCAL} or {AUTO}, "
             f"not {address!r}"
@@ -34,8 +35,8 @@ def check_address(address: str) -> None:
             connection.settimeout(PATIENCE)
             connection.sendall(PREFACE)
             answer = connection.recv(9, socket.MSG_WAITALL)
-    except OSError as error:
-        reason = error.strerror or str(error) or type(error).__name__
+    except (OSError, UnicodeError) as error:  # a host's name that can't be one isn't encoded
+        reason = getattr(error, "strerror", "") or str(error) or type(error).__name__
         raise WorkbenchError(f"no Ray cluster answers at {address}: {reason}") from error
     if answer[KIND] != SETTINGS:
         raise WorkbenchError(
