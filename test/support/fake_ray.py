@@ -82,7 +82,12 @@ class FakeRay:
 
     def nodes(self) -> list[dict[str, Any]]:
         return [
-            {"NodeID": id, "Alive": True, "Resources": {"CPU": 2.0}, "NodeManagerAddress": "10.0.0.7"}
+            {
+                "NodeID": id,
+                "Alive": True,
+                "Resources": {"CPU": 2.0},
+                "NodeManagerAddress": "10.0.0.7",
+            }
             for id in self.answers
         ]
 
@@ -101,7 +106,9 @@ class FakeRay:
 
     def put(self, value: Any) -> Reference:
         if self._full:
-            raise ObjectStoreFullError("Failed to put object:\nthe local object store is full of pages")
+            raise ObjectStoreFullError(
+                "Failed to put object:\nthe local object store is full of pages"
+            )
         return Reference(lambda: value)
 
     def cancel(self, told: Told, force: bool = False) -> None:

@@ -81,7 +81,11 @@ def test_a_head_may_be_there(answering: Answering) -> None:
     ["benchmark", "--seeds", "1"],
 ])  # fmt: skip
 def test_a_command_says_it_in_one_line(
-    command: list[str], tmp_path, monkeypatch, capsys: pytest.CaptureFixture[str], answering: Answering
+    command: list[str],
+    tmp_path,
+    monkeypatch,
+    capsys: pytest.CaptureFixture[str],
+    answering: Answering,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     place = ["--out", str(tmp_path / "out")] if command[0] == "benchmark" else []

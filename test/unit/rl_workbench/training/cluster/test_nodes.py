@@ -10,7 +10,6 @@ from rl_workbench.training.cluster import joining
 from rl_workbench.training.cluster.nodes import Cluster, _looking
 from rl_workbench.training.cluster.package import LIBRARIES, own_packages, versions
 
-
 OURS = versions(own_packages())
 
 
@@ -65,7 +64,9 @@ def test_a_cluster_none_of_whose_nodes_can_be_used(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(joining, "need", lambda *_: None)
     said: list[str] = []
     with (
-        pytest.raises(WorkbenchError, match="^no node of the cluster at 10.0.0.1:6379 can be used$"),
+        pytest.raises(
+            WorkbenchError, match="^no node of the cluster at 10.0.0.1:6379 can be used$"
+        ),
         joining.joined("10.0.0.1:6379", said.append),
     ):
         pytest.fail("it was entered")

@@ -55,7 +55,6 @@ class FakeRay:
         self.killed.append(actor)
 
 
-
 @pytest.fixture
 def make(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Makes workers on a fake of Ray."""
@@ -116,10 +115,11 @@ def test_five_losses_at_the_same_part_are_enough(make) -> None:
         "worker 2 of 2 was lost 5 times at the same part: "
         "The actor died unexpectedly before finishing this task"
     )
-    assert said == [
+    line = (
         "worker 2 of 2 is lost (The actor died unexpectedly before finishing this task): another one "
         "plays its part again"
-    ] * 4
+    )
+    assert said == [line] * 4
     assert set(fake.killed) == set(fake.made) and len(fake.made) == 6, "none is left"
 
 
