@@ -82,6 +82,8 @@ class RosSession:
     def start(self, say: Say) -> None:
         """Starts what is missing, and makes this the process's session.
 
+        A simulator that was started here and dies before its robots are brought up is replaced once.
+
         Args:
             say: is told what is started.
 
@@ -89,6 +91,17 @@ class RosSession:
             RobotEnvError: if something can't be started, or what runs doesn't fit; what was
                 started before that is for `close()` to end.
         """
+        try:
+            self._begin(say)
+        except RobotEnvError as error:
+            if not self._own_simulator or _simulator_answers():
+                raise
+            rospy.logwarn("%s; another simulator is started in its place", error)
+            self._undo.close()
+            self._begin(say)
+
+    def _begin(self, say: Say) -> None:
+        self._own_simulator = False
         if rospy.core.is_initialized() and rospy.is_shutdown():
             raise RobotEnvError(
                 "this process's ROS node has ended, and a process becomes one only once; keep a "
@@ -96,10 +109,11 @@ class RosSession:
             )
         if self._rviz:
             check_rviz(self._scene.robots[0])
-        self._own_simulator = own = not (node.master_is_up() and bring_up.simulator_answers())
+        own = not _simulator_answers()
         if own:
             say("starting the simulator")
             self._start_simulator()
+            self._own_simulator = True
         self._join()
         self._check_mode()
         bring_up.check_world(self._scene.robots[0])
@@ -229,6 +243,11 @@ class RosSession:
             self._undo.close()
         finally:
             self._node.close()
+
+
+def _simulator_answers() -> bool:
+    """Whether there is one, at a master that is there."""
+    return node.master_is_up() and bring_up.simulator_answers()
 
 
 def _at_living_simulator(simulator: OwnSimulator, undo: Undo) -> None:

@@ -126,7 +126,7 @@ class RayNodes:
         if not (job.folder / LAST).exists():
             return []
         held.enter_context(run_folder.held(job.folder))
-        parcels = Outbox(job.folder, job.folder / TOKEN).pack()
+        parcels = Outbox(job.folder, log=None).pack()
         try:
             return [self._ray.put(parcel) for parcel in parcels]
         except self._ray.exceptions.RayError as error:

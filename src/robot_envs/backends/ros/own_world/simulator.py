@@ -84,6 +84,17 @@ class PrivateSimulator:
         """Whether its processes run."""
         return self._process.poll() is None
 
+    def falls(self) -> bool:
+        """Whether it has died; its keeper notices that in a moment."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(FALLING)
+        return not self.is_alive
+
+    @property
+    def gave_up(self) -> bool:
+        """Whether it has ended by itself, for a reason of its own."""
+        return self._process.poll() in range(1, 128)
+
     @property
     def processes(self) -> list[int]:
         """Ids of the simulator's and the master's."""

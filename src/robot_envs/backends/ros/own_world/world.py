@@ -88,10 +88,14 @@ class RestartingWorld:
         """
         try:
             self._connect()
+            return
         except RobotEnvError as error:
-            if self._simulator.is_alive and not isinstance(error, SimulatorFault):
+            if not isinstance(error, SimulatorFault) and not self._simulator.falls():
                 raise
-            raise SimulatorError(self._ended(error)) from error
+            before = self._ended(error)
+            if isinstance(error, SimulatorHangs) or self._simulator.gave_up:
+                raise SimulatorError(before) from error  # another one would do the same
+        self._have_another(lambda world: world.look(self._query), before)
 
     def _connect(self) -> None:
         self._simulator.wait()
@@ -188,6 +192,15 @@ class RestartingWorld:
                 return self._asked(do)
         except SimulatorFault as error:
             before = self._ended(error)
+        return self._have_another(do, before)
+
+    def _have_another(self, do: Callable[[LockstepWorld], Result], before: str) -> Result:
+        """Has another simulator do something.
+
+        Args:
+            before: what became of the last one, if that isn't known yet.
+        """
+        if before:
             self.restarts += 1
             _warn(f"{before}; another one takes its place")
         try:

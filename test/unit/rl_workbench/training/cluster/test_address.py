@@ -76,6 +76,7 @@ def test_a_head_may_be_there(answering: Answering) -> None:
 
 
 @pytest.mark.extras("ray")
+@pytest.mark.usefixtures("signals")
 @pytest.mark.parametrize("command", [
     ["train", "--algo", "reinforce"],
     ["benchmark", "--seeds", "1"],

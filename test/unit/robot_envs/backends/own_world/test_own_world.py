@@ -165,6 +165,26 @@ def test_a_second_death_is_an_error_that_names_both_and_the_next_reset_begins_an
     assert differences(rollout(env, 60, seed=8), truth) == ""
 
 
+def test_one_that_dies_before_its_robot_is_there_is_replaced(truth, monkeypatch, caplog) -> None:
+    wait, killed = PrivateSimulator.wait, []
+
+    def die(simulator: PrivateSimulator) -> None:
+        wait(simulator)
+        if not killed:
+            killed.append(simulator.pid)
+            os.kill(simulator.pid, signal.SIGKILL)
+
+    monkeypatch.setattr(PrivateSimulator, "wait", die)
+    made = own(**RICH)
+    assert (
+        killed
+        and made.backend.restarts == 1
+        and "another one takes its place" in caplog.messages[-1]
+    )
+    assert differences(rollout(made, 60, seed=8), truth) == ""
+    made.close()
+
+
 def test_worlds_robots_and_objects_come_back_too(tmp_path: Path) -> None:
     """Two arms with a ball in a world of their own, and what a state tells beside joints."""
     here = RobotEnv([LEFT, RIGHT], Volley(tmp_path), "bullet")
