@@ -7,6 +7,7 @@ import pytest
 import yaml
 from training_runs import EXACT
 
+import robot_envs.robots  # noqa: F401 - registers what some sections are for
 from rl_workbench.agents.dqn.settings import DQNSettings
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import ALGORITHMS
