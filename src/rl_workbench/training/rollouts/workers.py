@@ -30,7 +30,10 @@ from rl_workbench.training.rollouts.worker import Failure, Home, Worker, kin_of
 from rl_workbench.training.run.algorithm import Say
 
 POLL = 0.1  # [s] between two looks for an interruption
-PATIENCE = 15.0  # [s] after which the user hears that workers wait for processors
+PATIENCE = 15.0  # [s] after which the user hears that workers haven't begun
+BEGINNING = (
+    180.0  # [s] after which one that hasn't is replaced, and the user hears of those that only play
+)
 ANSWER = 1.0  # [s] that a node has to answer in
 GRACE = 3.0  # [s] that environments have to close in
 ATTEMPTS = 5  # of workers at the same part, before the part is taken for the cause
@@ -64,11 +67,12 @@ class Workers:
         self._home = _home_of(options.run.env_id)
         self._nodes = [""] * self._count  # where each worker is
         self._playing: dict[Any, int] = {}
+        self._asked = [0.0] * self._count  # when each was [s of the monotonic clock]
         self._actors: list[Any] = []
         try:
             for index in range(self._count):
                 self._actors.append(self._start(index, processors=1))
-            self._check_kinds(self._gather(self._beginning, self._slow()) or [])
+            self._check_kinds(self._gather(self._beginning, lambda: False, BEGINNING) or [])
         except BaseException:  # Ctrl-C as well
             self.close()
             raise
@@ -113,19 +117,6 @@ class Workers:
         begin: Callable[[], Any] = self._actors[index].begin.remote
         return begin
 
-    def _slow(self) -> Callable[[], bool]:
-        """To be asked while workers begin: says once that they are waited for; nobody tells to stop."""
-        until = time.monotonic() + PATIENCE
-
-        def waiting() -> bool:
-            nonlocal until
-            if time.monotonic() > until:
-                until = math.inf
-                self._say(f"waiting for {len(self._playing)} of {self._count} workers to begin")
-            return False
-
-        return waiting
-
     def _check_kinds(self, kinds: Sequence[str]) -> None:
         mine = fingerprint()
         others = [str(number) for number, each in enumerate(kinds, 1) if each != mine]
@@ -148,19 +139,24 @@ class Workers:
         return self._gather(asking, should_stop)
 
     def _gather(
-        self, asking: Callable[[int], Callable[[], Any]], should_stop: Callable[[], bool]
+        self,
+        asking: Callable[[int], Callable[[], Any]],
+        should_stop: Callable[[], bool],
+        limit: float = math.inf,
     ) -> list[Any] | None:
         """What all workers answer; one that is lost is replaced, and its successor asked the same.
 
         Args:
             asking: makes of a worker's number what asks it, and gives Ray's reference to the answer.
             should_stop: is asked all the time.
+            limit: seconds after which one that hasn't answered is lost; an episode may take any time.
         """
         found: dict[int, Any] = {}
         lost = [0] * self._count
+        tell_at = time.monotonic() + (PATIENCE if limit < math.inf else BEGINNING)
         with _told():
             for index in range(self._count):
-                self._playing[asking(index)()] = index
+                self._ask(index, asking)
             while self._playing:
                 if should_stop():
                     return None
@@ -173,9 +169,32 @@ class Workers:
                         raise
                     except RayError as error:
                         lost[index] += 1
-                        self._replace(index, error, lost[index])
-                        self._playing[asking(index)()] = index
+                        self._replace(index, _line_of(error), lost[index])
+                        self._ask(index, asking)
+                for reference, index in self._silent_for(limit):
+                    del self._playing[reference]
+                    lost[index] += 1
+                    self._replace(index, f"it hasn't begun within {limit:.0f} s", lost[index])
+                    self._ask(index, asking)
+                if self._playing and time.monotonic() > tell_at:
+                    tell_at = math.inf
+                    self._tell_of_silence()
         return [found[index] for index in range(self._count)]
+
+    def _ask(self, index: int, asking: Callable[[int], Callable[[], Any]]) -> None:
+        self._playing[asking(index)()] = index
+        self._asked[index] = time.monotonic()
+
+    def _silent_for(self, seconds: float) -> list[tuple[Any, int]]:
+        """Those that were asked so long ago, and haven't answered."""
+        until = time.monotonic() - seconds
+        return [each for each in self._playing.items() if self._asked[each[1]] < until]
+
+    def _tell_of_silence(self) -> None:
+        numbers = sorted(self._playing.values())
+        seconds = time.monotonic() - min(self._asked[index] for index in numbers)
+        names = ", ".join(str(index + 1) for index in numbers)
+        self._say(f"for {seconds:.0f} s nothing has come from worker {names} of {self._count}")
 
     def _checked(self, index: int, answer: Any) -> Any:
         if not isinstance(answer, Failure):
@@ -186,14 +205,16 @@ class Workers:
         with numbered(index, self._count):
             raise kind(f"{place}{answer.text}") from WorkerTraceback(answer.trace)
 
-    def _replace(self, index: int, error: RayError, attempts: int) -> None:
-        """Has another worker in the place of one that is lost."""
+    def _replace(self, index: int, reason: str, attempts: int) -> None:
+        """Has another worker in the place of one that is lost.
+
+        Raises:
+            WorkbenchError: if it was lost too often.
+        """
         name = f"worker {index + 1} of {self._count}"
         if attempts == ATTEMPTS:
-            raise WorkbenchError(
-                f"{name} was lost {attempts} times at the same part: {_line_of(error)}"
-            ) from error
-        self._say(f"{name} is lost ({_line_of(error)}): another one plays its part again")
+            raise WorkbenchError(f"{name} was lost {attempts} times at the same part: {reason}")
+        self._say(f"{name} is lost ({reason}): another one plays its part again")
         ray.kill(self._actors[index])  # it may only have been out of reach
         self._cluster.update()
         self._actors[index] = self._start(index, processors=0)

@@ -9,6 +9,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.cluster.nodes import Node
 
 pytestmark = pytest.mark.extras("ray")
+SILENT = "silent"
 
 
 class Actor:
@@ -32,6 +33,7 @@ class FakeRay:
 
     def __init__(self, answers: list[Any], full: Exception | None = None) -> None:
         self._answers, self._full = answers, full
+        self.now, self.speaks = 0.0, float("inf")  # [s]; when the silent ones answer
         self.made, self.killed = list[Actor](), list[Actor]()
 
     def start(self, *_: Any, **__: Any) -> Actor:
@@ -44,7 +46,12 @@ class FakeRay:
         return value
 
     def wait(self, asked: list[Any], **_: Any) -> tuple[list[Any], list[Any]]:
-        return asked, []
+        self.now += 1.0
+        silent = [each for each in asked if each[1] == SILENT and self.now < self.speaks]
+        return [each for each in asked if each not in silent], silent
+
+    def monotonic(self) -> float:
+        return self.now
 
     def get(self, reference: tuple[Actor, Any]) -> Any:
         if isinstance(reference[1], Exception):
@@ -66,6 +73,7 @@ def make(monkeypatch: pytest.MonkeyPatch) -> Any:
         run = SimpleNamespace(num_envs=count, env_id="CartPole-v1")
         options = SimpleNamespace(run=run, record=dict)
         monkeypatch.setattr(workers, "ray", fake)
+        monkeypatch.setattr(workers, "time", fake)
         monkeypatch.setattr(workers.Workers, "_start", fake.start)
         return workers.Workers(cluster, options, said.append)
 
@@ -132,6 +140,28 @@ def test_one_that_is_lost_is_replaced(make) -> None:
     assert len(said) == 1 and len(fake.made) == 3
     assert workers.play("policy", [None, None], lambda: False) == [mine()] * 2
     assert workers.play("policy", [None, None], lambda: True) is None, "interrupted"
+
+
+def test_one_that_does_not_begin_is_replaced(make) -> None:
+    said: list[str] = []
+    fake = FakeRay([mine(), SILENT, mine()])
+    make(fake, 2, said)
+    assert said == [
+        "for 16 s nothing has come from worker 2 of 2",
+        "worker 2 of 2 is lost (it hasn't begun within 180 s): another one plays its part again",
+    ]
+    assert len(fake.made) == 3 and fake.killed == [fake.made[1]]
+
+
+def test_one_that_plays_for_long_is_told_of_once_and_waited_for(make) -> None:
+    said: list[str] = []
+    fake = FakeRay([mine()])
+    workers = make(fake, 2, said)
+    workers._actors[0] = Actor(SILENT)
+    fake.speaks = fake.now + 1000.0
+    assert workers.play("policy", [None, None], lambda: False) == [SILENT, mine()]
+    assert said == ["for 181 s nothing has come from worker 1 of 2"]
+    assert not fake.killed
 
 
 @pytest.mark.parametrize("kind", ["ObjectStoreFullError", "OutOfDiskError"])
