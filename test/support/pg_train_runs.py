@@ -4,7 +4,6 @@ import contextlib
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import tempfile
 import threading
@@ -12,15 +11,11 @@ import time
 import uuid
 from pathlib import Path
 
+from ros_utils.simulation import reserved_port
+
 BOUND = 120.0  # [s] for anything that a run does on a busy machine
 MARK = "CARTPOLE_TEST_RUN"
 NETWORKS = {"policy_network.pth", "value_network.pth"}
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Place:
@@ -30,7 +25,7 @@ class Place:
         self.folder = Path(tempfile.mkdtemp(prefix="pg_train_"))
         self.run = self.folder / "run"
         self._mark = uuid.uuid4().hex
-        master = master or f"http://127.0.0.1:{free_port()}"
+        master = master or f"http://127.0.0.1:{reserved_port()}"
         self.environment = os.environ | {"ROS_MASTER_URI": master, MARK: self._mark}
 
     def start(self, *command: str) -> "Process":

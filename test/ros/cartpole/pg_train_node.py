@@ -79,9 +79,10 @@ class PgTrain(unittest.TestCase):
         moves the robots."""
         flags = ("--start-noise=0.05", "--episodes=40", "--eval-episodes=1", "--num-envs=2", "--seed=4",
                  "--checkpoint-frequency=60")  # fmt: skip
-        inside, killed = self.place(), self.place()
+        inside = self.place()
         self.trained(inside, *flags, "--backend=bullet")
         self.assertEqual(inside.processes(), {})
+        killed = self.place()
         training = killed.train(*flags)
         training.wait_for("Episode   20 |")
         for pid in killed.processes():

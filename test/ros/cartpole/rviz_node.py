@@ -3,7 +3,6 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -18,6 +17,8 @@ import rostest
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
 from virtual_display import missing, virtual_display
 
+from ros_utils.simulation import reserved_port
+
 BOUND = 180.0  # [s] for anything
 ORANGE, BLUE = (lambda r, g, b: (r > b + 90) & (r > g + 40)), (lambda r, g, b: b > r + 60)
 MIDDLE = 550.0  # [pixels] column of the window's middle
@@ -26,12 +27,6 @@ CONFIGURE = """model_name: cartpole
 urdf_param_name: robot_description
 joint_names: [stand_cart, cart_pole]
 joint_positions: [%s, %s]"""
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def middle(picture, colour):
@@ -47,7 +42,7 @@ class Rviz(unittest.TestCase):
         self.display = self.enterContext(virtual_display())
         self.env = {
             **os.environ,
-            "ROS_MASTER_URI": f"http://localhost:{free_port()}",
+            "ROS_MASTER_URI": f"http://localhost:{reserved_port()}",
             "DISPLAY": self.display.name,
             "LIBGL_ALWAYS_SOFTWARE": "1",
         }

@@ -3,7 +3,6 @@
 
 import os
 import signal
-import socket
 import subprocess
 import tempfile
 import threading
@@ -13,6 +12,8 @@ import xmlrpc.client
 import rosgraph
 import rostest
 
+from ros_utils.simulation import reserved_port
+
 BOUND = 60.0  # [s]
 SERVER = ("rosrun", "gazebo_ros", "gzserver")
 SPAWN = ("rosrun", "gazebo_ros", "spawn_model", "-urdf", "-param", "/box", "-model", "box")
@@ -21,18 +22,12 @@ BOX = """<robot name="box"><link name="body"><inertial><mass value="1"/>
 <gazebo><plugin name="breaks" filename="libbreaks.so"/></gazebo></robot>"""
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 class World:
     """A world launched with arguments of the user's, on a master of its own."""
 
     def __init__(self, *args):
         self.log = tempfile.TemporaryFile()  # noqa: SIM115 - close() does
-        port = free_port()
+        port = reserved_port()
         self.uri = f"http://localhost:{port}"
         self._master = rosgraph.Master("/launch_arguments", self.uri)
         command = [

@@ -4,7 +4,6 @@
 import os
 import re
 import signal
-import socket
 import subprocess
 import tempfile
 import threading
@@ -13,16 +12,11 @@ from pathlib import Path
 
 import rostest
 
+from ros_utils.simulation import reserved_port
 from video_writing.mp4 import EncoderFailed, find_encoder
 
 BOUND = 100.0  # [s]
 WORLD = ("gazebo_ros", "empty_world.launch", "gui:=false", "server_required:=true")
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def has_ffmpeg():
@@ -38,7 +32,7 @@ class Recording(unittest.TestCase):
         self.log = self.folder / "log"
 
     def launch(self, *arguments):
-        port = free_port()
+        port = reserved_port()
         env = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "PYTHONUNBUFFERED": "1"}
         with self.log.open("w") as log:
             launch = subprocess.Popen(
