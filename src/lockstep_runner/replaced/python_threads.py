@@ -16,9 +16,13 @@ from lockstep_runner import originals
 from lockstep_runner.runner import Runner
 from lockstep_runner.script.callers import is_the_script
 
+# [s]; what is left of a time limit where the last digits of its two ends were rounded: it is over.
+ROUNDING = 1e-6
+
 
 def install(runner: Runner) -> None:
     """Puts the methods in place."""
+    rounded = threading.local()  # `passed`: where a thread's time limit was all but over
 
     def covered() -> bool:
         return (
@@ -38,6 +42,9 @@ def install(runner: Runner) -> None:
     def condition_wait(self: threading.Condition, timeout: float | None = None) -> bool:
         if not covered():
             return originals.condition_wait(self, timeout)
+        if timeout is not None and 0.0 < timeout < ROUNDING:  # else its caller asks for it for ever
+            rounded.passed = runner.clock.passed
+            timeout = 0.0
         return wait_for_notice(runner, self, timeout)
 
     def join(self: threading.Thread, timeout: float | None = None) -> None:
@@ -68,7 +75,11 @@ def install(runner: Runner) -> None:
 
     def time_limits() -> float:
         """The clock of time limits: simulated where the wait is."""
-        return begun + runner.clock.passed / 1e9 if covered() else originals.monotonic()
+        if not covered():
+            return originals.monotonic()
+        passed = runner.clock.passed
+        is_over = vars(rounded).pop("passed", None) == passed  # asked once, by who waited
+        return begun + passed / 1e9 + (ROUNDING if is_over else 0.0)
 
     begun = originals.monotonic()
     threading._time = queue.time = time_limits  # type: ignore[attr-defined]

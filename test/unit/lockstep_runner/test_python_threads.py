@@ -41,6 +41,30 @@ def passed(runner):
     return runner.clock.passed // MS
 
 
+@pytest.mark.parametrize("uptime", [0.1, 0.3, 65_536.7, 67_003.123_456_789, 4e6 + 0.1])
+def test_time_limits_end_whatever_the_clock_shows(runner, monkeypatch, uptime):
+    """The sums of simulated and wall time are rounded: what is left of a limit may be 1e-11 s, not 0."""
+    for owner, name in ((threading.Condition, "wait"), (threading, "_time"), (queue, "time"),
+                        (threading.Thread, "start"), (threading.Thread, "join"),
+                        (threading.Event, "wait"), (futures, "time")):  # fmt: skip
+        monkeypatch.setattr(owner, name, getattr(owner, name))
+    monkeypatch.setattr(python_threads.originals, "monotonic", lambda: uptime)
+    python_threads.install(runner)
+    condition = threading.Condition()
+    waits = 0
+
+    def never():
+        nonlocal waits
+        waits += 1
+        assert waits < 200, "it never ends"
+        return False
+
+    for count in range(1, 20):
+        with condition:
+            assert not condition.wait_for(never, 0.1)
+        assert passed(runner) == 100 * count
+
+
 def test_time_limits_are_simulated(replaced):
     assert not threading.Event().wait(0.05)
     assert passed(replaced) == 50
