@@ -143,7 +143,7 @@ def test_sweep_searches_what_is_not_given(tmp_path: Path) -> None:
     assert trial["state"] == "complete" and "gamma" not in trial["options"]
     (section,) = yaml.safe_load((out / "best.yaml").read_text())
     assert section == ENV_ID
-    assert open_run(out / "trial_0000_seed_0").config["hyperparameters"]["gamma"] == 0.5
+    assert open_run(out / "trial_0000" / "seed_0").config["hyperparameters"]["gamma"] == 0.5
 
 
 @pytest.mark.extras("optuna")
