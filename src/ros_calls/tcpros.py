@@ -107,12 +107,8 @@ class Connection:
         try:
             self._set_timeout(_finite(timeout))
             self._socket.sendall(payload)
-        except BlockingIOError as fault:
-            raise TimeoutError from fault
-        except TimeoutError:
-            raise
         except OSError as fault:
-            raise ConnectionEnded(str(fault)) from fault
+            raise _told(fault) from fault
 
     def receive(self, timeout: float) -> Any:
         """Returns the response to the request that was sent; its time limit begins now.
@@ -127,12 +123,8 @@ class Connection:
             if timeout == math.inf:
                 self._await_data(deadline)
             ok, answer = self._receive(deadline)
-        except BlockingIOError as fault:
-            raise TimeoutError from fault
-        except TimeoutError:
-            raise
         except OSError as fault:
-            raise ConnectionEnded(str(fault)) from fault
+            raise _told(fault) from fault
         if not ok:
             reason = answer.decode(errors="replace") or "without a reason"
             raise CallFailed(f"it failed: {reason}")
@@ -211,6 +203,13 @@ def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
         return rospy.msg.args_kwds_to_message(kind._request_class, request, {})
     except TypeError as fault:
         raise CallFailed(f"the request can't be sent: {fault}") from fault
+
+
+def _told(fault: OSError) -> Exception:
+    """What a fault of the socket is: the kernel's time limit is told as BlockingIOError."""
+    if isinstance(fault, BlockingIOError | TimeoutError):
+        return TimeoutError()
+    return ConnectionEnded(str(fault))
 
 
 def _finite(timeout: float) -> float:

@@ -1,7 +1,5 @@
 """What a node does: one attempt at a job, in a worker of Ray's; the training is a process of its own."""
 
-import fcntl
-import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -76,18 +74,6 @@ def sees(home: Home) -> bool:
         return (home.folder / TOKEN).read_text(encoding="utf-8") == home.token
     except OSError:
         return False
-
-
-def is_told_of_locks(home: Home) -> bool:
-    """Whether this machine, where the folder is seen, knows that another one holds it."""
-    descriptor = os.open(home.folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(descriptor)
-    return False
 
 
 def _run(job: Job, folder: Path, program: Sequence[str], outbox: Outbox | None) -> Iterator[Told]:

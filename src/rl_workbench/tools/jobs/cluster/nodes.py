@@ -14,7 +14,6 @@ from rl_workbench.tools.jobs.cluster.attempt import (
     Began,
     Home,
     attempt,
-    is_told_of_locks,
     sees,
 )
 from rl_workbench.tools.jobs.cluster.faults import in_a_line
@@ -236,4 +235,4 @@ class RayNodes:
 
 def _look(home: Home) -> tuple[bool, bool]:
     is_seen = sees(home)
-    return is_seen, is_seen and is_told_of_locks(home)
+    return is_seen, is_seen and run_folder.is_held(home.folder)
