@@ -75,8 +75,13 @@ class ServiceClient:
             ServiceHangs: no answer in time.
             ServiceFailed: the service refused, or the request can't be sent.
         """
-        self.begin(*request)
-        return self.end()
+        self._refuse_if_begun()
+        try:
+            self.begin(*request)
+            return self.end()
+        except BaseException:  # also of a signal's handler, at any place
+            self.close()
+            raise
 
     def begin(self, *request: Any) -> None:
         """Sends a request and returns at once; `end` takes the response, and must come next.
@@ -85,8 +90,7 @@ class ServiceClient:
             ServiceFailed: as for a call.
             RuntimeError: if a call was begun, and not ended.
         """
-        if self._begun:
-            raise RuntimeError(f"{self.name}: begin() once more before end()")
+        self._refuse_if_begun()
         try:
             message = tcpros.request_message(self._kind, request)
             self._connected().send(message, self.timeout)
@@ -116,6 +120,10 @@ class ServiceClient:
         finally:
             if not kept:
                 self.close()
+
+    def _refuse_if_begun(self) -> None:
+        if self._begun:
+            raise RuntimeError(f"{self.name}: begin() once more before end()")
 
     def _failure(self, fault: Exception) -> ServiceFailed:
         if isinstance(fault, TimeoutError):

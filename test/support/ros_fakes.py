@@ -58,15 +58,16 @@ class FakeMaster:
 
 
 class FakeService:
-    """A std_srvs/SetBool; `answer(request)` gives the pieces that are sent, or None to say nothing."""
+    """Of any `kind`; `answer(request)` gives the pieces that are sent, or None to say nothing."""
 
-    def __init__(self, answer=None, header=None):
+    def __init__(self, answer=None, header=None, kind=SetBool):
         self._answer = answer or (lambda request: [ok(request.data)])
         self._header = header or {
             "callerid": "/fake",
-            "md5sum": SetBool._md5sum,
-            "type": SetBool._type,
+            "md5sum": kind._md5sum,
+            "type": kind._type,
         }
+        self._kind = kind
         self._listener = socket.create_server((LOOPBACK, 0))
         self.address = f"rosrpc://{LOOPBACK}:{self._listener.getsockname()[1]}"
         self.connections = []
@@ -88,7 +89,7 @@ class FakeService:
             rosgraph.network.write_ros_handshake_header(connection, self._header)
             while length := connection.recv(4, socket.MSG_WAITALL):
                 data = connection.recv(struct.unpack("<I", length)[0], socket.MSG_WAITALL)
-                request = SetBool._request_class()
+                request = self._kind._request_class()
                 request.deserialize(data)
                 for piece in self._answer(request) or ():
                     connection.sendall(piece)
@@ -110,8 +111,13 @@ class FakeService:
 
 def ok(success, message=""):
     """An answer on the wire."""
+    return on_wire(SetBoolResponse(success, message))
+
+
+def on_wire(response):
+    """The answer of a service that succeeds."""
     payload = io.BytesIO()
-    SetBoolResponse(success, message).serialize(payload)
+    response.serialize(payload)
     return b"\x01" + struct.pack("<I", payload.tell()) + payload.getvalue()
 
 

@@ -1,12 +1,15 @@
 """When a subscriber has every message from now on: its publishers have to know it, not only it them."""
 
+import re
 import xmlrpc.client
 
 import rosgraph
 import rospy
+from rospy.impl.registration import get_topic_manager
 
 BOUND = 180.0  # [s of wall time]
 POLL = 0.01  # [s of wall time]
+PORT = re.compile(r":(\d+) on socket")  # of the subscriber's side, in what a publisher tells
 
 
 def is_heard(topic):
@@ -22,10 +25,17 @@ def is_heard(topic):
 
 
 def _sends(address, name):
+    """Whether the node at `address` sends on the topic through a connection that this process reads.
+
+    Of one whose subscriber is closed the publisher learns when it sends the next time.
+    """
     with xmlrpc.client.ServerProxy(address) as node:
         _, _, connections = node.getBusInfo(rospy.get_name())
+    subscriber = get_topic_manager().get_subscriber_impl(name)
+    ours = {str(each.local_endpoint[1]) for each in subscriber.connections} if subscriber else set()
     return any(
-        each[1] == rospy.get_name() and each[2] == "o" and each[4] == name for each in connections
+        way == "o" and topic == name and not ours.isdisjoint(PORT.findall(told))
+        for _, _, way, _, topic, _, told, *_ in connections
     )
 
 

@@ -18,6 +18,14 @@ SERVICE = f"{NODE}/advance_world"
 TIMEOUT = 30.0  # [s of wall time] for an answer; a call is at most `World.longest` ticks
 LOOK = 0.2  # [s of wall time] between two looks for a simulator
 NANOSECONDS = 1_000_000_000
+CALLING = (
+    "ros_calls",
+    "rosgraph",
+    "rospy",
+    "socket",
+    "http",
+    "xmlrpc",
+)  # packages that a call runs
 
 
 class NotInLockstep(Exception):
@@ -169,15 +177,20 @@ class World:
 def _raised_elsewhere(fault: BaseException) -> BaseException | None:
     """What a signal's handler raised in the middle of a call: a TimeoutError is a connection's, too."""
     cause: BaseException | None = fault
-    while cause is not None and not isinstance(cause, OSError):
+    while cause is not None:
+        if isinstance(cause, OSError) and _raised_in(cause) not in CALLING:
+            return cause
         cause = cause.__cause__
-    place = cause.__traceback__ if cause is not None else None
+    return None
+
+
+def _raised_in(fault: BaseException) -> str:
+    """The name of the package in which something was raised."""
+    place = fault.__traceback__
     while place is not None and place.tb_next is not None:
         place = place.tb_next
-    if place is None:
-        return None
-    package = place.tb_frame.f_globals.get("__name__", "").partition(".")[0]
-    return None if package in ("ros_calls", "socket") else cause
+    name = "" if place is None else place.tb_frame.f_globals.get("__name__", "")
+    return str(name.partition(".")[0])
 
 
 def is_running() -> bool:

@@ -1,0 +1,85 @@
+"""A world whose script's signals are handled in the middle of a call."""
+
+import signal
+import threading
+
+import pytest
+import rospy
+from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldResponse
+from ros_fakes import FakeMaster, FakeService, on_wire
+
+from lockstep_runner.simulation import world as world_module
+from lockstep_runner.simulation.world import World, WorldFailed
+from ros_calls import master as ros_master
+
+ANSWER = AdvanceWorldResponse(success=True, time_step=0.001, ticks=1)
+
+
+@pytest.fixture
+def answers():
+    """What the simulator of `world` does for one request after the other; each returns the pieces it sends."""
+    return []
+
+
+@pytest.fixture
+def world(answers):
+    master = FakeMaster()
+    service = FakeService(lambda request: answers.pop(0)(), kind=AdvanceWorld)
+    master.services[world_module.SERVICE] = service.address
+    master.nodes[world_module.NODE] = master.uri
+    with ros_master.using(master.uri):
+        made = World()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(rospy.core, "is_initialized", lambda: True)
+            assert made.look(at_once=True)
+        yield made
+        made.forget()
+    service.close()
+    master.close()
+
+
+@pytest.fixture
+def alarm(answers):
+    """Has a signal come while the next request is answered, and its handler do something."""
+    before = signal.getsignal(signal.SIGUSR1)
+
+    def ring(handler):
+        signal.signal(signal.SIGUSR1, handler)
+        answers.append(lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGUSR1))
+
+    yield ring
+    signal.signal(signal.SIGUSR1, before)
+
+
+@pytest.mark.parametrize("kind", [RuntimeError, TimeoutError, BlockingIOError, ConnectionError])
+def test_what_a_handler_raises_is_the_scripts(world, alarm, answers, kind):
+    def raises(*_):
+        raise kind("the script's own")
+
+    alarm(raises)
+    with pytest.raises(kind, match="the script's own"):
+        world.advance(1)
+    answers.append(lambda: [on_wire(ANSWER)])
+    assert world.advance(1).ticks == 1, "the next call has its own answer"
+
+
+def test_a_simulator_that_hangs_is_not_the_scripts(world, answers, monkeypatch):
+    monkeypatch.setattr(world._call, "timeout", 0.3)
+    answers.append(lambda: None)
+    with pytest.raises(WorldFailed, match=r"hangs: /gazebo/advance_world: no answer within 0.3 s"):
+        world.advance(1)
+
+
+def test_a_call_left_between_its_halves_is_given_up(world, answers, monkeypatch):
+    call = world._call
+    end = call.end
+
+    def leave():
+        monkeypatch.setattr(call, "end", end)
+        raise ValueError("of a handler")
+
+    monkeypatch.setattr(call, "end", leave)
+    answers += [lambda: [on_wire(AdvanceWorldResponse(ticks=5))], lambda: [on_wire(ANSWER)]]
+    with pytest.raises(ValueError, match="of a handler"):
+        world.advance(5)
+    assert world.advance(1).ticks == 1
