@@ -17,7 +17,7 @@ ANSWER = AdvanceWorldResponse(success=True, time_step=0.001, ticks=1)
 
 @pytest.fixture
 def answers():
-    """What the simulator of `world` does for one request after the other; each returns the pieces it sends."""
+    """What the simulator of `world` does, one for each request; each returns the pieces that it sends."""
     return []
 
 
