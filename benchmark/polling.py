@@ -22,8 +22,8 @@ from realtime import processor_time, simulator_process
 from cartpole.environment import CartPoleEnv
 from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
+from robot_envs.backends.ros.bringup.objects import Objects
 from robot_envs.backends.ros.lockstep import LockstepWorld
-from robot_envs.backends.ros.objects import Objects
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.scene import Scene
 from ros_calls.polling import SWITCH

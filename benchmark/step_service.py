@@ -24,8 +24,8 @@ from std_srvs.srv import Empty
 from cartpole.environment import CartPoleEnv
 from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
+from robot_envs.backends.ros.bringup.objects import Objects
 from robot_envs.backends.ros.lockstep import LockstepWorld
-from robot_envs.backends.ros.objects import Objects
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.scene import Scene
 from ros_utils.simulation import Simulation

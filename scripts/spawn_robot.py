@@ -8,6 +8,6 @@ from ros_calls.requirements import ALL, require
 if __name__ == "__main__":
     require(ALL)
     from cartpole.robot import ROBOT
-    from robot_envs.backends.ros.bring_up import spawn_command
+    from robot_envs.backends.ros.bringup.robots import spawn_command
 
     sys.exit(spawn_command(ROBOT, sys.argv[1:]))

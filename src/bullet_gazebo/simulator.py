@@ -4,10 +4,10 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
-from bullet_gazebo.applied_forces import AppliedForces
-from bullet_gazebo.fair_lock import FairLock
-from bullet_gazebo.holds import Holds
-from bullet_gazebo.pacing import Pacer
+from bullet_gazebo.clockwork.applied_forces import AppliedForces
+from bullet_gazebo.clockwork.fair_lock import FairLock
+from bullet_gazebo.clockwork.holds import Holds
+from bullet_gazebo.clockwork.pacing import Pacer
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose

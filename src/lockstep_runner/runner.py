@@ -18,8 +18,8 @@ from lockstep_runner.notices import Notices, tell
 from lockstep_runner.simulation.clock import NANOSECONDS, Clock
 from lockstep_runner.simulation.sleeper import Condition
 from lockstep_runner.simulation.topics import Topics
+from lockstep_runner.simulation.triggers import Triggers
 from lockstep_runner.simulation.world import NODE, NotInLockstep, World, WorldFailed, WorldGone
-from lockstep_runner.triggers import Triggers
 
 USAGE, FAILED = 2, 1  # exit codes
 OTHERS = 2.0  # [s of wall time] in which another node may come up without time passing

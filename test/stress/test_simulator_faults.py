@@ -20,7 +20,7 @@ from stress.scenario import Scenario
 from stress.worlds import World, world
 
 from cartpole.robot import ROBOT
-from robot_envs.backends.ros import bring_up
+from robot_envs.backends.ros.bringup.robots import bring_up
 from robot_envs.scene import Scene
 from ros_calls import master
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceHangs
@@ -49,7 +49,7 @@ def episode(client: StepClient, commands: list[float]) -> list[tuple[float, ...]
 def test_stopped_while_a_client_steps(scenario: Scenario, engine: str) -> None:
     """A client waits for it, or is told within its time limit; the episode is the same bits."""
     with world(engine, "lockstep:=true") as here, here.active():
-        bring_up.bring_up(Scene([ROBOT]), lambda text: None)
+        bring_up(Scene([ROBOT]), lambda text: None)
         client, hasty = StepClient(timeout=BOUND), StepClient(timeout=0.2)
 
         def case(number: int, dice: random.Random) -> None:

@@ -8,7 +8,7 @@ from stress.scenario import Case, Row, Scenario
 from stress.worlds import Usage, World, world
 
 from cartpole.robot import ROBOT
-from robot_envs.backends.ros import bring_up
+from robot_envs.backends.ros.bringup.robots import bring_up
 from robot_envs.scene import Scene
 from ros_utils.step_client import StepClient
 
@@ -39,7 +39,7 @@ def settled(scenario: Scenario, count: int, case: Case) -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_resets(scenario: Scenario, engine: str) -> None:
     with world(engine, "lockstep:=true") as here, here.active():
-        bring_up.bring_up(Scene([ROBOT]), lambda text: None)
+        bring_up(Scene([ROBOT]), lambda text: None)
         client, dice = StepClient(), scenario.dice("resets", 0)
         states: dict[int, list] = {}
 
@@ -89,7 +89,7 @@ def test_robots_with_controllers(scenario: Scenario) -> None:
     with world("ode") as here, here.active():
 
         def case(number: int, dice: random.Random) -> None:
-            bring_up.bring_up(Scene([ROBOT]), lambda text: None)
+            bring_up(Scene([ROBOT]), lambda text: None)
             answer = here.delete(ROBOT.model)
             assert answer.success, answer.status_message
 

@@ -16,13 +16,13 @@ from scenes.rover import ROVER, Push
 from scenes.two_arms import LEFT, RIGHT, Volley
 
 from robot_envs import InitialState, Pose, RobotEnv, RobotEnvError, SimulatorError
-from robot_envs.backends.ros import bring_up
+from robot_envs.backends.ros.bringup import world
 from robot_envs.testing import check_robot_env, differences, rollout
 
 
 def models():
     """What is in the simulator's world."""
-    return set(bring_up.models())
+    return set(world.models())
 
 
 class Scenes:

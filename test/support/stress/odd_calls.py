@@ -31,7 +31,7 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.ros.clients.world_client import METHOD
 from cartpole.robot import ROBOT
-from robot_envs.backends.ros import bring_up
+from robot_envs.backends.ros.bringup.robots import bring_up
 from robot_envs.scene import Scene
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceGone
 from ros_calls.xmlrpc import BadAnswer, Refused, call
@@ -153,7 +153,7 @@ def with_ticks(drawn: tuple[Any, int]) -> Any:
 def complete() -> None:
     """Brings back what an odd request has deleted, by right."""
     world = ServiceClient("/gazebo/get_world_properties", GetWorldProperties, timeout=BOUND)
-    bring_up.bring_up(Scene([ROBOT]), lambda text: None)
+    bring_up(Scene([ROBOT]), lambda text: None)
     if "box" not in world().model_names:
         pose = Pose(position=Point(2.0, 0.0, 1.0))
         spawn = ServiceClient("/gazebo/spawn_urdf_model", SpawnModel, timeout=BOUND)

@@ -5,10 +5,10 @@ import threading
 import pytest
 from robots import cartpole_urdf
 
+from bullet_gazebo.clockwork.fair_lock import FairLock
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.fair_lock import FairLock
 from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose

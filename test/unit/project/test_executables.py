@@ -13,8 +13,8 @@ pytestmark = pytest.mark.slow
 BOUND = 60.0  # [s]
 MAIN = "import sys; from bullet_gazebo.ros.{} import main; sys.exit(main())"
 PROGRAMS = {  # module: arguments, exit code after Ctrl-C
-    "clients.spawner": (["a_controller"], 0),
-    "clients.unspawner": (["a_controller"], 0),
+    "clients.controller_manager.spawner": (["a_controller"], 0),
+    "clients.controller_manager.unspawner": (["a_controller"], 0),
     "clients.spawn_model": (["-urdf", "-file", "/dev/null", "-model", "m", "-b"], 1),
     "clients.gzclient": ([], 0),
     "node.gazebo": ([], 130),

@@ -5,7 +5,7 @@ import random
 import numpy as np
 import pytest
 
-from rl_workbench.curves import moving_average
+from rl_workbench.plotting.curves import moving_average
 from web_page.series import MOST, Series
 
 

@@ -1,6 +1,6 @@
 """Helpers around the controller manager's interface, under the name that rqt's plugins import."""
 
-from bullet_gazebo.ros.clients.manager_discovery import (
+from bullet_gazebo.ros.clients.controller_manager.discovery import (
     ControllerLister,
     ControllerManagerLister,
     get_controller_managers,

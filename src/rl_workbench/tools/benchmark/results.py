@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from rl_workbench.curves import WINDOW
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.plotting.curves import WINDOW
 from rl_workbench.tools.runs.episodes import play
 from rl_workbench.tools.runs.policies import load_learned
 from rl_workbench.tools.runs.runs import (

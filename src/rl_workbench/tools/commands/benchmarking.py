@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from file_reading.content import open_text
-from rl_workbench.curves import evaluation_curves, seed_curves
 from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.plotting.curves import evaluation_curves, seed_curves
 from rl_workbench.tools.benchmark import tables
 from rl_workbench.tools.benchmark.results import RunResult, examine
 from rl_workbench.tools.benchmark.suites import (

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rl_workbench.curves import seed_curves
+from rl_workbench.plotting.curves import seed_curves
 from rl_workbench.tools.benchmark import tables
 from rl_workbench.tools.benchmark.results import RunResult, examine
 from rl_workbench.tools.commands.shared import number, write_figure

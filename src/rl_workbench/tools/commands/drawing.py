@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rl_workbench.curves import STEPS, training_curves
+from rl_workbench.plotting.curves import STEPS, training_curves
 from rl_workbench.tools.commands.shared import add_policy_flags, env_options, write_figure
 from rl_workbench.tools.pictures.panels import run_panels
 from rl_workbench.tools.pictures.policy_map import policy_map, state_plane

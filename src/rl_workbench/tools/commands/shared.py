@@ -7,7 +7,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.figure import as_png
+from rl_workbench.plotting.figure import as_png
 from rl_workbench.tools.runs.policies import RANDOM, WHICH
 from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.run_options import RunOptions

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rl_workbench.curves import Panel, SeedCurve
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.plotting.curves import Panel, SeedCurve
 from rl_workbench.tools.runs.runs import (
     Curve,
     Run,

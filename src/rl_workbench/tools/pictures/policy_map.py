@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 
 from rl_workbench.env_ids import without_module
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.figure import new_figure
+from rl_workbench.plotting.figure import new_figure
 from rl_workbench.tools.runs.episodes import episode_steps
 from rl_workbench.tools.runs.policies import LearnedPolicy
 

@@ -7,10 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
-from rl_workbench.curves import learning_curve
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.extras import replaying, watching
-from rl_workbench.figure import as_png
+from rl_workbench.plotting.curves import learning_curve
+from rl_workbench.plotting.figure import as_png
 from rl_workbench.training.environments.checked import EnvironmentFailure
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.checkpoints import candidates

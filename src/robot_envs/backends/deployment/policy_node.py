@@ -14,7 +14,8 @@ from std_msgs.msg import Float64, Float64MultiArray
 from robot_envs.backends.deployment.joint_listener import JointListener
 from robot_envs.backends.deployment.pilot import Pilot
 from robot_envs.backends.ros import node
-from robot_envs.backends.ros.bring_up import full_name, lockstep_hint
+from robot_envs.backends.ros.bringup.robots import full_name
+from robot_envs.backends.ros.bringup.world import lockstep_hint
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.task import GoalTask, Task

@@ -8,8 +8,9 @@ import genpy
 from bullet_gazebo_msgs.srv import StepWorldRequest, StepWorldResponse
 
 from bullet_gazebo.physics.pose import Pose
-from robot_envs.backends.ros.bring_up import STEP_SERVICE, full_name, ready
-from robot_envs.backends.ros.own_simulator import OwnSimulator
+from robot_envs.backends.ros.bringup.robots import full_name, ready
+from robot_envs.backends.ros.bringup.world import STEP_SERVICE
+from robot_envs.backends.ros.running_simulator import RunningSimulator
 from robot_envs.backends.ros.service import ServiceClient
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.backends.ros.variation import RosVariation
@@ -47,7 +48,7 @@ class LockstepWorld:
 
     def __init__(self, scene: Scene, ticks: int, turn: Turn, timeout: float = TIMEOUT) -> None:
         self.scene, self._turn = scene, turn
-        self._simulator = OwnSimulator()
+        self._simulator = RunningSimulator()
         self._step = ServiceClient(
             STEP_SERVICE, StepKind(), persistent=True, timeout=timeout, polls=True
         )

@@ -25,7 +25,7 @@ from bullet_gazebo.control.pid import Gains
 from bullet_gazebo.physics.description import Inertia
 from bullet_gazebo.physics.pose import IDENTITY, Vector
 from bullet_gazebo.physics.pose import Pose as Frame
-from robot_envs.backends.ros.bring_up import full_name
+from robot_envs.backends.ros.bringup.robots import full_name
 from robot_envs.backends.ros.service import ServiceClient
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene

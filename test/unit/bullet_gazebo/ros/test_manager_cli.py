@@ -2,7 +2,8 @@
 
 import pytest
 
-from bullet_gazebo.ros.clients import group_cli, manager_cli
+from bullet_gazebo.ros.clients.controller_manager import cli as manager_cli
+from bullet_gazebo.ros.clients.controller_manager import group_cli
 
 MANAGER = ["", "spin cart", "load", "unload", "start", "stop", "spawn", "sp", "kill", "kl", "list cart",
            "lc cart", "list-types x", "lt x", "--list", "reload-libraries --revert",

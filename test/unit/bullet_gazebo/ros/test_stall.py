@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 import pytest
 import rospy
 
+from bullet_gazebo.clockwork.fair_lock import FairLock
 from bullet_gazebo.control.controllers.base import Controller
-from bullet_gazebo.fair_lock import FairLock
 from bullet_gazebo.physics.description import Plugin
 from bullet_gazebo.physics.engines.registry import make_engine
 from bullet_gazebo.physics.world import World

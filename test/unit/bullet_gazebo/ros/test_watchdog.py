@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 import rospy
 
-from bullet_gazebo.fair_lock import FairLock
+from bullet_gazebo.clockwork.fair_lock import FairLock
 from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.node.watchdog import Watchdog
 

@@ -9,7 +9,10 @@ from controller_manager_msgs.msg import ControllerState
 from std_msgs.msg import Float64, Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from bullet_gazebo.ros.clients.manager_discovery import ControllerLister, ControllerManagerLister
+from bullet_gazebo.ros.clients.controller_manager.discovery import (
+    ControllerLister,
+    ControllerManagerLister,
+)
 from ros_calls.service import ServiceFailed
 from ros_calls.waiting import wait_until
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import rospkg
 
 import bullet_gazebo
-from robot_envs.backends.ros.simulator_world import world_path
+from robot_envs.backends.ros.bringup.world import world_path
 from robot_envs.backends.side_by_side import Place
 from robot_envs.description.files import Source
 from robot_envs.errors import RobotEnvError, SimulatorFault, SimulatorHangs
@@ -36,7 +36,7 @@ ONE_MORE = 15.0  # [s] for each that starts beside it
 NOT_OURS = ("ROS_HOSTNAME", "ROS_IPV6", "ROS_NAMESPACE")
 
 
-class PrivateSimulator:
+class OwnSimulator:
     """Master and simulator on loopback, moving in lock-step; they end with this process in any case.
 
     It only begins to start; `wait` waits until it can be used.
@@ -223,14 +223,14 @@ def _end_dropped(process: "subprocess.Popen[bytes]", owner: int) -> None:
 
 
 @lru_cache(maxsize=1)
-def _living() -> "weakref.WeakSet[PrivateSimulator]":
+def _living() -> "weakref.WeakSet[OwnSimulator]":
     """Those that this process has started and not ended; they end with it."""
-    living: weakref.WeakSet[PrivateSimulator] = weakref.WeakSet()
+    living: weakref.WeakSet[OwnSimulator] = weakref.WeakSet()
     atexit.register(_end_all, living)
     return living
 
 
-def _end_all(living: "weakref.WeakSet[PrivateSimulator]") -> None:
+def _end_all(living: "weakref.WeakSet[OwnSimulator]") -> None:
     those = list(living)
     for each in those:
         each.begin_end()

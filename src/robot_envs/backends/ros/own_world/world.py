@@ -11,15 +11,15 @@ from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.simulator import NANOSECONDS
 from robot_envs.backends import side_by_side
 from robot_envs.backends.backend import ticks_per_action
-from robot_envs.backends.ros.bring_up import bring_up
+from robot_envs.backends.ros.bringup.objects import Objects
+from robot_envs.backends.ros.bringup.robots import bring_up
+from robot_envs.backends.ros.bringup.world import physics_step
 from robot_envs.backends.ros.lockstep import LockstepWorld
-from robot_envs.backends.ros.objects import Objects
 from robot_envs.backends.ros.own_world import memory
 from robot_envs.backends.ros.own_world.health import checked
 from robot_envs.backends.ros.own_world.journal import Journal, merged
 from robot_envs.backends.ros.own_world.replay import repeat
-from robot_envs.backends.ros.own_world.simulator import PrivateSimulator
-from robot_envs.backends.ros.simulator_world import physics_step
+from robot_envs.backends.ros.own_world.simulator import OwnSimulator
 from robot_envs.backends.ros.turn import Turn
 from robot_envs.backends.world_files import world_models
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, SimulatorHangs
@@ -76,8 +76,8 @@ class RestartingWorld:
             self.close()
             raise
 
-    def _started(self) -> PrivateSimulator:
-        return PrivateSimulator(self._place, self.scene.robots[0].world, SEED)
+    def _started(self) -> OwnSimulator:
+        return OwnSimulator(self._place, self.scene.robots[0].world, SEED)
 
     def connect(self) -> None:
         """Waits for the simulator, brings the robots up, and has it tell what was asked for.
@@ -108,7 +108,7 @@ class RestartingWorld:
             self._world.look(self._query)
 
     @property
-    def simulator(self) -> PrivateSimulator:
+    def simulator(self) -> OwnSimulator:
         """The one that moves the robots now."""
         return self._simulator
 

@@ -12,7 +12,7 @@ from ros_calls.xmlrpc import NoAnswer, Refused
 NODE = "/gazebo"
 
 
-class OwnSimulator:
+class RunningSimulator:
     """Knows the simulator that runs when it is made; in a block of it, errors say what became of that."""
 
     def __init__(self) -> None:

@@ -19,7 +19,7 @@ from scenes.two_arms import LEFT, RIGHT, Volley
 
 from robot_envs import RobotEnv
 from robot_envs.backends.ros.own_world import memory
-from robot_envs.backends.ros.own_world.simulator import PrivateSimulator
+from robot_envs.backends.ros.own_world.simulator import OwnSimulator
 from robot_envs.backends.side_by_side import Place, side_by_side
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.testing import differences, rollout
@@ -142,9 +142,9 @@ def test_answers_that_cannot_be_are_faults(env, truth) -> None:
 def test_a_second_death_is_an_error_that_names_both_and_the_next_reset_begins_anew(
     env, truth, monkeypatch
 ) -> None:
-    wait = PrivateSimulator.wait
+    wait = OwnSimulator.wait
 
-    def die(simulator: PrivateSimulator) -> None:
+    def die(simulator: OwnSimulator) -> None:
         wait(simulator)
         os.kill(simulator.pid, signal.SIGKILL)
 
@@ -152,7 +152,7 @@ def test_a_second_death_is_an_error_that_names_both_and_the_next_reset_begins_an
     first = env.backend.simulator
     end(env, signal.SIGKILL)
     with monkeypatch.context() as patch:
-        patch.setattr(PrivateSimulator, "wait", die)
+        patch.setattr(OwnSimulator, "wait", die)
         with pytest.raises(SimulatorError) as raised:
             env.step(env.action_space.sample())
     text = str(raised.value)
@@ -166,15 +166,15 @@ def test_a_second_death_is_an_error_that_names_both_and_the_next_reset_begins_an
 
 
 def test_one_that_dies_before_its_robot_is_there_is_replaced(truth, monkeypatch, caplog) -> None:
-    wait, killed = PrivateSimulator.wait, []
+    wait, killed = OwnSimulator.wait, []
 
-    def die(simulator: PrivateSimulator) -> None:
+    def die(simulator: OwnSimulator) -> None:
         wait(simulator)
         if not killed:
             killed.append(simulator.pid)
             os.kill(simulator.pid, signal.SIGKILL)
 
-    monkeypatch.setattr(PrivateSimulator, "wait", die)
+    monkeypatch.setattr(OwnSimulator, "wait", die)
     made = own(**RICH)
     assert (
         killed
@@ -227,7 +227,7 @@ def test_where_there_is_no_memory_or_no_file_nothing_starts(monkeypatch) -> None
         with pytest.raises(
             RobotEnvError, match="^the simulator can't be started: Too many open files$"
         ):
-            PrivateSimulator(Place(), None, 0)
+            OwnSimulator(Place(), None, 0)
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, limits)
         for each in held:

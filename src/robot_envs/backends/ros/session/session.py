@@ -7,32 +7,29 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 
 import rospy
 
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
-from robot_envs.backends.ros import bring_up, node
-from robot_envs.backends.ros.bring_up import STEP_SERVICE, Say, Undo
-from robot_envs.backends.ros.objects import Objects
-from robot_envs.backends.ros.own_simulator import OwnSimulator
-from robot_envs.backends.ros.rviz import check_rviz, open_rviz
-from robot_envs.backends.ros.simulator_world import physics_step, world_path
-from robot_envs.backends.ros.turn import Turn
-from robot_envs.backends.ros.window import (
+from robot_envs.backends.ros import node
+from robot_envs.backends.ros.bringup import world
+from robot_envs.backends.ros.bringup.objects import Objects
+from robot_envs.backends.ros.bringup.robots import Say, bring_up
+from robot_envs.backends.ros.running_simulator import RunningSimulator
+from robot_envs.backends.ros.session import simulator
+from robot_envs.backends.ros.session.rviz import check_rviz, open_rviz
+from robot_envs.backends.ros.session.window import (
     is_open,
     open_window,
     show_curves,
     tell_open,
     tell_opening,
 )
+from robot_envs.backends.ros.turn import Turn
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from ros_calls.service import TIMEOUT
-from ros_utils import ros_gazebo
-
-START_TIMEOUT = 60.0  # [s] for the simulator to come up
 
 
 class RosSession:
@@ -74,10 +71,9 @@ class RosSession:
         self._rviz = rviz
         self._curves = curves
         self._undo = contextlib.ExitStack()
-        self._node = (
-            contextlib.ExitStack()
-        )  # outlives the world: a process becomes a node only once
-        self._own_simulator = False
+        # Outlives the world: a process becomes a node only once.
+        self._node = contextlib.ExitStack()
+        self._started_simulator = False
 
     def start(self, say: Say) -> None:
         """Starts what is missing, and makes this the process's session.
@@ -94,14 +90,14 @@ class RosSession:
         try:
             self._begin(say)
         except RobotEnvError as error:
-            if not self._own_simulator or _simulator_answers():
+            if not self._started_simulator or simulator.answers():
                 raise
             rospy.logwarn("%s; another simulator is started in its place", error)
             self._undo.close()
             self._begin(say)
 
     def _begin(self, say: Say) -> None:
-        self._own_simulator = False
+        self._started_simulator = False
         if rospy.core.is_initialized() and rospy.is_shutdown():
             raise RobotEnvError(
                 "this process's ROS node has ended, and a process becomes one only once; keep a "
@@ -109,24 +105,32 @@ class RosSession:
             )
         if self._rviz:
             check_rviz(self._scene.robots[0])
-        own = not _simulator_answers()
-        if own:
+        if not simulator.answers():
             say("starting the simulator")
-            self._start_simulator()
-            self._own_simulator = True
+            simulator.start(
+                self._scene.robots[0].world,
+                lockstep=not self._realtime,
+                gui=self._gui,
+                seed=self._seed,
+                undo=self._undo,
+            )
+            self._started_simulator = True
         self._join()
-        self._check_mode()
-        bring_up.check_world(self._scene.robots[0])
+        simulator.check_mode(self._realtime)
+        world.check_world(self._scene.robots[0])
         if self._curves is not None:
             self._undo.callback(show_curves(self._curves))
-        changes = bring_up.bring_up(self._scene, say)
-        self._undo_at_living_simulator([*changes, lambda: self._objects(())])
-        if self._gui and not own and is_open():
+        changes = bring_up(self._scene, say)
+        if not self._started_simulator:  # otherwise it ends with all that is in it
+            running = RunningSimulator()
+            for undo in (*changes, lambda: self._objects(())):
+                self._undo.callback(simulator.undo_there, running, undo)
+        if self._gui and not self._started_simulator and is_open():
             tell_open(say)
         elif self._gui:
-            if not own:
+            if not self._started_simulator:
                 self._undo.callback(open_window(say))
-            tell_opening(say, begun=not own)
+            tell_opening(say, begun=not self._started_simulator)
         if self._rviz:
             say("opening RViz")
             self._undo.callback(open_rviz(self._scene.robots[0]))
@@ -156,51 +160,14 @@ class RosSession:
             ValueError: if the period isn't a whole number of physics steps.
             RobotEnvError: if the simulator doesn't answer, or an object can't be spawned.
         """
-        ticks = ticks_per_action(control_period, physics_step()) if control_period else 0
+        ticks = ticks_per_action(control_period, world.physics_step()) if control_period else 0
         if self._realtime:
-            from robot_envs.backends.ros.realtime import RealtimeWorld
+            from robot_envs.backends.ros.realtime.world import RealtimeWorld
 
             return RealtimeWorld(scene, control_period, self._turn)
         from robot_envs.backends.ros.lockstep import LockstepWorld
 
         return LockstepWorld(scene, ticks, self._turn, deadline or TIMEOUT)
-
-    def _undo_at_living_simulator(self, changes: list[Undo]) -> None:
-        if self._own_simulator:  # it ends with all that is in it
-            return
-        simulator = OwnSimulator()
-        for undo in changes:
-            self._undo.callback(_at_living_simulator, simulator, undo)
-
-    def _start_simulator(self) -> None:
-        started = ros_gazebo.launch_Gazebo(
-            paused=True,
-            gui=self._gui,
-            output="log",
-            launch_new_term=False,
-            custom_world_path=world_path(self._scene.robots[0].world, self._write),
-            lockstep=not self._realtime,
-            seed=self._seed,
-            timeout=START_TIMEOUT,
-        )
-        if isinstance(started, bool):
-            raise RobotEnvError("the simulator didn't start; see the messages above")
-        simulator = OwnSimulator()
-
-        def end() -> None:
-            """One that has taken its place meanwhile is somebody else's."""
-            if started.pid is not None and simulator.is_there():
-                ros_gazebo.close_Gazebo()
-            else:
-                started.close()
-
-        self._undo.callback(end)
-
-    def _write(self, world: str) -> str:
-        with NamedTemporaryFile("w", suffix=".world", delete=False) as file:
-            file.write(world)
-        self._undo.callback(os.unlink, file.name)
-        return file.name
 
     def _join(self) -> None:
         """Becomes a node, unless the process is one; the training handles signals itself."""
@@ -209,19 +176,6 @@ class RosSession:
         node.refuse_twin(self._name)
         rospy.init_node(os.path.basename(self._name), argv=["", *self._argv], disable_signals=True)
         self._node.callback(rospy.signal_shutdown, "training ended")
-
-    def _check_mode(self) -> None:
-        lockstep = node.service_is_registered(STEP_SERVICE)
-        if self._realtime and lockstep:
-            raise RobotEnvError(
-                f"the running simulator moves in lock-step (it has {STEP_SERVICE}): its time would stand "
-                "still; train without --realtime, or start it with lockstep:=false"
-            )
-        if not self._realtime and not lockstep:
-            raise RobotEnvError(
-                f"the running simulator has no {STEP_SERVICE}: start it with lockstep:=true "
-                "(roslaunch gazebo_ros empty_world.launch takes it), or train with --realtime"
-            )
 
     def make_room(self) -> None:
         """Ends what `start()` started, all but the node: another world comes.
@@ -245,18 +199,6 @@ class RosSession:
             self._node.close()
 
 
-def _simulator_answers() -> bool:
-    """Whether there is one, at a master that is there."""
-    return node.master_is_up() and bring_up.simulator_answers()
-
-
-def _at_living_simulator(simulator: OwnSimulator, undo: Undo) -> None:
-    """Cleans up at a simulator that may have died meanwhile, or made place for another one."""
-    with contextlib.suppress(RobotEnvError, rospy.ServiceException, rospy.ROSException, OSError):
-        if simulator.is_there() and bring_up.simulator_answers():
-            undo()
-
-
 def running_session(scene: Scene, realtime: bool) -> RosSession:
     """The process's session, started if there is none; that one runs until the process ends.
 
@@ -267,7 +209,7 @@ def running_session(scene: Scene, realtime: bool) -> RosSession:
             robots is open.
     """
     for session in reversed(_started()[:]):
-        lives = bring_up.simulator_answers()
+        lives = world.simulator_answers()
         if session.serves(scene, realtime):
             if lives:
                 return session

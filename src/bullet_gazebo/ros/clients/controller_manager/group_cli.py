@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import rospy
 
-from bullet_gazebo.ros.clients import manager_interface as interface
-from bullet_gazebo.ros.clients.manager_presence import NoManager, require
+from bullet_gazebo.ros.clients.controller_manager import interface
+from bullet_gazebo.ros.clients.controller_manager.presence import NoManager, require
 
 PARAMETER = "controller_groups"
 USAGE = """\

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from robot_envs.backends.ros import bring_up
+from robot_envs.backends.ros.bringup import world
 from robot_envs.description.files import read_text
 from robot_envs.task import Object
 from ros_utils import ros_gazebo
@@ -34,10 +34,10 @@ class Objects:
         self._wanted = list(wanted)
 
     def _fill(self, wanted: Sequence[Object]) -> None:
-        there = bring_up.models() if wanted else []
+        there = world.models() if wanted else []
         for each in wanted:
             if each.name not in there:
-                bring_up.spawn(each.name, read_text(each.file), each.pose)
+                world.spawn(each.name, read_text(each.file), each.pose)
                 self._spawned.append(each.name)
 
     def _clear(self) -> None:

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import rospy
 
-from bullet_gazebo.ros.clients import manager_interface as interface
-from bullet_gazebo.ros.clients.manager_presence import NoManager, require
+from bullet_gazebo.ros.clients.controller_manager import interface
+from bullet_gazebo.ros.clients.controller_manager.presence import NoManager, require
 
 USAGE = """\
 usage: controller_manager COMMAND [NAME...]

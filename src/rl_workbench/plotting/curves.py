@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from rl_workbench.figure import new_figure
+from rl_workbench.plotting.figure import new_figure
 from rl_workbench.statistics import bands
 
 WINDOW = 20  # [episodes] of the moving average

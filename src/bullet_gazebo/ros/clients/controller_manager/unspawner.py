@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import rospy
 
-from bullet_gazebo.ros.clients.manager_client import BEST_EFFORT, ManagerClient
+from bullet_gazebo.ros.clients.controller_manager.client import BEST_EFFORT, ManagerClient
 from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
 from ros_calls.service import ServiceFailed
 

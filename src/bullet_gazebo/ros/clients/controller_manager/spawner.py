@@ -16,7 +16,7 @@ import rosparam
 import rospy
 from std_msgs.msg import Bool
 
-from bullet_gazebo.ros.clients.manager_client import STRICT, ManagerClient
+from bullet_gazebo.ros.clients.controller_manager.client import STRICT, ManagerClient
 from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
 from file_reading.content import read_file
 from file_reading.errors import FileError

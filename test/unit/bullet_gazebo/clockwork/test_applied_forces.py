@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from bullet_gazebo.applied_forces import (
+from bullet_gazebo.clockwork.applied_forces import (
     AppliedEffort,
     AppliedForces,
     AppliedWrench,

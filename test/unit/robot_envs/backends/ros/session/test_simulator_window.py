@@ -6,7 +6,7 @@ import pytest
 import rospy
 from ros_fakes import FakeMaster
 
-from robot_envs.backends.ros import window
+from robot_envs.backends.ros.session import window
 
 NODE = "/gazebo_gui"
 WHERE = "the window is the page http://127.0.0.1:8080/"

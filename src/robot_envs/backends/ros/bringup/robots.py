@@ -1,4 +1,4 @@
-"""A robot in a running simulator: its model and its controllers, brought up where missing."""
+"""Robots in a running simulator: their models and controllers, brought up where missing."""
 
 import contextlib
 import os
@@ -8,59 +8,25 @@ from typing import Any
 
 import rospy
 from controller_manager_msgs.srv import ListControllers
-from gazebo_msgs.srv import GetWorldProperties, SpawnModel
-from geometry_msgs.msg import Point, Quaternion
-from geometry_msgs.msg import Pose as PoseMsg
 
-from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.ros import node
+from robot_envs.backends.ros.bringup import world
+from robot_envs.backends.ros.bringup.world import WORLD_SERVICE, Undo
 from robot_envs.backends.ros.service import ServiceClient
-from robot_envs.backends.world_files import world_models
-from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorHangs
+from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from ros_calls import master
 from ros_calls.waiting import wait_until
 from ros_calls.xmlrpc import NoAnswer, Refused
-from ros_utils import ros_controllers, ros_gazebo
+from ros_utils import ros_controllers
 from ros_utils.readiness import NotReady, Ready
 
-WORLD_SERVICE = "/gazebo/get_world_properties"
-STEP_SERVICE = "/gazebo/step_world"  # of a simulator in lock-step
 SIMULATOR_TIMEOUT = 60.0  # [s]
 READY_TIMEOUT = 30.0  # [s] for controllers that were started to run
 # Of a robot that comes without one.
 PUBLISHER = {"type": "joint_state_controller/JointStateController", "publish_rate": 1000}
 Say = Callable[[str], None]
-Undo = Callable[[], object]
-
-
-def lockstep_hint() -> str:
-    """For who waits in vain for a simulation to go on by itself; empty where that isn't the reason."""
-    with contextlib.suppress(RobotEnvError):  # without its master nobody knows
-        if node.service_is_registered(STEP_SERVICE):
-            return (
-                f"; the simulator is in lock-step (it offers {STEP_SERVICE}) and moves by its steps alone: "
-                "start it with lockstep:=false paused:=false"
-            )
-    return ""
-
-
-def simulator_answers() -> bool:
-    """Whether a living simulator offers Gazebo's services.
-
-    Raises:
-        SimulatorHangs: if there is one that doesn't answer.
-    """
-    if not node.service_is_registered(WORLD_SERVICE):
-        return False
-    try:
-        models()
-        return True
-    except SimulatorHangs:
-        raise
-    except SimulatorError:  # registered by one that died
-        return False
 
 
 def bring_up(scene: Scene, say: Say) -> list[Undo]:
@@ -100,65 +66,15 @@ def ready(scene: Scene) -> Ready:
     return Ready(models, list(dict.fromkeys(full_name(*each) for each in wanted)))
 
 
-def check_world(robot: Robot) -> None:
-    """Makes sure that a simulator that runs has what the robot's world file brings.
-
-    Raises:
-        RobotEnvError: if it hasn't.
-    """
-    there = models()
-    missing = [name for name in world_models(robot.world) if name not in there]
-    if missing:
-        raise RobotEnvError(
-            f"the running simulator has another world than {robot.world}: there is no model "
-            f"'{missing[0]}'; end it, and one is started with that world, or start it with world_name:="
-        )
-
-
-def models() -> list[str]:
-    """Names of what is in the world.
-
-    Raises:
-        SimulatorError: if the simulator doesn't answer.
-    """
-    return ServiceClient(WORLD_SERVICE, GetWorldProperties)().model_names
-
-
 def _bring_model(robot: Robot, say: Say) -> list[Undo]:
-    if robot.model in models():
+    if robot.model in world.models():
         return []
     say(f"spawning the robot '{robot.model}'")
     # Before it comes: its drives read them. As text: packages of the user's may have the names of ours.
     for name, value in robot.parameters.items():
         _set_parameter(full_name(robot, name), value)
     _set_parameter(full_name(robot, robot.description), robot.xml)
-    return [spawn(robot.model, robot.xml, robot.pose, f"/{robot.namespace.strip('/')}")]
-
-
-def spawn(name: str, text: str, pose: Pose, namespace: str = "") -> Undo:
-    """Adds a model.
-
-    Args:
-        name: of the model.
-        text: its URDF or SDF.
-        pose: in the world.
-        namespace: of what its plugins offer.
-
-    Returns:
-        What takes it away.
-
-    Raises:
-        RobotEnvError: if it is refused.
-        SimulatorError: if the simulator doesn't answer.
-    """
-    kind = "urdf" if "<robot" in text else "sdf"
-    at = PoseMsg(Point(*pose.position), Quaternion(*pose.orientation))
-    answer = ServiceClient(f"/gazebo/spawn_{kind}_model", SpawnModel)(
-        name, text, namespace, at, "world"
-    )
-    if not answer.success:
-        raise RobotEnvError(f"'{name}' can't be spawned: {answer.status_message}")
-    return lambda: ros_gazebo.gazebo_delete_model(name)
+    return [world.spawn(robot.model, robot.xml, robot.pose, f"/{robot.namespace.strip('/')}")]
 
 
 def _bring_controllers(robot: Robot, say: Say) -> list[Undo]:
@@ -243,7 +159,7 @@ def spawn_command(robot: Robot, argv: list[str]) -> int:
 
 
 def _wait_for_simulator() -> None:
-    if not wait_until(simulator_answers, SIMULATOR_TIMEOUT, "a simulator"):
+    if not wait_until(world.simulator_answers, SIMULATOR_TIMEOUT, "a simulator"):
         raise RobotEnvError(
             f"no simulator offered {WORLD_SERVICE} within {SIMULATOR_TIMEOUT:g} s; "
             "start one with roslaunch gazebo_ros empty_world.launch"

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from rl_workbench.curves import (
+from rl_workbench.plotting.curves import (
     Panel,
     SeedCurve,
     evaluation_curves,
@@ -17,7 +17,7 @@ from rl_workbench.curves import (
     seed_curves,
     training_curves,
 )
-from rl_workbench.figure import as_png
+from rl_workbench.plotting.figure import as_png
 
 
 def seed(positions: list[float], values: list[float], complete: bool = True) -> SeedCurve:

@@ -6,7 +6,7 @@ import pytest
 import rospy
 from ros_fakes import FakeMaster
 
-from robot_envs.backends.ros.own_simulator import OwnSimulator
+from robot_envs.backends.ros.running_simulator import RunningSimulator
 from robot_envs.errors import SimulatorError, SimulatorHangs
 
 
@@ -33,7 +33,7 @@ def fail(simulator, error):
 
 
 def test_one_that_is_there_changes_no_error(master) -> None:
-    own = OwnSimulator()
+    own = RunningSimulator()
     assert own.is_there()
     for error in (
         SimulatorHangs("no answer"),
@@ -47,7 +47,7 @@ def test_one_that_is_there_changes_no_error(master) -> None:
 
 
 def test_one_that_ended_changes_no_error(master) -> None:
-    own = OwnSimulator()
+    own = RunningSimulator()
     with socket.socket() as reserved:  # bound only: connections are refused
         reserved.bind(("127.0.0.1", 0))
         for address in (
@@ -62,7 +62,7 @@ def test_one_that_ended_changes_no_error(master) -> None:
 
 
 def test_another_one_in_its_place_is_told(master, another) -> None:
-    own = OwnSimulator()
+    own = RunningSimulator()
     master.nodes["/gazebo"] = another
     assert not own.is_there()
     with pytest.raises(
@@ -75,7 +75,7 @@ def test_another_one_in_its_place_is_told(master, another) -> None:
     "error", [rospy.ROSException("publish() to a closed topic"), SimulatorError("x")]
 )
 def test_so_is_the_end_of_ones_own_node(master, monkeypatch, error) -> None:
-    own = OwnSimulator()
+    own = RunningSimulator()
     monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
     with pytest.raises(
         SimulatorError, match="this process's ROS node .* was shut down from outside"

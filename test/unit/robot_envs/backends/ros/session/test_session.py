@@ -1,13 +1,15 @@
 """What a session does where its simulator dies while robots are brought up."""
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from types import SimpleNamespace
 
 import pytest
 import rospy
 
-from robot_envs.backends.ros import bring_up, node, session
-from robot_envs.backends.ros.session import RosSession
+from robot_envs.backends.ros import node
+from robot_envs.backends.ros.bringup import world
+from robot_envs.backends.ros.session import RosSession, session, simulator
 from robot_envs.errors import RobotEnvError, SimulatorFault
 
 BROKE = SimulatorFault("/gazebo/spawn_urdf_model: the connection broke; its node has ended")
@@ -24,9 +26,9 @@ class Simulators:
     def __init__(self, deaths: int, running: bool = False) -> None:
         self.deaths, self.is_there, self.started, self.ended = deaths, running, 0, 0
 
-    def start(self, its_session: RosSession) -> None:
+    def start(self, *_: object, undo: ExitStack, **__: object) -> None:
         self.is_there, self.started = True, self.started + 1
-        its_session._undo.callback(self.end)
+        undo.callback(self.end)
 
     def end(self) -> None:
         self.is_there, self.ended = False, self.ended + 1
@@ -41,19 +43,18 @@ class Simulators:
 @pytest.fixture
 def session_with(monkeypatch) -> Callable[[Simulators], RosSession]:
     def made(simulators: Simulators) -> RosSession:
-        def begin(its_session: RosSession) -> None:
-            simulators.start(its_session)
-
         monkeypatch.setattr(rospy.core, "is_initialized", lambda: False)
         monkeypatch.setattr(node, "master_is_up", lambda: simulators.is_there)
-        monkeypatch.setattr(bring_up, "simulator_answers", lambda: simulators.is_there)
-        monkeypatch.setattr(bring_up, "check_world", lambda robot: None)
-        monkeypatch.setattr(bring_up, "bring_up", simulators.bring_up)
+        monkeypatch.setattr(world, "simulator_answers", lambda: simulators.is_there)
+        monkeypatch.setattr(world, "check_world", lambda robot: None)
+        monkeypatch.setattr(session, "bring_up", simulators.bring_up)
         monkeypatch.setattr(session, "Scene", lambda robots: SimpleNamespace(robots=robots))
-        monkeypatch.setattr(RosSession, "_start_simulator", begin)
+        monkeypatch.setattr(simulator, "start", simulators.start)
         monkeypatch.setattr(RosSession, "_join", lambda self: None)
-        monkeypatch.setattr(RosSession, "_check_mode", lambda self: None)
-        return RosSession([object()], "/a", [], realtime=False, gui=False, seed=0)
+        monkeypatch.setattr(simulator, "check_mode", lambda realtime: None)
+        return RosSession(
+            [SimpleNamespace(world=None)], "/a", [], realtime=False, gui=False, seed=0
+        )
 
     return made
 
@@ -89,7 +90,7 @@ def test_what_a_living_one_refuses_is_refused(session_with, monkeypatch) -> None
     def refuse(*_: object) -> None:
         raise RobotEnvError("'cart' can't be spawned")
 
-    monkeypatch.setattr(bring_up, "bring_up", refuse)
+    monkeypatch.setattr(session, "bring_up", refuse)
     with pytest.raises(RobotEnvError, match="can't be spawned"):
         its_session.start(lambda text: None)
     assert simulators.started == 1
