@@ -21,6 +21,7 @@ from rl_workbench.training.cluster.nodes import Cluster
 from rl_workbench.training.options.training_options import TrainingOptions, choose
 from rl_workbench.training.pg.algorithm import make_agent
 from rl_workbench.training.pg.remote import EpisodePlayer, Played
+from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.algorithm import environments_elsewhere
 from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.training import Training
@@ -166,7 +167,8 @@ def run_jobs(machines: Callable[[Path], Machines], count: int) -> tuple[float, f
             for seed in range(count)
         ]
         began, own = time.perf_counter(), time.process_time()
-        Runner(machines(folder)).run(wanted, Interrupt())
+        with run_folder.held(folder):  # nodes look whether they are told of the lock
+            Runner(machines(folder)).run(wanted, Interrupt())
         seconds = time.perf_counter() - began
         own = time.process_time() - own
         assert all(job.is_done() for job in wanted), wanted[0].log.read_text()
