@@ -14,6 +14,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.sweep.ranges import Range
 
 JOURNAL, NAME = "study.journal", "sweep"
+JUDGED = b'"completed_rung_'  # in a line of the journal
 PRUNERS = ("median", "hyperband", "none")
 
 
@@ -42,12 +43,16 @@ class Trial:
     Args:
         trial: Optuna's.
         ranges: what is chosen from; what was chosen before a kill stays.
+        seed: of the search.
     """
 
-    def __init__(self, trial: Any, ranges: dict[str, Range]) -> None:
+    def __init__(self, trial: Any, ranges: dict[str, Range], seed: int) -> None:
         self._trial = trial
         self.number: int = trial.number
-        self.values = {name: each.suggest(trial, name) for name, each in ranges.items()}
+        self.values: dict[str, Any] = {}
+        for index, (name, each) in enumerate(ranges.items()):
+            trial.study.sampler = _sampler(seed, self.number, index)
+            self.values[name] = each.suggest(trial, name)
         known = trial.storage.get_trial(trial._trial_id).intermediate_values
         self._steps = set(known)
         self.falls_behind: bool = bool(known) and trial.should_prune()
@@ -126,24 +131,14 @@ class Study:
         from optuna.trial import Trial as Optunas
 
         left = self._study.get_trials(deepcopy=False, states=[self._states.RUNNING])
-        return [self._trial(Optunas(self._study, each._trial_id), each.number) for each in left]
+        return [self._trial(Optunas(self._study, each._trial_id)) for each in left]
 
     def next(self) -> Trial:
         """A new one, by all that are known to have come to an end."""
-        number = len(self)
-        self._draw_for(number)
-        return Trial(self._study.ask(), self._ranges)
+        return self._trial(self._study.ask())
 
-    def _trial(self, trial: Any, number: int) -> Trial:
-        self._draw_for(number)  # one that was killed before it had all of its options
-        return Trial(trial, self._ranges)
-
-    def _draw_for(self, number: int) -> None:
-        """Each trial has draws of its own: a search that goes on tries what it would have tried."""
-        from optuna.samplers import TPESampler
-
-        (own,) = np.random.SeedSequence((self._seed, number)).generate_state(1)
-        self._study.sampler = TPESampler(seed=int(own))
+    def _trial(self, trial: Any) -> Trial:
+        return Trial(trial, self._ranges, self._seed)
 
     def complete(self, trial: Trial, score: float) -> None:
         """It came to its end."""
@@ -181,15 +176,27 @@ class Study:
         return trial.number, self._study.best_value, dict(trial.params)
 
 
+def _sampler(seed: int, trial: int, option: int) -> Any:
+    """Each option of each trial has draws of its own, so a search that goes on draws what it would have drawn."""
+    from optuna.samplers import TPESampler
+
+    (own,) = np.random.SeedSequence((seed, trial, option)).generate_state(1)
+    return TPESampler(seed=int(own))
+
+
 def _cut(path: Path) -> None:
-    """Takes away the end of a line that a kill has cut off."""
+    """Takes away what a kill has left half done: the end of a line, a judgement, and the lock of who wrote."""
     try:
-        content = path.read_bytes()
-        whole = content.rfind(b"\n") + 1
-        if whole < len(content):
-            if content[whole : whole + 1] != b"{":
-                raise WorkbenchError(f"{path} isn't a study that can be used")
-            os.truncate(path, whole)
+        path.with_name(f"{path.name}.lock").unlink(missing_ok=True)
+        *lines, end = path.read_bytes().splitlines(keepends=True) or [b""]
+        if end.endswith(b"\n"):
+            lines.append(end)
+        elif end and not end.startswith(b"{"):
+            raise WorkbenchError(f"{path} isn't a study that can be used")
+        # Hyperband notes whom it has judged, and judges nobody twice; the verdict is another line.
+        while lines and JUDGED in lines[-1]:
+            lines.pop()
+        os.truncate(path, sum(map(len, lines)))
     except FileNotFoundError:
         pass
     except OSError as error:

@@ -216,6 +216,28 @@ def test_a_search_that_is_killed_again_and_again_comes_to_the_same(tmp_path: Pat
     assert trials(tmp_path / "killed") == trials(tmp_path / "one")
 
 
+@pytest.mark.parametrize("pruner", ["median", "hyperband"])
+def test_a_kill_between_any_two_lines_of_the_journal_changes_nothing(tmp_path: Path, pruner: str) -> None:
+    """Optuna's first ten trials are random, later ones learn from what was found."""
+    search(tmp_path / "one", 12, pruner=pruner)
+    lines = (tmp_path / "one/study.journal").read_bytes().splitlines(keepends=True)
+    for count in range(len(lines)):
+        folder = tmp_path / str(count)
+        folder.mkdir()
+        (folder / "study.journal").write_bytes(b"".join(lines[:count]))
+        search(folder, 12, pruner=pruner)
+        assert trials(folder) == trials(tmp_path / "one")
+        assert (folder / "best.yaml").read_bytes() == (tmp_path / "one/best.yaml").read_bytes()
+
+
+def test_nobody_waits_for_one_who_was_killed_while_he_wrote(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "study.journal.lock").symlink_to("study.journal")
+    monkeypatch.setattr("optuna.storages.journal._file.time.sleep", lambda seconds: pytest.fail())
+    search(tmp_path, 1)
+
+
 def test_a_training_that_is_lost_is_tried_again_before_the_next_trial_is_made(
     tmp_path: Path,
 ) -> None:
