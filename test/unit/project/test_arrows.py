@@ -42,9 +42,9 @@ ALLOWED = {
 # A folder, and what nothing in it may import beside that.
 FORBIDDEN = [
     ("bullet_gazebo/physics", ("bullet_gazebo.control", "bullet_gazebo.ros", "bullet_gazebo.simulator",
-                               "bullet_gazebo.clockwork")),
+                               "bullet_gazebo.timing")),
     ("bullet_gazebo/control", ("bullet_gazebo.physics", "bullet_gazebo.ros", "bullet_gazebo.simulator",
-                               "bullet_gazebo.clockwork", "pybullet")),
+                               "bullet_gazebo.timing", "pybullet")),
     ("bullet_gazebo", ("gymnasium", "torch")),
     ("ros_utils", ("pybullet", "torch")),
     ("robot_envs", ("bullet_gazebo.ros", "torch")),

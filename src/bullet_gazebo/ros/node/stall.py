@@ -7,10 +7,10 @@ import traceback
 from collections.abc import Callable, Iterator
 from types import FrameType
 
-from bullet_gazebo.clockwork.fair_lock import FairLock
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.ros.plugins import PluginContext
 from bullet_gazebo.simulator import Simulator
+from bullet_gazebo.timing.fair_lock import FairLock
 
 PATIENCE = 10.0  # [s of wall time]
 LONGEST_LOOK = (

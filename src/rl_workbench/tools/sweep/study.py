@@ -177,7 +177,7 @@ class Study:
 
 
 def _sampler(seed: int, trial: int, option: int) -> Any:
-    """Each option of each trial has draws of its own, so a search that goes on draws what it would have drawn."""
+    """Each option of each trial has draws of its own: a search that goes on draws what it would have."""
     from optuna.samplers import TPESampler
 
     (own,) = np.random.SeedSequence((seed, trial, option)).generate_state(1)
@@ -185,7 +185,7 @@ def _sampler(seed: int, trial: int, option: int) -> Any:
 
 
 def _cut(path: Path) -> None:
-    """Takes away what a kill has left half done: the end of a line, a judgement, and the lock of who wrote."""
+    """Takes away what a kill has left half done: the end of a line, a judgement, the lock of who wrote."""
     try:
         path.with_name(f"{path.name}.lock").unlink(missing_ok=True)
         *lines, end = path.read_bytes().splitlines(keepends=True) or [b""]

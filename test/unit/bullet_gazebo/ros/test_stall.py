@@ -12,7 +12,6 @@ from xml.etree import ElementTree
 import pytest
 import rospy
 
-from bullet_gazebo.clockwork.fair_lock import FairLock
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.physics.description import Plugin
 from bullet_gazebo.physics.engines.registry import make_engine
@@ -22,6 +21,7 @@ from bullet_gazebo.ros.node.stall import StallWatch
 from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.plugins import PluginContext
 from bullet_gazebo.simulator import Simulator
+from bullet_gazebo.timing.fair_lock import FairLock
 
 BOUND = 60.0  # [s]
 

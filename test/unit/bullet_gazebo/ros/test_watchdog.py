@@ -10,9 +10,9 @@ from types import SimpleNamespace
 import pytest
 import rospy
 
-from bullet_gazebo.clockwork.fair_lock import FairLock
 from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.node.watchdog import Watchdog
+from bullet_gazebo.timing.fair_lock import FairLock
 
 BOUND = 60.0  # [s]
 

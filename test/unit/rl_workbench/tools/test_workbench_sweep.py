@@ -217,7 +217,9 @@ def test_a_search_that_is_killed_again_and_again_comes_to_the_same(tmp_path: Pat
 
 
 @pytest.mark.parametrize("pruner", ["median", "hyperband"])
-def test_a_kill_between_any_two_lines_of_the_journal_changes_nothing(tmp_path: Path, pruner: str) -> None:
+def test_a_kill_between_any_two_lines_of_the_journal_changes_nothing(
+    tmp_path: Path, pruner: str
+) -> None:
     """Optuna's first ten trials are random, later ones learn from what was found."""
     search(tmp_path / "one", 12, pruner=pruner)
     lines = (tmp_path / "one/study.journal").read_bytes().splitlines(keepends=True)

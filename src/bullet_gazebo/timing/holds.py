@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from bullet_gazebo.clockwork.fair_lock import FairLock
+from bullet_gazebo.timing.fair_lock import FairLock
 
 POLL = 0.2  # [s]
 

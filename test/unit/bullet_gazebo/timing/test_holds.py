@@ -4,8 +4,8 @@ import threading
 
 import pytest
 
-from bullet_gazebo.clockwork.fair_lock import FairLock
-from bullet_gazebo.clockwork.holds import Holds
+from bullet_gazebo.timing.fair_lock import FairLock
+from bullet_gazebo.timing.holds import Holds
 
 
 @pytest.fixture

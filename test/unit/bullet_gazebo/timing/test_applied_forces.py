@@ -8,14 +8,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from bullet_gazebo.clockwork.applied_forces import (
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.timing.applied_forces import (
     AppliedEffort,
     AppliedForces,
     AppliedWrench,
     Interval,
     in_world,
 )
-from bullet_gazebo.physics.pose import Pose
 
 TICK = 1_000_000  # [ns]
 NOTHING = (0.0, 0.0, 0.0)
