@@ -5,7 +5,9 @@ import io
 import socket
 import struct
 import threading
+import time
 from functools import partial
+from pathlib import Path
 from xmlrpc.server import SimpleXMLRPCServer
 
 import rosgraph
@@ -58,7 +60,10 @@ class FakeMaster:
 
 
 class FakeService:
-    """Of any `kind`; `answer(request)` gives the pieces that are sent, or None to say nothing."""
+    """Of any `kind`; `answer(request)` gives the pieces that are sent, or None to say nothing.
+
+    A piece is sent once the one before was read, so that they arrive apart.
+    """
 
     def __init__(self, answer=None, header=None, kind=SetBool):
         self._answer = answer or (lambda request: [ok(request.data)])
@@ -92,7 +97,12 @@ class FakeService:
                 request = self._kind._request_class()
                 request.deserialize(data)
                 for piece in self._answer(request) or ():
+                    self._await_read(connection)
                     connection.sendall(piece)
+
+    def _await_read(self, connection):
+        while not (_is_read(connection) or self.over.is_set()):
+            time.sleep(0.001)
 
     def break_off(self):
         """Ends all connections, as a node does that ends."""
@@ -107,6 +117,18 @@ class FakeService:
             self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
         self.break_off()
+
+
+def _is_read(connection):
+    """Whether the client has taken all that was sent: no kernel holds anything of it."""
+    here, there = connection.getsockname()[1], connection.getpeername()[1]
+    queues = {}  # by the ports of either side: what waits to be sent, and to be read
+    for line in Path("/proc/net/tcp").read_text().splitlines()[1:]:
+        _, local, remote, _, waiting, *_ = line.split()
+        ports = int(local.split(":")[1], 16), int(remote.split(":")[1], 16)
+        queues[ports] = tuple(int(each, 16) for each in waiting.split(":"))
+    sent, read = queues.get((here, there), (0, 0)), queues.get((there, here), (0, 0))
+    return sent[0] == read[1] == 0
 
 
 def ok(success, message=""):

@@ -2,38 +2,26 @@
 
 import atexit
 import contextlib
-import io
 import os
-import secrets
 import select
-import signal
 import subprocess
-import sys
 import time
 import weakref
 from functools import lru_cache
-from pathlib import Path
 
-import rospkg
-
-import bullet_gazebo
 from robot_envs.backends.ros.bringup.world import world_path
+from robot_envs.backends.ros.own_world import keeper_process
 from robot_envs.backends.side_by_side import Place
 from robot_envs.description.files import Source
 from robot_envs.errors import RobotEnvError, SimulatorFault, SimulatorHangs
 from ros_calls import master
 from ros_calls.waiting import POLL, service_answers
 
-KEEPER = Path(__file__).with_name("keeper.py")
-OURS = Path(bullet_gazebo.__file__).parents[1]
-LOOPBACK = "127.0.0.1"
 ANSWERING = "/gazebo/pause_physics"  # the last thing that a client needs before it can begin
 FALLING = 2.0  # [s] for a keeper to notice that its simulator has died
 ENDING = 10.0  # [s] for all processes to end that were asked to
 STARTING = 60.0  # [s] for one simulator to come up
 ONE_MORE = 15.0  # [s] for each that starts beside it
-# Of the client, which would have processes of ours look for it elsewhere, or be another name.
-NOT_OURS = ("ROS_HOSTNAME", "ROS_IPV6", "ROS_NAMESPACE")
 
 
 class OwnSimulator:
@@ -55,7 +43,7 @@ class OwnSimulator:
         self.uri = ""  # the master's address, once it is known
         self.pid: int | None = None  # the simulator's process
         self._owner = os.getpid()
-        folder = _log_folder()
+        folder = keeper_process.log_folder()
         self.log = folder / "simulator.log"
         arguments = ["-u", "--lockstep", "--seed", str(seed), "__name:=gazebo",
                      f"__log:={folder / 'node.log'}", "_pub_clock_frequency:=100"]  # fmt: skip
@@ -67,7 +55,9 @@ class OwnSimulator:
 
         try:
             path = world_path(world, write)
-            self._process, self._report = _spawned([*arguments, *filter(None, [path])], self.log)
+            self._process, self._report = keeper_process.spawned(
+                [*arguments, *filter(None, [path])], self.log
+            )
         except OSError as error:
             raise RobotEnvError(f"{place} can't be started: {error.strerror}") from error
         self._begun = time.monotonic()
@@ -149,14 +139,14 @@ class OwnSimulator:
         """
         try:
             self._process.wait(0.0 if hangs else FALLING)
-            how = f"{_told(self._process.returncode)}, "
+            how = f"{keeper_process.end_of(self._process.returncode)}, "
         except subprocess.TimeoutExpired:
             how = ""
         self._bury()
         return f"{how}{self._last_line()}"
 
     def _bury(self) -> None:
-        _kill(self._process)
+        keeper_process.kill(self._process)
         self._dropped.detach()
         _living().discard(self)
         self._report.close()
@@ -177,49 +167,10 @@ class OwnSimulator:
         return f"{said} (log: {self.log})"
 
 
-def _spawned(arguments: list[str], path: Path) -> "tuple[subprocess.Popen[bytes], io.FileIO]":
-    """Starts a keeper, whose output goes to a file; returns what it reports to, too."""
-    with contextlib.ExitStack() as stack:
-        log = stack.enter_context(path.open("wb"))
-        reading, telling = os.pipe()
-        stack.callback(os.close, telling)
-        report = io.FileIO(reading)
-        try:
-            process = subprocess.Popen(
-                [sys.executable, "-P", str(KEEPER), str(os.getpid()), str(telling), *arguments],
-                stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=_environment(path.parent),
-                pass_fds=(telling,), start_new_session=True,
-            )  # fmt: skip
-        except BaseException:
-            report.close()
-            raise
-        return process, report
-
-
-def _told(code: int) -> str:
-    """How a keeper's end is to be read."""
-    number = code - 128 if code > 128 else -code
-    if number <= 0:
-        return f"it ended with exit code {code}"
-    with contextlib.suppress(ValueError):
-        name = signal.Signals(number).name
-        more = ", as the kernel does where memory runs out" if name == "SIGKILL" else ""
-        return f"it was ended by {name}{more}"
-    return f"it ended with exit code {code}"
-
-
-def _kill(process: "subprocess.Popen[bytes]") -> None:
-    """Ends a keeper and all of its session."""
-    if process.poll() is None:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-
-
-def _end_dropped(process: "subprocess.Popen[bytes]", owner: int) -> None:
+def _end_dropped(keeper: "subprocess.Popen[bytes]", owner: int) -> None:
     """Ends one that nobody has any more, and that wasn't closed."""
     if os.getpid() == owner:
-        _kill(process)
+        keeper_process.kill(keeper)
 
 
 @lru_cache(maxsize=1)
@@ -236,34 +187,3 @@ def _end_all(living: "weakref.WeakSet[OwnSimulator]") -> None:
         each.begin_end()
     for each in those:
         each.end()
-
-
-def _log_folder() -> Path:
-    """A new folder for the logs of one simulator.
-
-    Raises:
-        RobotEnvError: if there can't be one.
-    """
-    folder = Path(rospkg.get_log_dir(), "robot_envs", f"{os.getpid()}-{secrets.token_hex(4)}")
-    try:
-        folder.mkdir(parents=True)
-    except OSError as error:
-        raise RobotEnvError(
-            f"{folder}: {error.strerror}: set ROS_LOG_DIR to a folder that can be written"
-        ) from error
-    return folder
-
-
-def _environment(folder: Path) -> dict[str, str]:
-    """Ours, with our Python and this library, for a master and a node on loopback.
-
-    What else this process imports from isn't theirs: catkin's packages add to it as they are imported.
-    """
-    kept = {name: value for name, value in os.environ.items() if name not in NOT_OURS}
-    return kept | {
-        "PATH": os.pathsep.join([os.path.dirname(sys.executable), kept.get("PATH", os.defpath)]),
-        "PYTHONPATH": os.pathsep.join(filter(None, [kept.get("PYTHONPATH"), str(OURS)])),
-        "PYTHONUNBUFFERED": "1",
-        "ROS_IP": LOOPBACK,
-        "ROS_LOG_DIR": str(folder),
-    }
