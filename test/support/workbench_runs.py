@@ -6,8 +6,13 @@ from pathlib import Path
 import training_runs
 from training_runs import train
 
+from rl_workbench.tools.benchmark.suites import make_variant, training_flags
+from rl_workbench.tools.jobs.job import Job
+
 PPO = {"env_id": "CartPole-v1", "n_steps": 64, "batch_size": 64, "total_timesteps": 256,
        "eval_frequency": 128, "eval_episodes": 2}  # fmt: skip
+QUICK = {"total_timesteps": 300, "learning_starts": 50, "batch_size": 8, "hidden_sizes": [8],
+         "eval_frequency": 150, "eval_episodes": 1, "confirm_episodes": 1}  # fmt: skip
 
 
 def dqn(folder: Path, **changed: object) -> Path:
@@ -35,3 +40,9 @@ def record(folder: Path, returns: list[float], **run: object) -> Path:
     rows += [f"{10 * i + 10},charts/episodic_return,{value},0" for i, value in enumerate(returns)]
     (folder / "scalars.csv").write_text("\n".join(rows) + "\n")
     return folder
+
+
+def job(folder: Path, seed: int = 0, **options: object) -> Job:
+    """A quick training of DQN, as a benchmark begins it."""
+    variant = make_variant("test", "quick", {**QUICK, **options})
+    return Job(f"quick, seed {seed}", folder / f"seed_{seed}", tuple(training_flags(variant, seed)))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 import workbench_runs
-from training_runs import assert_same_run
+from workbench_runs import QUICK, job
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
@@ -23,25 +23,16 @@ from rl_workbench.tools.benchmark.suites import (
     default_file,
     make_variant,
     read_suite,
-    training_flags,
 )
-from rl_workbench.tools.benchmark.tables import RESULTS_SUMMARY, grouped, summary_table
 from rl_workbench.tools.commands import benchmarking
-from rl_workbench.tools.jobs import machines, runner
+from rl_workbench.tools.jobs import machines
 from rl_workbench.tools.jobs.job import Job, command
-from rl_workbench.tools.jobs.machines import ThisMachine
-from rl_workbench.tools.jobs.runner import Runner, Watch
-from rl_workbench.tools.jobs.states import steps_of
-from rl_workbench.tools.runs.runs import cost_file, cost_of, open_run
+from rl_workbench.tools.runs.runs import cost_file, open_run
 from rl_workbench.training.cli import PROGRAM
 from rl_workbench.training.run import folder as run_folder
-from rl_workbench.training.run.interrupt import Interrupt
 
 pytestmark = pytest.mark.usefixtures("signals")
 
-QUICK = {"total_timesteps": 300, "learning_starts": 50, "batch_size": 8, "hidden_sizes": [8],
-         "eval_frequency": 150, "eval_episodes": 1, "confirm_episodes": 1}  # fmt: skip
-LONGER = {"total_timesteps": 3000, "checkpoint_frequency": 100}
 SUITE = """
 two:
   about: Two ways.
@@ -59,11 +50,6 @@ def suites(tmp_path: Path) -> Path:
     path = tmp_path / "suites.yaml"
     path.write_text(SUITE)
     return path
-
-
-def job(folder: Path, seed: int = 0, **options: object) -> Job:
-    variant = make_variant("test", "quick", {**QUICK, **options})
-    return Job(f"quick, seed {seed}", folder / f"seed_{seed}", tuple(training_flags(variant, seed)))
 
 
 def examined(one: Job) -> RunResult:
@@ -241,40 +227,6 @@ def test_pauses_are_no_part_of_the_seconds_to_solve(tmp_path: Path) -> None:
     assert examined(one).solved_step == 400
 
 
-def row(seed: int, score: float | None, step: int | None, fault: str = "") -> RunResult:
-    return RunResult(
-        "a", seed, "run", score, final=score, evaluations=score, solved_step=step, seconds=1.0,
-        fault=fault,
-    )  # fmt: skip
-
-
-def summarised(rows: list[RunResult], line: float | None) -> str:
-    return summary_table(grouped(rows), RESULTS_SUMMARY, {"a": line}).splitlines()[2]
-
-
-def test_seeds_that_never_solve_count_as_never() -> None:
-    rows = [row(0, 475.0, 100), row(1, 500.0, 300), row(2, 20.0, None)]
-    line = summarised(rows, 475.0)
-    assert "| a | 2 of 3 |" in line and "| 300 | never |" in line
-
-
-def test_a_statistic_tells_how_many_seeds_it_lacks() -> None:
-    rows = [row(0, 480.0, 100), row(1, 500.0, 300), row(2, None, None, "the loss is nan")]
-    cells = summarised(rows, 475.0).split(" | ")
-    assert cells[1] == "2 of 3, 1 failed" and cells[2] == "490.0 ± 14.1 (2 of 3)"
-    assert all(cell.endswith(" (2 of 3)") for cell in cells[3:6])
-
-
-def test_where_there_is_no_line_nobody_has_missed_it() -> None:
-    line = summarised([row(0, 5.0, None), row(1, 6.0, None)], None)
-    assert "never" not in line and line.startswith("| a | - |")
-
-
-def test_a_variant_without_any_run_has_a_line_of_its_own() -> None:
-    line = summarised([RunResult("a", 0, "run", fault="no run folder")], None)
-    assert line == "| a | 0 of 1, 1 failed | - | - | - | - | - | - |"
-
-
 def complete(out: Path) -> list[str]:
     """A benchmark whose only training is done; the command that goes on with it."""
     run = out / "dqn__CartPole-v1/seed_0"
@@ -311,55 +263,6 @@ def test_two_benchmarks_do_not_share_a_folder(
     assert f"another benchmark is running in {tmp_path}" in capsys.readouterr().err
 
 
-class Told(Watch):
-    """What a runner tells of its jobs."""
-
-    def __init__(self) -> None:
-        self.losses: list[str] = []
-        self.endings: dict[str, str] = {}
-
-    def lost(self, job: Job, reason: str) -> None:
-        self.losses.append(reason)
-
-    def ended(self, job: Job, failure: str) -> None:
-        self.endings[job.name] = failure
-
-
-def run(jobs: list[Job], at_once: int = 1, interrupt: Interrupt | None = None) -> Told:
-    told = Told()
-    Runner(ThisMachine(at_once, PROGRAM), told).run(jobs, interrupt or Interrupt())
-    return told
-
-
-def test_a_training_that_outlived_its_benchmark_is_left_alone(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(runner, "MOST_LOST", 2)
-    one = job(tmp_path)
-    one.folder.mkdir()
-    with run_folder.held(one.folder):
-        told = run([one])
-    assert told.losses == [f"a training is running in {one.folder}"]
-    assert "given up after 2 attempts" in told.endings[one.name]
-    assert one.folder.exists() and not one.log.exists()
-
-
-@pytest.mark.slow
-def test_a_training_that_is_killed_goes_on_to_the_same_bits(tmp_path: Path) -> None:
-    killed, other = job(tmp_path / "a", **LONGER), job(tmp_path / "b", **LONGER)
-    machine = ThisMachine(1, PROGRAM)
-
-    class Killing(Told):
-        def progressed(self, job: Job, node: str) -> None:
-            if job is killed and not self.losses and steps_of(job.folder)[0] >= 300:
-                os.kill(machine._running[job]._process.pid, signal.SIGKILL)
-
-    told = Killing()
-    Runner(machine, told).run([killed, other], Interrupt())
-    assert told.losses == ["its process was killed"]
-    assert told.endings == {killed.name: "", other.name: ""}
-    assert len(cost_of(killed.folder)["spans"]) == 2
-    assert_same_run(killed.folder, other.folder)
-
-
 def test_a_damaged_record_costs_no_other_run_its_row(tmp_path: Path) -> None:
     command = complete(tmp_path)
     workbench_runs.record(tmp_path / "dqn__CartPole-v1/seed_1", [20.0] * 30)
@@ -368,40 +271,3 @@ def test_a_damaged_record_costs_no_other_run_its_row(tmp_path: Path) -> None:
     assert cli.main([*command, "--seeds=2"]) == 0
     text = (tmp_path / "results.md").read_text()
     assert "isn't JSON" in text and "0 of 2, 2 failed" in text
-
-
-def test_every_training_has_a_master_of_its_own(tmp_path: Path, monkeypatch) -> None:
-    program = "import os; print(os.environ['ROS_MASTER_URI'])"
-    monkeypatch.setattr(machines, "command", lambda *_: [sys.executable, "-c", program])
-    jobs = [job(tmp_path, seed) for seed in range(2)]
-    told = run(jobs, 2)
-    masters = {one.log.read_text().strip() for one in jobs}
-    assert len(masters) == 2 and all(each.startswith("http://127.0.0.1:") for each in masters)
-    assert all("ended with exit code 0" in told.endings[one.name] for one in jobs), (
-        "it left nothing"
-    )
-
-
-def test_no_further_job_begins_after_ctrl_c(tmp_path: Path, monkeypatch) -> None:
-    interrupt, genuine = Interrupt(), ThisMachine.wait
-
-    def waited(*arguments: object) -> object:
-        result = genuine(*arguments)
-        interrupt.signal = signal.SIGINT
-        return result
-
-    monkeypatch.setattr(machines, "command", lambda *_: ["sleep", "1000"])
-    monkeypatch.setattr(ThisMachine, "wait", waited)
-    one, other = (job(tmp_path, seed) for seed in range(2))
-    run([one, other], 1, interrupt)
-    assert cost_of(one.folder)["cpu_seconds"] >= 0.0
-    assert not other.log.exists() and not cost_of(other.folder)
-
-
-def test_the_training_is_told_all_of_its_options(tmp_path: Path) -> None:
-    variant = make_variant("t", "wide", {"preset": "tutorial", "hidden_sizes": [64, 32]})
-    flags = tuple(training_flags(variant, 1))
-    told = command(Job("wide", tmp_path / "run", flags), tmp_path / "run", PROGRAM)[3:]
-    assert told[:4] == ["train", f"--run-dir={tmp_path / 'run'}", "--algo", "dqn"]
-    assert {"--preset=tutorial", "--seed=1", "--exp-name=wide"} <= set(told)
-    assert told[told.index("--params") + 1 :] == ["hidden_sizes=[64,32]"]

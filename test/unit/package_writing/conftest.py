@@ -1,0 +1,35 @@
+"""Packages that new_robot.py has written, and that can be imported."""
+
+import importlib
+import os
+import sys
+
+import pytest
+
+from package_writing.cli import main
+
+
+@pytest.fixture
+def new(tmp_path, monkeypatch, capsys):
+    """Writes packages, finds them, and gives the robot and the task; their modules are gone afterwards."""
+    target = tmp_path / "packages"
+    target.mkdir()
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{target}:{os.environ.get('ROS_PACKAGE_PATH', '')}")
+
+    def write(name, text=None, *arguments):
+        if isinstance(text, str):
+            (tmp_path / "robot.urdf").write_text(text)
+            text = tmp_path / "robot.urdf"
+        urdf = [] if text is None else ["--urdf", str(text)]
+        code = main([name, *urdf, "--to", str(target), *arguments])
+        told = capsys.readouterr()
+        assert code == 0, told.err
+        monkeypatch.syspath_prepend(target / name / "src")
+        made = importlib.import_module(f"{name}.robot").ROBOT
+        return target / name, made, importlib.import_module(f"{name}.tasks").Reach, told.out
+
+    before = set(sys.modules)
+    yield write
+    for name in set(sys.modules) - before:
+        if name.partition(".")[0].startswith("my_"):
+            del sys.modules[name]

@@ -1,0 +1,99 @@
+"""new_robot.py: what a robot's file draws on comes along, or is found again."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from mesh_files import binary_stl
+from new_robots import (
+    BARE,
+    FIXED,
+    LINK,
+    SWING,
+    robot,
+)
+
+ROBOTS = Path(__file__).resolve().parents[2] / "data/robots"
+
+
+def test_xacro_files_that_it_includes_and_arguments(new, tmp_path):
+    (tmp_path / "arm/urdf").mkdir(parents=True)
+    (tmp_path / "arm/common").mkdir()
+    (tmp_path / "arm/urdf/arm.urdf.xacro").write_text(
+        robot(
+            '<xacro:arg name="rod" default="none"/><xacro:include filename="parts/links.xacro"/>',
+            '<xacro:property name="n" value="joints"/><xacro:include filename="../common/${n}.xacro"/>',
+        )
+    )
+    (tmp_path / "arm/urdf/parts").mkdir()
+    links = LINK.format("base", "") + LINK.format("$(arg rod)", "")
+    (tmp_path / "arm/urdf/parts/links.xacro").write_text(robot(links))
+    (tmp_path / "arm/common/joints.xacro").write_text(robot(SWING, FIXED))
+    folder, made, _, told = new("my_parts", tmp_path / "arm/urdf/arm.urdf.xacro", "rod:=rod")
+    (tmp_path / "arm").rename(tmp_path / "gone")
+    made.check()
+    assert sorted(str(each.relative_to(folder)) for each in folder.glob("urdf/**/*.xacro")) == [
+        *("urdf/common/joints.xacro", "urdf/my_parts_control.urdf.xacro"),
+        *("urdf/urdf/arm.urdf.xacro", "urdf/urdf/parts/links.xacro"),
+    ]
+    assert "rod:=rod" in (folder / "launch/simulation.launch").read_text()
+    assert "not copied" not in told
+
+
+def test_what_lies_elsewhere_is_told(new, tmp_path):
+    (tmp_path / "far").mkdir()
+    other = tmp_path / "far/links.xacro"
+    other.write_text(robot(LINK.format("base", "") + LINK.format("rod", "")))
+    (tmp_path / "near/urdf").mkdir(parents=True)
+    urdf = tmp_path / "near/urdf/arm.xacro"
+    urdf.write_text(robot(f'<xacro:include filename="{other}"/>', SWING, FIXED))
+    *_, told = new("my_far", urdf)
+    assert f"not copied, and read from where it is: {other}" in told
+
+
+def test_meshes_by_a_plain_path_come_along(new, tmp_path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes/rod.stl").write_bytes(binary_stl())
+    shape = '<geometry><mesh filename="meshes/rod.stl" scale="1 1 1"/></geometry>'
+    rod = LINK.format("rod", f"<visual>{shape}</visual><collision>{shape}</collision>")
+    folder, made, *_ = new("my_meshes", robot(BARE[0], rod, SWING, FIXED))
+    assert (folder / "meshes/rod.stl").is_file()
+    assert made.links.links["rod"].collisions[0].mesh == str(folder / "meshes/rod.stl")
+
+
+def test_meshes_of_a_package_that_was_downloaded_without_its_package_xml_come_along(new, tmp_path):
+    for kind in ("visual", "collision"):  # of one name
+        (tmp_path / "arm_files/meshes" / kind).mkdir(parents=True)
+        (tmp_path / "arm_files/meshes" / kind / "rod.stl").write_bytes(binary_stl(len(kind)))
+    shapes = "".join(
+        f'<{kind}><geometry><mesh filename="package://arm_files/meshes/{kind}/rod.stl"/></geometry></{kind}>'
+        for kind in ("visual", "collision")
+    )
+    (tmp_path / "arm_files/urdf").mkdir()
+    urdf = tmp_path / "arm_files/urdf/arm.urdf"
+    urdf.write_text(robot(BARE[0], LINK.format("rod", shapes), SWING, FIXED))
+    folder, made, *_ = new("my_download", urdf)
+    for kind in ("visual", "collision"):
+        copy = folder / "meshes/arm_files" / kind / "rod.stl"
+        assert copy.read_bytes() == binary_stl(len(kind))
+    assert made.links.links["rod"].collisions[0].mesh == str(copy)
+
+
+def test_a_package_that_it_needs_is_depended_on(new, tmp_path, monkeypatch):
+    other = tmp_path / "ws/their_description"
+    (other / "urdf").mkdir(parents=True)
+    (other / "package.xml").write_text("<package><name>their_description</name></package>")
+    (other / "urdf/links.xacro").write_text(robot(LINK.format("base", "") + LINK.format("rod", "")))
+    urdf = other / "urdf/arm.urdf.xacro"
+    urdf.write_text(
+        robot(
+            '<xacro:include filename="$(find their_description)/urdf/links.xacro"/>', SWING, FIXED
+        )
+    )
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}/ws:{os.environ['ROS_PACKAGE_PATH']}")
+    monkeypatch.setenv("CARTPOLE_WITH", str(tmp_path / "ws"))
+    folder, made, _, told = new("my_described", urdf)
+    made.check()
+    assert "<exec_depend>their_description</exec_depend>" in (folder / "package.xml").read_text()
+    assert f"./ws --with {tmp_path}/ws --with " in told

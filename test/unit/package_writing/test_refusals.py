@@ -1,0 +1,98 @@
+"""new_robot.py: what it refuses in one line, and leaves as it was."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from new_robots import (
+    BARE,
+    FIXED,
+    LINK,
+    MOTOR,
+    NOBODYS,
+    SWING,
+    robot,
+)
+
+from package_writing.cli import main
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "words"),
+    [
+        (robot(*BARE), [], "nothing fixes its link 'base' to the world: --base fixed"),
+        (robot(LINK.format("base", "")), ["--base", "fixed"], "nothing in it moves"),
+        ("<robot", [], "robot.urdf"),
+        ("", [], "robot.urdf"),
+        ("<sdf version='1.6'/>", [], "not <robot>"),
+        (robot(*BARE, "<xacro:include filename='none.xacro'/>"), [], "none.xacro"),
+        (robot(*BARE, "${nothing}"), [], "nothing"),
+        (robot(*BARE, FIXED, MOTOR.format("swung", "Effort")), [], "transmission of joint 'swung'"),
+        (robot(*BARE, FIXED, MOTOR.format("swing", "Hydraulic")), [], "HydraulicJointInterface"),
+        (
+            robot(*BARE[:2], FIXED, SWING.replace('lower="-1" upper="2" ', "")),
+            [],
+            "joint 'swing' can't move: lower and upper",
+        ),
+        (
+            robot(BARE[0], SWING, FIXED, LINK.format("rod", NOBODYS)),
+            [],
+            "the package 'nobodys', which isn't found: ./ws --with FOLDER",
+        ),
+        (robot(*BARE, FIXED), ["size=3"], "NAME:=VALUE"),
+        (robot(*BARE, FIXED), ["--height", "nan"], "--height"),
+        (robot(*BARE, FIXED), ["--passive", "swign"], "did you mean 'swing'?"),
+        (robot(*BARE, FIXED), ["--passive", "swing"], "nothing in it moves by a motor"),
+        (
+            robot(*BARE, FIXED, MOTOR.format("swing", "Effort")), ["--passive", "swing"],
+            "for files without transmissions",
+        ),
+    ],
+)  # fmt: skip
+def test_a_robot_that_can_not_be_used_is_one_line(tmp_path, capsys, text, arguments, words):
+    (tmp_path / "robot.urdf").write_text(text)
+    command = ["my_bad", "--urdf", str(tmp_path / "robot.urdf"), "--to", str(tmp_path), *arguments]
+    assert main(command) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("new_robot: ") and words in line, line
+    assert [path.name for path in tmp_path.iterdir()] == ["robot.urdf"], "nothing is left behind"
+
+
+@pytest.mark.parametrize(
+    ("name", "better"),
+    [
+        ("My-Arm", "my_arm"),
+        ("MyArm", "my_arm"),
+        ("3dof arm", "my_3dof_arm"),
+        ("class", "my_class"),
+        ("cartpole", "my_cartpole"),
+        ("gazebo_msgs", "my_gazebo_msgs"),
+        ("random", "my_random"),
+        ("рука", "robot"),
+        ("", "robot"),
+    ],
+)
+def test_a_name_that_can_not_be_is_told_with_one_that_can(tmp_path, capsys, name, better):
+    assert main([name, "--to", str(tmp_path)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert re.search(f"'{better}' would do", line), line
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("there", ["folder", "file", "link"])
+def test_nothing_is_overwritten(tmp_path, capsys, there):
+    place = tmp_path / "my_arm"
+    {"folder": place.mkdir, "file": place.touch, "link": lambda: place.symlink_to("nowhere")}[
+        there
+    ]()
+    assert main(["my_arm", "--to", str(tmp_path)]) == 1
+    assert "is there already" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["my_arm"]
+
+
+def test_places_that_can_not_be(tmp_path, capsys):
+    assert main(["my_arm", "--to", str(tmp_path / "none")]) == 1
+    assert f"there is no folder {tmp_path}/none" in capsys.readouterr().err
+    assert main(["my_arm", "--urdf", str(tmp_path / "no.urdf"), "--to", str(tmp_path)]) == 1
+    assert f"{tmp_path}/no.urdf" in capsys.readouterr().err
