@@ -49,6 +49,27 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 ENGINES = ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
 
 
+@pytest.fixture
+def other_master() -> Iterator[Any]:
+    """What answers as a ROS master does, and as a node, without ROS's servers: a `FakeMaster`."""
+    from ros_fakes import FakeMaster
+
+    fake = FakeMaster()
+    yield fake
+    fake.close()
+
+
+@pytest.fixture
+def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """Another one, which is this process's."""
+    from ros_fakes import FakeMaster
+
+    fake = FakeMaster()
+    monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
+    yield fake
+    fake.close()
+
+
 @pytest.fixture(params=ENGINES)
 def new_engine(request: pytest.FixtureRequest) -> Callable:
     """Makes a physics engine; a test that asks for it runs with each of them."""

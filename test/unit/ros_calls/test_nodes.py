@@ -3,34 +3,17 @@
 import socket
 
 import pytest
-from ros_fakes import FakeMaster
 
 from ros_calls import nodes
 from ros_calls.xmlrpc import NoAnswer
 
 
-@pytest.fixture
-def master(monkeypatch):
-    fake = FakeMaster()
-    monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
-    yield fake
-    fake.close()
-
-
-@pytest.fixture
-def other():
-    """What answers as a node does, somewhere else."""
-    fake = FakeMaster()
-    yield fake
-    fake.close()
-
-
-def test_a_node_that_answers_lives(master, other) -> None:
+def test_a_node_that_answers_lives(master, other_master) -> None:
     assert nodes.living_address("/gazebo") is None
-    master.nodes["/gazebo"] = other.uri
-    assert nodes.living_address("/gazebo") == other.uri
-    other.told.update(getName="/gazebo", getMasterUri=master.uri)
-    assert nodes.living_address("/gazebo") == other.uri
+    master.nodes["/gazebo"] = other_master.uri
+    assert nodes.living_address("/gazebo") == other_master.uri
+    other_master.told.update(getName="/gazebo", getMasterUri=master.uri)
+    assert nodes.living_address("/gazebo") == other_master.uri
 
 
 def test_one_that_was_killed_does_not(master) -> None:
@@ -49,9 +32,9 @@ def test_nor_does_one_that_says_nothing(master) -> None:
 @pytest.mark.parametrize(
     "told", [{"getName": "/talker"}, {"getName": "/gazebo", "getMasterUri": "http://127.0.0.1:1"}]
 )
-def test_its_port_may_belong_to_another_node_now(master, other, told) -> None:
-    master.nodes["/gazebo"] = other.uri
-    other.told.update(told)
+def test_its_port_may_belong_to_another_node_now(master, other_master, told) -> None:
+    master.nodes["/gazebo"] = other_master.uri
+    other_master.told.update(told)
     assert nodes.living_address("/gazebo") is None
 
 

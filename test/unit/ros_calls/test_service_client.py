@@ -7,7 +7,7 @@ import time
 
 import pytest
 import rospy
-from ros_fakes import FakeMaster, FakeService, failed, ok
+from ros_fakes import FakeService, failed, ok
 from std_srvs.srv import Empty, SetBool, SetBoolRequest
 
 from ros_calls import master as ros_master
@@ -25,13 +25,11 @@ BOUND = 60.0  # [s] of one that has an answer
 
 
 @pytest.fixture
-def master(monkeypatch):
+def master(other_master, monkeypatch):
     # The process's own is another one, so that a call that goes there finds nothing.
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
-    fake = FakeMaster()
-    with ros_master.using(fake.uri):
-        yield fake
-    fake.close()
+    with ros_master.using(other_master.uri):
+        yield other_master
 
 
 @pytest.fixture

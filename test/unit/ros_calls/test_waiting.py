@@ -8,7 +8,7 @@ import time
 
 import pytest
 import rospy
-from ros_fakes import FakeMaster, FakeService
+from ros_fakes import FakeService
 from std_srvs.srv import SetBool
 
 from ros_calls import master as ros_master
@@ -27,11 +27,9 @@ BOUND = 60.0  # [s] of one that has an end
 
 
 @pytest.fixture
-def master():
-    fake = FakeMaster()
-    with ros_master.using(fake.uri):
-        yield fake
-    fake.close()
+def master(other_master):
+    with ros_master.using(other_master.uri):
+        yield other_master
 
 
 def test_the_first_thing_that_is_true_is_returned():

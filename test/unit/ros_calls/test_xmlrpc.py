@@ -9,7 +9,6 @@ import threading
 import time
 
 import pytest
-from ros_fakes import FakeMaster
 
 from ros_calls import master as ros_master
 from ros_calls import xmlrpc
@@ -18,11 +17,9 @@ LIMIT = 0.3  # [s]
 
 
 @pytest.fixture
-def master():
-    fake = FakeMaster()
-    with ros_master.using(fake.uri):
-        yield fake
-    fake.close()
+def master(other_master):
+    with ros_master.using(other_master.uri):
+        yield other_master
 
 
 @contextlib.contextmanager

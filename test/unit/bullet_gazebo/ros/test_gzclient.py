@@ -1,18 +1,8 @@
 """The window's name as a node, before it is one."""
 
 import pytest
-from ros_fakes import FakeMaster
 
 from bullet_gazebo.ros.clients import gzclient
-
-
-@pytest.fixture
-def master(monkeypatch):
-    fake = FakeMaster()
-    monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
-    monkeypatch.delenv("ROS_NAMESPACE", raising=False)
-    yield fake
-    fake.close()
 
 
 @pytest.mark.parametrize(
@@ -27,6 +17,7 @@ def master(monkeypatch):
     ],
 )
 def test_another_window_keeps_its_name(line, dead, living, anonymous, master, monkeypatch):
+    monkeypatch.delenv("ROS_NAMESPACE", raising=False)
     master.nodes.update(dict.fromkeys(dead, "http://127.0.0.1:1"))
     master.nodes.update(dict.fromkeys(living, master.uri))
     taken = []

@@ -3,21 +3,12 @@
 import threading
 
 import pytest
-from ros_fakes import FakeMaster
 
 from bullet_gazebo.ros.node import one_world
 from bullet_gazebo.ros.node.one_world import NameTaken, refuse_twin
 from bullet_gazebo.ros.wire.names import full_name, one_at_a_time
 
 BOUND = 60.0  # [s]
-
-
-@pytest.fixture
-def master(monkeypatch):
-    fake = FakeMaster()
-    monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
-    yield fake
-    fake.close()
 
 
 @pytest.mark.parametrize(

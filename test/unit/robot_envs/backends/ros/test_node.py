@@ -3,18 +3,9 @@
 import socket
 
 import pytest
-from ros_fakes import FakeMaster
 
 from robot_envs.backends.ros import node
 from robot_envs.errors import RobotEnvError
-
-
-@pytest.fixture
-def master(monkeypatch):
-    fake = FakeMaster()
-    monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
-    yield fake
-    fake.close()
 
 
 @pytest.fixture

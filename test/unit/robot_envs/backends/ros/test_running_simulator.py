@@ -4,27 +4,17 @@ import socket
 
 import pytest
 import rospy
-from ros_fakes import FakeMaster
 
 from robot_envs.backends.ros.running_simulator import RunningSimulator
 from robot_envs.errors import SimulatorError, SimulatorHangs
 
 
 @pytest.fixture
-def master(monkeypatch):
-    fake = FakeMaster()
-    monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
+def master(master, monkeypatch):
+    """Knows a simulator."""
     monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
-    fake.nodes["/gazebo"] = fake.uri
-    yield fake
-    fake.close()
-
-
-@pytest.fixture
-def another():
-    fake = FakeMaster()
-    yield fake.uri
-    fake.close()
+    master.nodes["/gazebo"] = master.uri
+    return master
 
 
 def fail(simulator, error):
@@ -33,8 +23,8 @@ def fail(simulator, error):
 
 
 def test_one_that_is_there_changes_no_error(master) -> None:
-    own = RunningSimulator()
-    assert own.is_there()
+    running = RunningSimulator()
+    assert running.is_there()
     for error in (
         SimulatorHangs("no answer"),
         SimulatorError("refused"),
@@ -42,12 +32,12 @@ def test_one_that_is_there_changes_no_error(master) -> None:
         KeyError(),
     ):
         with pytest.raises(type(error)) as raised:
-            fail(own, error)
+            fail(running, error)
         assert raised.value is error
 
 
 def test_one_that_ended_changes_no_error(master) -> None:
-    own = RunningSimulator()
+    running = RunningSimulator()
     with socket.socket() as reserved:  # bound only: connections are refused
         reserved.bind(("127.0.0.1", 0))
         for address in (
@@ -56,28 +46,28 @@ def test_one_that_ended_changes_no_error(master) -> None:
         ):
             if address != master.uri:
                 master.nodes["/gazebo"] = address
-            assert not own.is_there()
+            assert not running.is_there()
             with pytest.raises(SimulatorError, match="^it broke$"):
-                fail(own, SimulatorError("it broke"))
+                fail(running, SimulatorError("it broke"))
 
 
-def test_another_one_in_its_place_is_told(master, another) -> None:
-    own = RunningSimulator()
-    master.nodes["/gazebo"] = another
-    assert not own.is_there()
+def test_another_one_in_its_place_is_told(master, other_master) -> None:
+    running = RunningSimulator()
+    master.nodes["/gazebo"] = other_master.uri
+    assert not running.is_there()
     with pytest.raises(
         SimulatorError, match="another one runs as /gazebo .* ROS_MASTER_URI .*model does not"
     ):
-        fail(own, SimulatorError("model does not exist"))
+        fail(running, SimulatorError("model does not exist"))
 
 
 @pytest.mark.parametrize(
     "error", [rospy.ROSException("publish() to a closed topic"), SimulatorError("x")]
 )
 def test_so_is_the_end_of_ones_own_node(master, monkeypatch, error) -> None:
-    own = RunningSimulator()
+    running = RunningSimulator()
     monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
     with pytest.raises(
         SimulatorError, match="this process's ROS node .* was shut down from outside"
     ):
-        fail(own, error)
+        fail(running, error)

@@ -4,7 +4,6 @@ import threading
 
 import pytest
 import rospy
-from ros_fakes import FakeMaster
 
 from robot_envs.backends.ros.session import window
 
@@ -13,14 +12,11 @@ WHERE = "the window is the page http://127.0.0.1:8080/"
 
 
 @pytest.fixture
-def master(monkeypatch):
-    fake = FakeMaster()
-    monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
+def master(master, monkeypatch):
     monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
     for kept in ("_master_proxy", "_param_server"):  # of another test's master
         monkeypatch.setattr(rospy.client, kept, None)
-    yield fake
-    fake.close()
+    return master
 
 
 @pytest.fixture
