@@ -1,1 +1,1 @@
-"""The workbench around a training: look at runs, compare them, search options, train with SB3."""
+"""What is done with trainings: looked at, filmed, compared, searched for options, run as many jobs."""
