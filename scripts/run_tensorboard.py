@@ -9,4 +9,4 @@ from ros_calls.requirements import require
 if __name__ == "__main__":
     require(("tensorboard",))
     flags = [argument for argument in sys.argv[1:] if ":=" not in argument]
-    os.execv(sys.executable, [sys.executable, "-m", "tensorboard.main", *flags])
+    os.execv(sys.executable, [sys.executable, "-P", "-m", "tensorboard.main", *flags])

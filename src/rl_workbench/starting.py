@@ -1,7 +1,10 @@
-"""Ctrl-C while a command is still reading its modules."""
+"""How commands start: Ctrl-C while they still read their modules, and how one starts another."""
 
 import contextlib
+import os
 import signal
+import sys
+import sysconfig
 from collections.abc import Iterator
 
 
@@ -18,3 +21,18 @@ def ended_by_ctrl_c() -> Iterator[None]:
     yield
     if before is signal.default_int_handler:
         signal.signal(signal.SIGINT, before)
+
+
+def program(module: str) -> tuple[str, ...]:
+    """What starts a module as a process of its own, which doesn't search the current folder for modules.
+
+    A user's `token.py` there would stand in for the standard library's. See `search_path`.
+    """
+    return (sys.executable, "-P", "-m", module)
+
+
+def search_path() -> str:
+    """PYTHONPATH of a process that is to find the modules that this one finds."""
+    standard = sysconfig.get_path("stdlib")
+    found = sys.path.index(standard) if standard in sys.path else len(sys.path)
+    return os.pathsep.join(dict.fromkeys(map(os.path.abspath, sys.path[:found])))

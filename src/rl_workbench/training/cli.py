@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
+from rl_workbench import starting
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.output import reader_may_go
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm, recorded_kind
@@ -21,7 +22,7 @@ from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell, warn
 
 PROG = "rl-workbench train"
-PROGRAM = (sys.executable, "-m", "rl_workbench")
+PROGRAM = starting.program("rl_workbench")
 EPILOG = """\
 dqn and the two of REINFORCE are our own, the others Stable-Baselines3's.
 Each has flags of its own: --algo NAME --help shows them."""
