@@ -1,6 +1,7 @@
 """`train`: one command line for every algorithm; errors in one line, exit codes."""
 
 import argparse
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
@@ -116,8 +117,8 @@ def train(
     run = options.run
     try:
         with ExitStack() as holding:
-            if options.session.ray:
-                make_pool = holding.enter_context(_workers(options.session.ray))
+            if options.session.ray is not None:
+                make_pool = holding.enter_context(_workers(options.session.ray, options))
                 options = options._replace(make_pool=make_pool)
             if options.resume:
                 folder = options.resume.resolve()
@@ -135,15 +136,20 @@ def train(
 
 
 @contextmanager
-def _workers(address: str) -> Iterator[MakePool]:
+def _workers(address: str, options: TrainingOptions) -> Iterator[MakePool]:
     """What makes the workers on a cluster, as long as that is joined.
 
     Raises:
         WorkbenchError: if it can't be.
     """
-    from rl_workbench.training.cluster.joining import joined
+    from rl_workbench.training.cluster.address import LOCAL
+    from rl_workbench.training.cluster.joining import joined, local_processors
+    from rl_workbench.training.cluster.nodes import check_processors
 
-    with joined(address) as cluster:
+    if address == LOCAL:  # it takes long to start
+        check_processors(options.run.num_envs, local_processors())
+    folder = str(options.resume or options.run.run_dir or "RUN_DIR")
+    with joined(address, f"--resume {shlex.quote(folder)} goes on, if that is there") as cluster:
         from rl_workbench.training.rollouts.workers import Workers  # needs what joining sets
 
         yield partial(Workers, cluster, say=warn)
