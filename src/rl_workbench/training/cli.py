@@ -187,6 +187,8 @@ def main(
     except KeyboardInterrupt:
         print(f"{prog}: interrupted before the training began", file=sys.stderr)
         return interrupt.exit_code or 130
+    finally:
+        interrupt.defer()  # Python is ending
 
 
 def shown(
