@@ -1,8 +1,8 @@
 """Jobs without Ray: folders on their way between machines, how they are getting on, what is lost."""
 
 import json
-import re
 import os
+import re
 from pathlib import Path
 
 import pytest
