@@ -58,7 +58,7 @@ def main() -> None:
     step, episode = line(found.lengths, found.seconds)
     lines = []
     alone, _ = run_jobs(lambda folder: ThisMachine(1, PROGRAM), 1)
-    with joined("local") as cluster:
+    with joined("local", "the same command begins anew") as cluster:
         call, latency = calls(cluster, found, policy_of(options(env_id, backend)))
         real = {each: real_rollouts(cluster, options(env_id, backend, each)) for each in MEASURED}
         rolling = RolloutTimes(step, episode, call, latency, real[1].learn_step)

@@ -3,10 +3,12 @@
 
 import sys
 
-from ros_calls.requirements import ALL, require
-
 if __name__ == "__main__":
-    require(ALL)
-    from package_writing.cli import main
+    from rl_workbench.starting import ended_by_ctrl_c
 
+    with ended_by_ctrl_c():
+        from ros_calls.requirements import ALL, require
+
+        require(ALL)
+        from package_writing.cli import main
     sys.exit(main())

@@ -4,9 +4,12 @@
 import os
 import sys
 
-from ros_calls.requirements import require
-
 if __name__ == "__main__":
-    require(("tensorboard",))
+    from rl_workbench.starting import ended_by_ctrl_c
+
+    with ended_by_ctrl_c():
+        from ros_calls.requirements import require
+
+        require(("tensorboard",))
     flags = [argument for argument in sys.argv[1:] if ":=" not in argument]
-    os.execv(sys.executable, [sys.executable, "-m", "tensorboard.main", *flags])
+    os.execv(sys.executable, [sys.executable, "-P", "-m", "tensorboard.main", *flags])

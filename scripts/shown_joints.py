@@ -3,10 +3,12 @@
 
 import sys
 
-from ros_calls.requirements import SIMULATOR, require
-
 if __name__ == "__main__":
-    require(SIMULATOR)
-    from bullet_gazebo.ros.clients.shown_joints import main
+    from rl_workbench.starting import ended_by_ctrl_c
 
+    with ended_by_ctrl_c():
+        from ros_calls.requirements import SIMULATOR, require
+
+        require(SIMULATOR)
+        from bullet_gazebo.ros.clients.shown_joints import main
     sys.exit(main())

@@ -3,11 +3,13 @@
 
 import sys
 
-from ros_calls.requirements import ALL, require
-
 if __name__ == "__main__":
-    require(ALL)
-    from cartpole.robot import ROBOT
-    from robot_envs.backends.ros.bringup.robots import spawn_command
+    from rl_workbench.starting import ended_by_ctrl_c
 
+    with ended_by_ctrl_c():
+        from ros_calls.requirements import ALL, require
+
+        require(ALL)
+        from cartpole.robot import ROBOT
+        from robot_envs.backends.ros.bringup.robots import spawn_command
     sys.exit(spawn_command(ROBOT, sys.argv[1:]))

@@ -4,6 +4,7 @@ import sys
 
 from cartpole.ros_options import ros_options
 from cartpole.workbench import PROGRAM
+from rl_workbench.starting import ended_by_ctrl_c
 from rl_workbench.training import cli
 from robot_envs.errors import RobotEnvError
 
@@ -13,7 +14,8 @@ NODE = "dqn_train"
 def main(argv: list[str] | None = None) -> int:
     """Trains as the arguments say; returns the process's exit code."""
     try:
-        flags, parameters, _ = ros_options(sys.argv[1:] if argv is None else argv, NODE)
+        with ended_by_ctrl_c():
+            flags, parameters, _ = ros_options(sys.argv[1:] if argv is None else argv, NODE)
     except RobotEnvError as error:
         print(f"{NODE}.py: {error}", file=sys.stderr)
         return 1

@@ -146,9 +146,11 @@ def _joined(
         raise WorkbenchError("--headless: not with --gui")
     run = options.run
     for key in ("realtime", "rviz"):
-        if getattr(robot, key) and (run.num_envs > 1 or options.session.ray):
+        if getattr(robot, key) and (run.num_envs > 1 or options.session.ray is not None):
             others = (
-                "not with --ray" if options.session.ray else f"num_envs is 1, not {run.num_envs}"
+                "not with --ray"
+                if options.session.ray is not None
+                else f"num_envs is 1, not {run.num_envs}"
             )
             raise WorkbenchError(f"--{key} is of the robot of one simulator: {others}")
     recorded = [key for key in given if key not in WINDOWS]
@@ -183,7 +185,7 @@ def shows_itself(options: TrainingOptions) -> bool:
     Of several environments each has a simulator of its own, and so have those of workers; in the session's
     the policy is evaluated.
     """
-    return needs_session(options) and options.run.num_envs == 1 and not options.session.ray
+    return needs_session(options) and options.run.num_envs == 1 and options.session.ray is None
 
 
 def _backend(options: TrainingOptions) -> str:

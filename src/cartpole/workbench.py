@@ -5,8 +5,9 @@ from pathlib import Path
 
 import robot_envs.robots  # noqa: F401 - registers its environments, as importing cartpole does its own
 from rl_workbench import cli
+from rl_workbench.starting import program
 
-PROGRAM = (sys.executable, "-m", "cartpole.workbench")  # knows the same environments
+PROGRAM = program("cartpole.workbench")  # knows the same environments
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -13,6 +13,7 @@ from package_writing.errors import CannotWrite
 from package_writing.names import check_name
 
 EXIT_REFUSED = 1
+INTERRUPTED = 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -28,6 +29,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"new_robot: {error.filename}: {error.strerror}", file=sys.stderr)
         return EXIT_REFUSED
+    except KeyboardInterrupt:
+        print("new_robot: interrupted", file=sys.stderr)
+        return INTERRUPTED
 
 
 def _parser() -> argparse.ArgumentParser:

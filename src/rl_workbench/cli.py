@@ -79,6 +79,8 @@ def main(
     except KeyboardInterrupt:
         print(f"{prog}: interrupted", file=sys.stderr)
         return interrupt.exit_code or 130
+    finally:
+        interrupt.defer()  # Python is ending
 
 
 def parse(argv: list[str], prog: str = PROG) -> argparse.Namespace:

@@ -12,6 +12,7 @@ def option(
     lowest: float | None = None,
     highest: float | None = None,
     choices: tuple[str, ...] | None = None,
+    metavar: str | None = None,
 ) -> Any:
     """A dataclass field that knows what it means and what it may be.
 
@@ -20,9 +21,10 @@ def option(
         lowest: smallest value of a number.
         highest: largest one.
         choices: all values of a text.
+        metavar: what `--help` calls its value (the end of its name).
     """
     limits = None if lowest is None or highest is None else (lowest, highest)
-    metadata = {"help": text, "limits": limits, "choices": choices}
+    metadata = {"help": text, "limits": limits, "choices": choices, "metavar": metavar}
     if isinstance(default, dict):
         return field(default_factory=default.copy, metadata=metadata)
     return field(default=default, metadata=metadata)

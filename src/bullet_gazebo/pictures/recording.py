@@ -179,6 +179,6 @@ def _start(options: RecordingOptions) -> subprocess.Popen[bytes]:
     ]  # fmt: skip
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     return subprocess.Popen(
-        [sys.executable, "-m", FILMING, *words], stdin=subprocess.PIPE, env=environment,
+        [sys.executable, "-P", "-m", FILMING, *words], stdin=subprocess.PIPE, env=environment,
         start_new_session=True,
     )  # fmt: skip

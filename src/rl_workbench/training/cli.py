@@ -1,6 +1,7 @@
 """`train`: one command line for every algorithm; errors in one line, exit codes."""
 
 import argparse
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
@@ -9,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
+from rl_workbench import starting
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.output import reader_may_go
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm, recorded_kind
@@ -21,7 +23,7 @@ from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell, warn
 
 PROG = "rl-workbench train"
-PROGRAM = (sys.executable, "-m", "rl_workbench")
+PROGRAM = starting.program("rl_workbench")
 EPILOG = """\
 dqn and the two of REINFORCE are our own, the others Stable-Baselines3's.
 Each has flags of its own: --algo NAME --help shows them."""
@@ -115,8 +117,8 @@ def train(
     run = options.run
     try:
         with ExitStack() as holding:
-            if options.session.ray:
-                make_pool = holding.enter_context(_workers(options.session.ray))
+            if options.session.ray is not None:
+                make_pool = holding.enter_context(_workers(options.session.ray, options))
                 options = options._replace(make_pool=make_pool)
             if options.resume:
                 folder = options.resume.resolve()
@@ -134,15 +136,20 @@ def train(
 
 
 @contextmanager
-def _workers(address: str) -> Iterator[MakePool]:
+def _workers(address: str, options: TrainingOptions) -> Iterator[MakePool]:
     """What makes the workers on a cluster, as long as that is joined.
 
     Raises:
         WorkbenchError: if it can't be.
     """
-    from rl_workbench.training.cluster.joining import joined
+    from rl_workbench.training.cluster.address import LOCAL
+    from rl_workbench.training.cluster.joining import joined, local_processors
+    from rl_workbench.training.cluster.nodes import check_processors
 
-    with joined(address) as cluster:
+    if address == LOCAL:  # it takes long to start
+        check_processors(options.run.num_envs, local_processors())
+    folder = str(options.resume or options.run.run_dir or "RUN_DIR")
+    with joined(address, f"--resume {shlex.quote(folder)} goes on, if that is there") as cluster:
         from rl_workbench.training.rollouts.workers import Workers  # needs what joining sets
 
         yield partial(Workers, cluster, say=warn)
@@ -180,6 +187,8 @@ def main(
     except KeyboardInterrupt:
         print(f"{prog}: interrupted before the training began", file=sys.stderr)
         return interrupt.exit_code or 130
+    finally:
+        interrupt.defer()  # Python is ending
 
 
 def shown(

@@ -1,11 +1,14 @@
 """The page beside a training, in a process of its own: the training never waits for it, nor needs it."""
 
 import contextlib
+import os
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO
+
+from rl_workbench.starting import search_path
 
 END = 15.0  # [s] for it to end
 POLICIES = ("last", "best", "random")
@@ -26,8 +29,9 @@ def page_beside(
     try:
         # Ctrl-C is the training's; the page ends when its standard input does, however the training ends.
         process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
-        )
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
+            env={**os.environ, "PYTHONPATH": search_path()},
+        )  # fmt: skip
     except OSError as error:
         say(f"no page; the training goes on without one: {error.strerror}")
         yield

@@ -7,6 +7,7 @@ of docs/catkin.md by test_catkin_workspace.py. A command that nothing here knows
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import re
 import runpy
@@ -29,6 +30,7 @@ from bullet_gazebo.ros.clients import gzclient
 from cartpole import dqn_train, pg_train, policy_node, workbench
 from package_writing import cli as new_robot
 from rl_workbench.training import cli as training_cli
+from rl_workbench.training.algorithms import ALGORITHMS
 
 pytestmark = pytest.mark.usefixtures("signals")
 
@@ -162,7 +164,14 @@ def test_the_window_takes_it(command: Command) -> None:
     assert gzclient.parse_args(command.words[3:]).ignored == []
 
 
-@pytest.mark.parametrize("command", GROUPS["workbench"], ids=str)
+def with_extras(command: Command) -> object:
+    """The command, which needs the package of the algorithm that it names."""
+    words = dict(itertools.pairwise(command.words))
+    package = ALGORITHMS[words.get("--algo", "dqn")].package
+    return pytest.param(command, marks=[pytest.mark.extras(package[0])] if package else [])
+
+
+@pytest.mark.parametrize("command", map(with_extras, GROUPS["workbench"]), ids=str)
 def test_the_workbench_takes_it(command: Command, only_parsing: None, monkeypatch) -> None:
     name, *arguments = command.words[3:]
     if name == "--help":

@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _window(arguments: Sequence[str]) -> Iterator[None]:
     # The launch file's name and log file are the server's.
     own = [a for a in arguments if ":=" in a and not a.startswith(("__name:=", "__log:="))]
-    client = subprocess.Popen([sys.executable, "-c", CLIENT, *own, f"__name:={NAME}"])
+    client = subprocess.Popen([sys.executable, "-P", "-c", CLIENT, *own, f"__name:={NAME}"])
     try:
         yield
     finally:

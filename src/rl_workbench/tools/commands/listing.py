@@ -1,6 +1,7 @@
 """jobs: how the jobs of a benchmark or a sweep are getting on."""
 
 import argparse
+import datetime
 from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
@@ -40,7 +41,7 @@ def _line(each: JobState, width: int) -> str:
     steps = f"{each.step} of {each.steps}" if each.steps else str(each.step)
     parts = [f"{each.state:8}", f"{each.name:{width}}", f"{steps:>15} steps"]
     if each.node and each.state == "running":
-        parts.append(f"on {each.node}")
+        parts.append(f"for {datetime.timedelta(seconds=int(each.seconds))} on {each.node}")
     if each.attempts > 1:
         parts.append(f"attempt {each.attempts}")
     return "  ".join([*parts, each.line]).rstrip()

@@ -8,7 +8,8 @@ from pathlib import Path
 from rl_workbench.tools.commands.shared import number
 from rl_workbench.tools.jobs.ledger import settle
 from rl_workbench.tools.jobs.machines import CARRIED, SHARED, Machines, ThisMachine
-from rl_workbench.training.options.ray_flag import add_ray_flag
+from rl_workbench.training.options.options import Options
+from rl_workbench.training.options.session import ClusterOptions
 from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell
 
@@ -17,7 +18,8 @@ def add_job_flags(parser: argparse.ArgumentParser) -> None:
     """Where jobs run, and how many at a time."""
     parser.add_argument("--jobs", type=number(1), metavar="N",
         help="trainings at a time, each on one core (1; with --ray as many as there are cores)")  # fmt: skip
-    add_ray_flag(parser)
+    Options(ClusterOptions).add_flags(parser)
+    parser.set_defaults(ray=None)
     parser.add_argument("--folders", choices=(SHARED, CARRIED),
         help="with --ray: seen by all nodes, or carried home by Ray (found out)")  # fmt: skip
 
@@ -44,7 +46,7 @@ def machines_for(
             from rl_workbench.tools.jobs.cluster.nodes import RayNodes
             from rl_workbench.training.cluster.joining import joined
 
-            cluster = stack.enter_context(joined(arguments.ray))
+            cluster = stack.enter_context(joined(arguments.ray, "the same command goes on"))
         nodes = RayNodes(cluster, folder, arguments.program, arguments.jobs, arguments.folders)
         tell(nodes.about())
         yield nodes

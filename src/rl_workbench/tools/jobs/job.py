@@ -78,9 +78,14 @@ def command(job: Job, folder: Path, program: Sequence[str]) -> list[str]:
     return [*begin, f"--run-dir={folder}", *job.flags]
 
 
-def environment() -> dict[str, str]:
-    """What a training has of its own: one core, and the address of a master, since robots can't share one."""
-    return {**ONE_CORE, "ROS_MASTER_URI": f"http://127.0.0.1:{_free_port()}"}
+def environment(modules: str) -> dict[str, str]:
+    """What a training has of its own: one core, and the address of a master, since robots can't share one.
+
+    Args:
+        modules: PYTHONPATH, by which it finds them.
+    """
+    master = f"http://127.0.0.1:{_free_port()}"
+    return {**ONE_CORE, "ROS_MASTER_URI": master, "PYTHONPATH": modules}
 
 
 def _free_port() -> int:

@@ -38,6 +38,7 @@ class Entry:
     node: str = ""  # the last one that it ran on
     attempts: int = 0
     note: str = ""  # why it failed, or was lost
+    began: float = 0.0  # the last attempt [s since 1970]
 
 
 class Ledger(Watch):
@@ -69,6 +70,7 @@ class Ledger(Watch):
         """See Watch."""
         entry = self._entry(job)
         entry.state, entry.node, entry.attempts = RUNNING, node, entry.attempts + 1
+        entry.began = round(time.time(), 1)
         self._is_changed = True
 
     def progressed(self, job: Job, node: str) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import search_path
 from rl_workbench.tools.jobs.job import Ending, Job, command, environment
 from rl_workbench.tools.jobs.process import TrainingProcess
 
@@ -70,7 +71,7 @@ class ThisMachine:
         try:
             job.folder.parent.mkdir(parents=True, exist_ok=True)
             words = command(job, job.folder, self._program)
-            self._running[job] = TrainingProcess(words, job.log, environment())
+            self._running[job] = TrainingProcess(words, job.log, environment(search_path()))
         except WorkbenchError as error:
             self._refused.append((job, Ending(lost=str(error))))
         except OSError as error:

@@ -22,12 +22,19 @@ class TrainingProcess:
         command: what is run.
         log: what it says is appended there.
         environment: on top of this process's own.
+        at_callers_end: the signal that it gets when this process is killed.
 
     Raises:
         OSError: if it can't be started.
     """
 
-    def __init__(self, command: Sequence[str], log: Path, environment: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        command: Sequence[str],
+        log: Path,
+        environment: Mapping[str, str],
+        at_callers_end: str = "TERM",
+    ) -> None:
         self._began = time.time()
         self._is_stopped = False
         # A worker of Ray's has Ctrl-C blocked, and what it starts would inherit that.
@@ -35,7 +42,7 @@ class TrainingProcess:
         try:
             with log.open("ab") as output:
                 self._process = subprocess.Popen(
-                    [*_dying_with_caller(), *command],
+                    [*_told_of_callers_end(at_callers_end), *command],
                     env={**os.environ, **environment},
                     stdin=subprocess.DEVNULL,
                     stdout=output,
@@ -78,6 +85,6 @@ class TrainingProcess:
         return Ending(code, lost, span, usage.ru_utime + usage.ru_stime)
 
 
-def _dying_with_caller() -> list[str]:
-    """A prefix by which the kernel ends the training when this process is killed."""
-    return ["setpriv", "--pdeathsig", "TERM", "--"] if shutil.which("setpriv") else []
+def _told_of_callers_end(signal_name: str) -> list[str]:
+    """A prefix by which the kernel sends the training a signal when this process is killed."""
+    return ["setpriv", "--pdeathsig", signal_name, "--"] if shutil.which("setpriv") else []

@@ -32,6 +32,7 @@ class JobState:
     steps: int  # of the whole training; 0: its length isn't counted in steps
     node: str  # the last one that it ran on
     attempts: int
+    seconds: float  # since the attempt began that runs; else 0
     line: str  # why it failed; else the last thing that it said
 
 
@@ -61,8 +62,8 @@ def _steps(path: Path) -> Iterator[int]:
     except OSError:
         return
     for row in reversed(rows):
-        step = row.partition(b",")[0]
-        if step.isdigit():
+        step, tag, *_ = *row.split(b","), b""
+        if step.isdigit() and b"/" in tag:  # without, it is a curve over episodes
             yield int(step)
 
 
@@ -91,18 +92,29 @@ def _state(folder: Path, entry: Entry, is_alive: bool) -> JobState:
     summary = read_leniently(run / SUMMARY)
     (step, steps), state, line = steps_of(run), entry.state, last_words(log_of(run))
     if summary.get("complete"):
-        state, line = DONE, told(summary)
+        step, state, line = summary["steps"], DONE, _outcome(summary)
     elif state == FAILED:
         line = entry.note
     elif state == DONE:
         line = "ended early: the rest wasn't needed any more"
     elif state == RUNNING and not is_alive or state == WAITING and step:
         state = STOPPED if not is_alive else WAITING
-    return JobState(entry.name, entry.folder, state, step, steps, entry.node, entry.attempts, line)
+    if state == STOPPED and summary.get("interrupted"):
+        line = _outcome(summary)
+    elif state == WAITING and entry.note:
+        line = f"lost, and tried again: {entry.note}"
+    since = max(time.time() - entry.began, 0.0) if state == RUNNING and entry.began else 0.0
+    return JobState(
+        entry.name, entry.folder, state, step, steps, entry.node, entry.attempts, round(since, 1), line
+    )  # fmt: skip
 
 
 def told(summary: dict[str, Any]) -> str:
     """What a run came to, in a line."""
+    return f"{summary['steps']} steps {_outcome(summary)}"
+
+
+def _outcome(summary: dict[str, Any]) -> str:
     best = summary.get("best")
     found = f"best evaluation {best[1]:.1f} at step {best[0]}" if best else "no evaluation"
-    return f"{summary['steps']} steps in {summary['seconds']:.1f} s, {found}"
+    return f"in {summary['seconds']:.1f} s, {found}"

@@ -31,20 +31,18 @@ QUIET = {
     "RAY_DEDUP_LOGS_SKIP_REGEX": ".",  # what its daemons say of workers and nodes that die: pages
 }
 PATIENCE = 60.0  # [s] until every node has started a worker that answers
-LOST = (
-    "this process was ended from outside, as by kill -9, or by Ray, since its node on this machine is lost; "
-    "what was saved is not lost"
-)
+LOST = "this process was ended from outside, as by kill -9, or by Ray, since its node on this machine is lost"
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextlib.contextmanager
-def joined(address: str, say: Callable[[str], None] = warn) -> Iterator[Cluster]:
+def joined(address: str, going_on: str, say: Callable[[str], None] = warn) -> Iterator[Cluster]:
     """A cluster, as long as it is entered; of this process's handlers of signals none is changed.
 
     Args:
         address: HOST:PORT of its head; `auto`: the one that this machine belongs to; `local`: one of
             this process's own, which ends with it.
+        going_on: how the user does, if this process is ended without a word.
         say: is told of nodes that can't be used.
 
     Raises:
@@ -55,7 +53,7 @@ def joined(address: str, say: Callable[[str], None] = warn) -> Iterator[Cluster]
     for name, value in QUIET.items():
         os.environ.setdefault(name, value)
     with contextlib.ExitStack() as stack:
-        stack.enter_context(obituary(LOST))
+        stack.enter_context(obituary(f"{LOST}; {going_on}"))
         ray = _started(stack) if address == LOCAL else _found(without_auto(address))
         stack.callback(ray.shutdown)
         cluster = Cluster(ray, say)
@@ -75,11 +73,16 @@ def _started(stack: contextlib.ExitStack) -> Any:
     return _init(
         "a local cluster",
         address=LOCAL,
-        num_cpus=len(os.sched_getaffinity(0)),
+        num_cpus=local_processors(),
         object_store_memory=STORE,
         include_dashboard=False,
         _temp_dir=str(folder),
     )
+
+
+def local_processors() -> int:
+    """How many a local cluster has."""
+    return len(os.sched_getaffinity(0))
 
 
 def _keep_for_oneself() -> None:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.cluster.package import PACKAGE, own_packages, versions
 
 NODE_LABEL = "ray.io/node-id"
@@ -87,6 +88,19 @@ class Cluster:
     def placement(self) -> dict[str, Any]:
         """Options of a task or an actor: on any of the nodes that can be used."""
         return {"label_selector": {NODE_LABEL: f"in({','.join(self.nodes)})"}}
+
+
+def check_processors(workers: int, processors: int) -> None:
+    """Holds a training's workers against a cluster.
+
+    Raises:
+        WorkbenchError: if it has fewer processors than there are workers.
+    """
+    if processors < workers:
+        raise WorkbenchError(
+            f"num_envs {workers} takes as many processors, and the cluster has {processors}: "
+            f"--num-envs {max(processors, 1)}, or more machines"
+        )
 
 
 def only(node_id: str) -> dict[str, str]:

@@ -78,7 +78,6 @@ class CommandLine:
             allow_abbrev=False,
             argument_default=argparse.SUPPRESS,
             parents=list(parents),
-            conflict_handler="resolve",  # commands that train have --ray, too: this is the same
         )
         add = self.parser.add_argument
         add("--config", metavar="FILE", help=f"options in YAML (config/{kind.config})")

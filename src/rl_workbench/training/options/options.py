@@ -82,12 +82,13 @@ class Options:
                 action = argparse.BooleanOptionalAction
                 parser.add_argument(flag, action=action, default=argparse.SUPPRESS, help=text)
                 continue
+            metavar = each.metadata["metavar"] or name.rsplit("_", 1)[-1].upper()
             parser.add_argument(
                 flag,
                 type=self._argument_type(name),
                 choices=each.metadata["choices"],
                 default=argparse.SUPPRESS,
-                metavar=None if each.metadata["choices"] else name.rsplit("_", 1)[-1].upper(),
+                metavar=None if each.metadata["choices"] else metavar,
                 help=text,
             )
 

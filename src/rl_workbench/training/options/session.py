@@ -1,17 +1,27 @@
-"""What holds for one session of a training: no setting of it, so it is recorded nowhere and may differ when
-it goes on."""
+"""What holds for one session: no setting of a training, so it is recorded nowhere and may differ when it goes
+on."""
 
 from dataclasses import dataclass
 
 from rl_workbench.option import option
-from rl_workbench.training.options.ray_flag import HELP
 
 
 @dataclass(frozen=True)
-class SessionOptions:
+class ClusterOptions:
+    """Where a command's trainings, or the environments of one, are."""
+
+    ray: str | None = option(
+        None,
+        "on a cluster of Ray's: HOST:PORT of its head, auto for the one that this machine belongs to, or "
+        "local to start one on this machine alone",
+        metavar="ADDRESS",
+    )
+
+
+@dataclass(frozen=True)
+class SessionOptions(ClusterOptions):
     """What is seen of a training beside the terminal, and where its environments are."""
 
     gui: bool = option(
         False, "show it on a page in the browser: its curves, and episodes of its newest checkpoint"
     )
-    ray: str = option("", f"play in its environments {HELP}")

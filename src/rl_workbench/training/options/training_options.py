@@ -143,11 +143,11 @@ def _in_session(options: TrainingOptions, session: SessionOptions) -> TrainingOp
     """
     name = options.kind.name
     length = getattr(options.hyperparameters, "n_steps", SHORTEST)
-    if session.ray and not options.kind.plays_elsewhere:
+    if session.ray is not None and not options.kind.plays_elsewhere:
         raise WorkbenchError(
             f"--ray is for reinforce, ppo and a2c, which learn from whole rollouts, not for {name}"
         )
-    if session.ray and length < SHORTEST:
+    if session.ray is not None and length < SHORTEST:
         raise WorkbenchError(
             f"--ray carries at least {SHORTEST} steps at a time, since each way costs what some steps "
             f"cost: {name} needs --n-steps {SHORTEST} or more, not {length}"

@@ -21,7 +21,7 @@ from ray.exceptions import ObjectStoreFullError, OutOfDiskError, RayError, RayTa
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.cluster.nodes import Cluster, Node
+from rl_workbench.training.cluster.nodes import Cluster, Node, check_processors
 from rl_workbench.training.environments.checked import EnvironmentFailure
 from rl_workbench.training.environments.several import numbered
 from rl_workbench.training.options.training_options import TrainingOptions
@@ -59,11 +59,7 @@ class Workers:
     def __init__(self, cluster: Cluster, options: TrainingOptions, say: Say) -> None:
         self._cluster, self._say = cluster, say
         self._record, self._count = options.record(), options.run.num_envs
-        if cluster.cpus < self._count:
-            raise WorkbenchError(
-                f"num_envs {self._count} takes as many processors, and the cluster has {cluster.cpus}: "
-                f"--num-envs {max(cluster.cpus, 1)}, or more machines"
-            )
+        check_processors(self._count, cluster.cpus)
         self._home = _home_of(options.run.env_id)
         self._nodes = [""] * self._count  # where each worker is
         self._playing: dict[Any, int] = {}

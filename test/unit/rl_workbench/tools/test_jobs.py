@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -136,6 +137,8 @@ def jobs(folder: Path) -> list[Job]:
     summary = {"complete": True, "steps": 300, "seconds": 1.5, "best": [200, 9.0]}
     (found[0].folder / "summary.json").write_text(json.dumps(summary))
     workbench_runs.record(found[1].folder, [20.0] * 3, total_timesteps=500)
+    with (found[1].folder / "scalars.csv").open("a") as table:
+        table.write("2,Reward,20.0,0\n")  # of REINFORCE's document, over episodes
     found[1].log.write_text("Episode 20\n\n")
     return found
 
@@ -146,6 +149,7 @@ def test_jobs_are_listed_from_files_alone(
     every = jobs(tmp_path)
     ledger = Ledger(tmp_path, every)
     ledger.began(every[1], "10.0.0.7")
+    ledger._entries[every[1]].began -= 3600.0
     ledger.ended(every[2], "ended with exit code 1: the loss is nan")
     with run_folder.held(tmp_path):
         ledger.progressed(every[1], "10.0.0.8")  # written, since something has changed
@@ -155,19 +159,26 @@ def test_jobs_are_listed_from_files_alone(
         assert cli.main(["jobs", str(tmp_path), f"--json={tmp_path / 'out.json'}"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert (
-        lines[0].split()[:2] == ["done", "done"] and "best evaluation 9.0 at step 200" in lines[0]
+        lines[0].split()[:2] == ["done", "done"]
+        and "300 steps  in 1.5 s, best evaluation 9.0 at step 200" in lines[0]
     )
     assert lines[1].split()[0] == "running" and "30 of 500 steps" in lines[1]
-    assert "on 10.0.0.8" in lines[1] and lines[1].endswith("Episode 20")
+    assert re.search("for 1:00:.. on 10.0.0.8", lines[1]) and lines[1].endswith("Episode 20")
     assert lines[2].endswith("the loss is nan") and lines[3].split()[0] == "waiting"
     assert lines[4] == "4 jobs: 1 done, 1 running, 1 failed, 1 waiting"
     assert json.loads((tmp_path / "out.json").read_text())[1]["step"] == 30
 
     # Whoever ran them was killed.
-    assert [each.state for each in read_states(tmp_path)][1] == "stopped"
+    summary = {"complete": False, "interrupted": True, "steps": 30, "seconds": 1.5, "best": None}
+    (every[1].folder / "summary.json").write_text(json.dumps(summary))
+    stopped = read_states(tmp_path)[1]
+    assert (stopped.state, stopped.line) == ("stopped", "in 1.5 s, no evaluation")
     settle(tmp_path)
     with run_folder.held(tmp_path):
         assert [each.state for each in read_states(tmp_path)][1] == "waiting"
+        ledger.lost(every[1], "its node died")
+        ledger._write()
+        assert read_states(tmp_path)[1].line == "lost, and tried again: its node died"
 
 
 def test_where_there_are_no_jobs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -34,7 +34,7 @@ def test_eight_attempts_without_progress_are_enough(
     error: RayError, reason: str, tmp_path: Path, monkeypatch, capsys
 ) -> None:
     @contextlib.contextmanager
-    def joined(address: str) -> Iterator[Cluster]:
+    def joined(address: str, going_on: str) -> Iterator[Cluster]:
         cluster = Cluster(FakeRay({"a1b2c3": OURS}, [Began("a1b2c3"), error]), pytest.fail)
         cluster.update()
         yield cluster

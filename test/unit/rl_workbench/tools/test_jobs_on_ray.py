@@ -42,7 +42,7 @@ def finished(process: subprocess.Popen[str], code: int = 0) -> str:
 def state(out: Path, seed: int) -> JobState:
     """Of a job; as if it waited, before there is a list of them."""
     if not (out / "jobs.json").exists():
-        return JobState("", "", "waiting", 0, 0, "", 0, "")
+        return JobState("", "", "waiting", 0, 0, "", 0, 0.0, "")
     return read_states(out)[seed]
 
 

@@ -122,7 +122,12 @@ def test_view_plays_it(trained: Path, server) -> None:
     env.close()
 
 
-def test_benchmark_trains_in_processes_of_their_own(tmp_path: Path, capsys) -> None:
+def test_benchmark_trains_in_processes_of_their_own(tmp_path: Path, monkeypatch, capsys) -> None:
+    """They find the modules that this one finds, and no others in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("token", "random", "queue"):  # of the standard library
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('not the standard library')\n")
+    monkeypatch.delenv("PYTHONPATH")
     options = ["env_kwargs=moves=4", "total_timesteps=200", "learning_starts=50", "eval_frequency=0",
                "confirm_episodes=0", "eval_episodes=1"]  # fmt: skip
     wanted = ["--seeds", "1", "--episodes", "2", "--out", str(tmp_path / "out")]

@@ -1,5 +1,6 @@
 """What a node does: one attempt at a job, in a worker of Ray's; the training is a process of its own."""
 
+import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -14,7 +15,9 @@ from rl_workbench.training.cluster.scratch import scratch_folder
 
 LOOK_EVERY = 0.5  # [s] at the training's files
 GROWTH_EVERY = 5.0  # [s] at least between two parcels of tables alone
-TIME_TO_SAVE = 2.0  # [s] after being stopped; it can be resumed from its last checkpoint anyway
+TIME_TO_SAVE = (
+    60.0  # [s] at most after being stopped; who can't wait for that ends the worker by force
+)
 TOKEN = ".seen_by_nodes"
 
 
@@ -24,6 +27,20 @@ class Home(NamedTuple):
     folder: Path
     token: str  # in a file there: who reads it sees the same folder
     is_shared: bool | None  # None: find out
+
+
+class Program(NamedTuple):
+    """What starts the command line on the driver's machine."""
+
+    words: Sequence[str]  # without `train`
+    modules: str  # PYTHONPATH
+
+    def here(self) -> "Program":
+        """The same on this machine, whose own modules come first."""
+        # Where Python is may differ between machines.
+        own = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+        modules = filter(None, [*own, *self.modules.split(os.pathsep)])
+        return Program([sys.executable, *self.words[1:]], os.pathsep.join(modules))
 
 
 class Began(NamedTuple):
@@ -36,24 +53,21 @@ Told = Began | Parcel | Ending
 
 
 def attempt(
-    job: Job, home: Home, luggage: Sequence[Any] | None, program: Sequence[str]
+    job: Job, home: Home, luggage: Sequence[Any] | None, program: Program
 ) -> Iterator[Told]:
     """Trains, and tells what there is to be told of it, an Ending as the last.
 
     Args:
         luggage: references to the parcels of a half done run; None: nobody has packed them, since all
             nodes see the folder.
-        program: what starts the command line, without `train`.
     """
     import ray
 
     node = ray.get_runtime_context().get_node_id()
     is_shared = sees(home) if home.is_shared is None else home.is_shared
     yield Began(node)
-    # Where Python is may differ between machines.
-    words = [sys.executable, *program[1:]]
     if is_shared:
-        yield from _run(job, job.folder, words, None)
+        yield from _run(job, job.folder, program.here(), None)
     elif luggage is None:
         yield Ending(lost=f"its node doesn't see {home.folder}")
     else:
@@ -65,7 +79,7 @@ def attempt(
             outbox = Outbox(folder, log_of(folder))
             for _ in outbox.pack():  # that is what home has
                 pass
-            yield from _run(job, folder, words, outbox)
+            yield from _run(job, folder, program.here(), outbox)
 
 
 def sees(home: Home) -> bool:
@@ -76,11 +90,13 @@ def sees(home: Home) -> bool:
         return False
 
 
-def _run(job: Job, folder: Path, program: Sequence[str], outbox: Outbox | None) -> Iterator[Told]:
+def _run(job: Job, folder: Path, program: Program, outbox: Outbox | None) -> Iterator[Told]:
     """The training as a process; its files, if they are to be carried, as they are written."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        process = TrainingProcess(command(job, folder, program), log_of(folder), environment())
+        words = command(job, folder, program.words)
+        own = environment(program.modules)
+        process = TrainingProcess(words, log_of(folder), own, at_callers_end="KILL")
     except WorkbenchError as error:
         yield Ending(lost=str(error))
         return

@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import search_path
 from rl_workbench.tools.jobs.cluster.attempt import (
     TOKEN,
     Began,
     Home,
+    Program,
     attempt,
     sees,
 )
@@ -66,7 +68,11 @@ class RayNodes:
         at_once: int | None,
         folders: str | None,
     ) -> None:
-        self._cluster, self._ray, self._program = cluster, cluster.ray, list(program)
+        self._cluster, self._ray, self._program = (
+            cluster,
+            cluster.ray,
+            Program(list(program), search_path()),
+        )
         self._at_once, self._running = at_once, list[_Attempt]()
         self._refused: list[tuple[Job, Ending]] = []
         is_shared = None if folders is None else folders == SHARED

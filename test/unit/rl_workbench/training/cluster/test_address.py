@@ -1,5 +1,6 @@
 """Addresses where no cluster is: one line, found out without Ray."""
 
+import os
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -8,7 +9,7 @@ import pytest
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.cluster import address
+from rl_workbench.training.cluster import address, joining
 from rl_workbench.training.cluster.address import check_address
 
 Answering = Callable[[bytes], str]
@@ -90,7 +91,20 @@ def test_a_command_says_it_in_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     place = ["--out", str(tmp_path / "out")] if command[0] == "benchmark" else []
-    for where in ("127.0.0.1:1", answering(b"SSH-2.0-OpenSSH_9.2\r\n")):
+    for where in ("127.0.0.1:1", "", answering(b"SSH-2.0-OpenSSH_9.2\r\n")):
         assert cli.main([*command, *place, "--ray", where]) == 1
         said = capsys.readouterr().err.splitlines()
         assert len(said) == 1 and where in said[0] and said[0].startswith("rl-workbench"), said
+
+
+@pytest.mark.extras("ray")
+@pytest.mark.usefixtures("signals")
+def test_more_workers_than_this_machine_has_processors(tmp_path, monkeypatch, capsys) -> None:
+    """Nobody waits until a cluster has started."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(joining, "_init", lambda *_, **__: pytest.fail())
+    count = len(os.sched_getaffinity(0))
+    command = ["train", "--algo", "reinforce", f"--num-envs={count + 1}", "--ray=local"]
+    assert cli.main(command) == 1
+    (said,) = capsys.readouterr().err.splitlines()
+    assert f"num_envs {count + 1} takes as many processors, and the cluster has {count}: " in said

@@ -67,7 +67,7 @@ def test_a_cluster_none_of_whose_nodes_can_be_used(monkeypatch: pytest.MonkeyPat
         pytest.raises(
             WorkbenchError, match="^no node of the cluster at 10.0.0.1:6379 can be used$"
         ),
-        joining.joined("10.0.0.1:6379", said.append),
+        joining.joined("10.0.0.1:6379", "", said.append),
     ):
         pytest.fail("it was entered")
     assert len(said) == 1
@@ -88,7 +88,7 @@ def test_another_version_of_ray_or_python_is_a_line(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(joining, "check_address", lambda address: None)
     with (
         pytest.raises(WorkbenchError) as raised,
-        joining.joined("10.0.0.1:6379", pytest.fail),
+        joining.joined("10.0.0.1:6379", "", pytest.fail),
     ):
         pytest.fail("it was entered")
     assert str(raised.value) == (
