@@ -72,8 +72,13 @@ def test_help_names_all_commands(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize(
     ("name", "flag"),
-    [("dqn", "--dueling"), ("reinforce", "--gae-lambda"), ("reinforce-document", "--save-every"),
-     ("ppo", "--clip-range"), ("sac", "--ent-coef")],
+    [
+        ("dqn", "--dueling"),
+        ("reinforce", "--gae-lambda"),
+        ("reinforce-document", "--save-every"),
+        ("ppo", "--clip-range"),
+        ("sac", "--ent-coef"),
+    ],
 )
 @pytest.mark.extras("stable_baselines3")
 def test_every_algorithm_shows_its_own_flags(

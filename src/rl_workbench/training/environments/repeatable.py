@@ -39,17 +39,11 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._start = ""  # the generator before the reset; nothing where that is seeded
         self._seed: int | None = None  # of the reset, if it had one
         self._last = np.empty(0, np.float32)  # observation
-        self._was_begun = False
 
     @property
     def length(self) -> int:
         """Steps of the episode so far."""
         return len(self._actions)
-
-    @property
-    def was_begun(self) -> bool:
-        """Whether there was a first episode."""
-        return self._was_begun
 
     @property
     def generator(self) -> str:
@@ -66,7 +60,6 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Begins an episode."""
         self._actions, self._seed = [], seed
         self._start = self.generator if seed is None else ""
-        self._was_begun = True
         observation, info = self.env.reset(seed=seed, options=options)
         self._last = as_vector(observation)
         return observation, info

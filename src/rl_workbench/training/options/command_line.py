@@ -22,8 +22,8 @@ Trains {about}.
 
 What isn't given comes from config/{config}, the environment's section, else it is the default.
 --params wins over the file, {ros}and a flag over all of them.
-Ctrl-C saves everything and exits with 130 (SIGTERM: 143, SIGHUP: 129, SIGXCPU: 152); --resume goes on from there,
-to the same bits as a training that was never interrupted.
+Ctrl-C saves everything and exits with 130 (SIGTERM: 143, SIGHUP: 129, SIGXCPU: 152); --resume goes on from
+there, to the same bits as a training that was never interrupted.
 Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
 
 

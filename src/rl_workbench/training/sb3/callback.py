@@ -46,7 +46,10 @@ class FrameCallback(BaseCallback):
 
     def _on_training_start(self) -> None:
         model: Any = self.model  # off-policy, where it has a replay buffer
-        self._arrived, self._is_on_policy = model.num_timesteps, isinstance(model, OnPolicyAlgorithm)
+        self._arrived, self._is_on_policy = (
+            model.num_timesteps,
+            isinstance(model, OnPolicyAlgorithm),
+        )
         lengths = getattr(getattr(model, "replay_buffer", None), "ep_length", None)
         if lengths is not None and not lengths.any():
             self._held, model.learning_starts = model.learning_starts, math.inf

@@ -92,7 +92,9 @@ class Positions:
         model._last_obs = _observations(state["observations"], model.observation_space, count)
         model._last_episode_starts = array(state["begins"], torch.bool, (count,))
         set_generator(model.action_space.np_random, state["actions"])
-        found = [self.bring_back(each) for each in zip(range(count), episodes, generators)]
+        found = [
+            self.bring_back(each) for each in zip(range(count), episodes, generators, strict=True)
+        ]
         return [index for index, is_there in enumerate(found) if not is_there]
 
     def leave(self, index: int) -> tuple[int, Any, str]:

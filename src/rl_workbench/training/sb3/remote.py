@@ -124,7 +124,7 @@ class RemoteTraining(SB3Training):
     def environment_state(self) -> None:
         """None: the workers tell where their environments are."""
 
-    def start_environment(self, state: None, say: Say) -> None:
+    def start_environment(self, state: Any, say: Say) -> None:
         """Nothing to do: the workers are told where their environments are."""
 
     def close(self) -> None:
@@ -150,7 +150,9 @@ class FragmentCallback(FrameCallback):
         before, count = model.num_timesteps, len(fragments)
         for index, fragment in enumerate(fragments):
             if fragment.was_cut:
-                tell(f"environment {index + 1} of {count} doesn't repeat itself: its episode was cut off")
+                tell(
+                    f"environment {index + 1} of {count} doesn't repeat itself: its episode was cut off"
+                )
         ended = [
             (each.step, index, each) for index, one in enumerate(fragments) for each in one.ended
         ]

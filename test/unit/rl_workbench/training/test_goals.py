@@ -99,9 +99,7 @@ def test_progress_and_summary_tell_the_rate(tmp_path: Path, capsys) -> None:
 
 @SB3
 @pytest.mark.parametrize("strategy", STRATEGIES)
-def test_a_resumed_hindsight_has_its_episodes(
-    tmp_path: Path, monkeypatch, strategy: str
-) -> None:
+def test_a_resumed_hindsight_has_its_episodes(tmp_path: Path, monkeypatch, strategy: str) -> None:
     """Interrupted in the midst of an episode that doesn't come back, of a buffer that is full."""
     folder = made(
         tmp_path, "sac-her", goal_selection_strategy=strategy, total_timesteps=250, buffer_size=90

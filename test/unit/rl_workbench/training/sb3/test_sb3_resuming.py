@@ -4,11 +4,9 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import pytest
 import torch
 from goal_environments import REACH
-from learning_fakes import POLE, Dicing, register_with
 from training_runs import (
     InterruptAfter,
     assert_no_doubles,
@@ -16,13 +14,9 @@ from training_runs import (
     checkpoint,
     options_of,
     resume,
-    rows,
     run,
     summary,
 )
-
-from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.sb3.model import make_model
 
 pytestmark = [pytest.mark.extras("stable_baselines3"), pytest.mark.slow]
 

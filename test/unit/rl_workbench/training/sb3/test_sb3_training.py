@@ -151,7 +151,9 @@ def test_the_state_comes_back_whole(whole) -> None:
     model.get_env().close()
 
 
-def test_one_of_an_earlier_version_goes_on_with_other_episodes(whole, tmp_path: Path, capsys) -> None:
+def test_one_of_an_earlier_version_goes_on_with_other_episodes(
+    whole, tmp_path: Path, capsys
+) -> None:
     first = gymnasium.make("Pendulum-v1").reset(seed=3)[0]
 
     def has_begun_with_it(folder: Path) -> bool:
