@@ -4,16 +4,19 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import pytest
 import torch
 from goal_environments import REACH
 from training_runs import (
     InterruptAfter,
     assert_no_doubles,
+    assert_same,
     assert_same_run,
     checkpoint,
     options_of,
     resume,
+    rows,
     run,
     summary,
 )
@@ -82,3 +85,37 @@ def test_resumed_it_is_the_training_that_was_never_broken_off(tmp_path: Path, na
     assert_same_run(whole, resume(run))
     if not name.endswith("-3"):  # of which some end at the same step
         assert_no_doubles(run)
+
+
+@pytest.mark.parametrize("name", ["a2c", "td3"])
+def test_prolonged_it_is_the_one_that_was_longer_from_the_start(tmp_path: Path, name: str) -> None:
+    """One ends with a rollout that goes beyond its last step, the other in the midst of an episode."""
+    constant = {"lr_schedule": "constant"}
+    whole = train(tmp_path / "whole", name, **constant)
+    run = train(tmp_path / "run", name, **constant, total_timesteps=73)
+    resume(run, total_timesteps=120)
+    assert rows(run) == rows(whole)
+    assert_same(checkpoint(run), checkpoint(whole))
+
+
+@pytest.mark.parametrize("name", ["ppo-3", "sac-3"])
+def test_what_does_not_repeat_itself_is_cut_off(
+    tmp_path: Path, monkeypatch, capsys, name: str
+) -> None:
+    run = train(tmp_path, name, total_timesteps=48)
+    before = checkpoint(run)
+    for env_id in ("CartPole-v1", "Pendulum-v1"):
+        monkeypatch.setattr(gymnasium.registry[env_id], "nondeterministic", True)
+    resume(run, total_timesteps=120)
+    told = capsys.readouterr().err
+    lengths = [len(each["actions"]) for each in before["environment"]["episodes"]]
+    lost = [length for length in lengths if length]
+    assert (
+        told.count("of 3 doesn't repeat itself: the episode under way is cut off") == len(lost) > 0
+    )
+    after = summary(run)
+    assert after["complete"] and after["steps"] >= 120
+    if before["buffer"]:
+        arrays, last = checkpoint(run)["buffer"]["arrays"], before["buffer"]["position"] - 1
+        for name in ("dones", "timeouts"):
+            assert arrays[name][last].tolist() == [1.0] * 3, "as at a time limit"
