@@ -22,7 +22,7 @@ from rl_workbench.training.options.training_options import (
 from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.training import Training
 
-EXACT = ("dqn", "reinforce", "reinforce-document")  # resumed, they come to the same bits
+EXACT = ("dqn", "reinforce", "reinforce-document")  # our own; they need no extras
 OTHERS = [
     pytest.param(name, marks=pytest.mark.extras("stable_baselines3")) for name in ("ppo", "sac")
 ]
@@ -73,6 +73,7 @@ SMALL: dict[str, dict[str, Any]] = {
         "total_timesteps": 256,
         "n_steps": 64,
         "batch_size": 64,
+        "log_frequency": 64,
         "net_arch": "8",
         "eval_frequency": 100,
         "checkpoint_frequency": 70,
@@ -88,6 +89,7 @@ SMALL: dict[str, dict[str, Any]] = {
         "net_arch": "8",
         "eval_frequency": 100,
         "checkpoint_frequency": 50,
+        "log_frequency": 20,
     },
 }
 

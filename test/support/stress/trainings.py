@@ -30,6 +30,13 @@ OPTIONS: dict[str, dict[str, Any]] = {
     },
     "reinforce-document": {"episodes": 90, "eval_frequency": 500, "checkpoint_frequency": 25},
     "ppo": {"total_timesteps": 5000, "eval_frequency": 1000, "checkpoint_frequency": 250},
+    "sac": {
+        "env_id": "Pendulum-v1",
+        "env_kwargs": "max_episode_steps=20",
+        "total_timesteps": 800,
+        "eval_frequency": 200,
+        "checkpoint_frequency": 50,
+    },
 }
 # Every start of a process reads the exit codes of all that have ended, and each can be read once.
 _ONE_AT_A_TIME = threading.Lock()

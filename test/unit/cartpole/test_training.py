@@ -51,14 +51,17 @@ def test_it_resumes_exactly(tmp_path: Path, name: str) -> None:
 def test_in_two_simulators_it_comes_to_the_bits_of_two_worlds_here(
     tmp_path: Path, name: str, length: dict[str, int]
 ) -> None:
-    """Both are at work at the same time; policies are evaluated in this process."""
+    """Both are at work at the same time; policies are evaluated in this process. Those over ROS are ended in
+    their midst, and gone on with in new ones."""
     given = {"env_id": "cartpole/Balance-v0", "env_kwargs": {"noise": 0.02}, "num_envs": 2, **length,
              "eval_env_kwargs": {"backend": "bullet"}}  # fmt: skip
-    places = {"bullet": {}, "ros-own": {"backend": "ros-own"}}
-    here, there = (
-        train(tmp_path / place, name, **given, train_env_kwargs=options)
-        for place, options in places.items()
-    )
+    counting = InterruptAfter()
+    here, there = tmp_path / "here", tmp_path / "there"
+    train(here, name, counting, **given)
+    simulators = {"train_env_kwargs": {"backend": "ros-own"}}
+    train(there, name, InterruptAfter(counting.times * 2 // 3), **given, **simulators)
+    assert summary(there)["interrupted"]
+    resume(there)
     for name in ("agent", "policy", "optimizers", "history", "environment"):
         mine, other = (checkpoint(run).get(name) for run in (here, there))
         assert_same(mine, other, name)

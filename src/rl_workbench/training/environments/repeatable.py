@@ -5,7 +5,7 @@ same actions bring it back there: that is what is kept.
 """
 
 import json
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -14,6 +14,17 @@ from gymnasium import spaces
 
 from rl_workbench.states import array, whole
 from rl_workbench.training.environments.answers import as_vector
+
+
+class Mark(NamedTuple):
+    """A place in an episode, cheap to remember."""
+
+    start: str
+    seed: int | None
+    actions: list[Any]  # those that come later, too
+    length: int  # of it [steps]
+    last: np.ndarray
+    generator: Any
 
 
 class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -25,20 +36,14 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         super().__init__(env)
         self._actions: list[Any] = []
-        self._start = ""  # the generator before the reset
+        self._start = ""  # the generator before the reset; nothing where that is seeded
         self._seed: int | None = None  # of the reset, if it had one
         self._last = np.empty(0, np.float32)  # observation
-        self._was_begun = False
 
     @property
     def length(self) -> int:
         """Steps of the episode so far."""
         return len(self._actions)
-
-    @property
-    def was_begun(self) -> bool:
-        """Whether there was a first episode."""
-        return self._was_begun
 
     @property
     def generator(self) -> str:
@@ -53,8 +58,8 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begins an episode."""
-        self._actions, self._seed, self._start = [], seed, self.generator
-        self._was_begun = True
+        self._actions, self._seed = [], seed
+        self._start = self.generator if seed is None else ""
         observation, info = self.env.reset(seed=seed, options=options)
         self._last = as_vector(observation)
         return observation, info
@@ -65,6 +70,22 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._actions.append(np.array(action))
         self._last = as_vector(observation)
         return observation, reward, terminated, truncated, info
+
+    def mark(self) -> Mark:
+        """Remembers the place in the episode under way."""
+        generator = self.env.unwrapped.np_random.bit_generator.state
+        return Mark(
+            self._start, self._seed, self._actions, self.length, self._last.copy(), generator
+        )
+
+    def take_back(self, mark: Mark) -> None:
+        """Forgets what was done since `mark`: `state_dict` tells of that place again.
+
+        The environment itself isn't moved: this is for the end of a training.
+        """
+        self._start, self._seed, self._last = mark.start, mark.seed, mark.last
+        self._actions = mark.actions[: mark.length]
+        self.env.unwrapped.np_random.bit_generator.state = mark.generator
 
     def state_dict(self) -> dict[str, Any]:
         """How the episode began, its actions, and where they led."""
@@ -87,7 +108,8 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         after = self.generator
         if self.env.spec is not None and self.env.spec.nondeterministic:
             return None
-        self.generator = state["start"]
+        if state["start"]:
+            self.generator = state["start"]
         seed = state.get("seed")
         self.reset(seed=None if seed is None else whole(seed))
         wanted = array(state["observation"], torch.float32, self._last.shape)

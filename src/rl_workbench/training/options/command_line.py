@@ -22,7 +22,8 @@ Trains {about}.
 
 What isn't given comes from config/{config}, the environment's section, else it is the default.
 --params wins over the file, {ros}and a flag over all of them.
-Ctrl-C saves everything and exits with 130 (SIGTERM: 143, SIGHUP: 129, SIGXCPU: 152); {resume}.
+Ctrl-C saves everything and exits with 130 (SIGTERM: 143, SIGHUP: 129, SIGXCPU: 152); --resume goes on from
+there, to the same bits as a training that was never interrupted.
 Exit codes: 0 done, 1 failed (what was learned is saved), 2 wrong arguments."""
 
 
@@ -71,7 +72,6 @@ class CommandLine:
             description=DESCRIPTION.format(
                 about=kind.about,
                 config=kind.config,
-                resume=kind.resuming,
                 ros="under roslaunch a private ROS parameter over --params, " if is_node else "",
             ),
             formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -21,7 +21,6 @@ class AlgorithmKind:
         hyperparameters: gives the dataclass of the algorithm's own options.
         defaults: of common options, where they are this algorithm's own.
         presets: whether the file has sections that no environment is called after.
-        resuming: for --help: what --resume comes to.
         keeps_dict: whether it learns from a Dict of arrays as it is; others get all of its numbers in one
             vector.
         plays_elsewhere: whether it learns from whole rollouts, which workers on other machines can play.
@@ -37,9 +36,6 @@ class AlgorithmKind:
     section: str = "{env_id}"
     defaults: Mapping[str, Any] = field(default_factory=dict)
     presets: bool = False
-    resuming: str = (
-        "--resume goes on from there,\nto the same bits as a training that was never interrupted"
-    )
     keeps_dict: bool = False
     plays_elsewhere: bool = False
     learns_in_several: bool = False

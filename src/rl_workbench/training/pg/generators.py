@@ -1,15 +1,14 @@
 """The random generators that episodes draw from, and the way back from those that are broken off."""
 
 import json
-import random
 from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
 import numpy as np
-import torch
 
 from rl_workbench.states import sequence, set_generator
+from rl_workbench.training.run.random_states import mark_random_states, rewind_random_states
 
 
 def action_generator(seed: int, index: int) -> np.random.Generator:
@@ -71,17 +70,12 @@ class EpisodeGenerators:
 
     def mark(self) -> None:
         """Remembers where they all are."""
-        self._process: Any = (
-            random.getstate(), np.random.get_state(legacy=False), torch.get_rng_state()
-        )  # fmt: skip
+        self._process = mark_random_states()
         self._states = [each.bit_generator.state for each in self._own()]
 
     def rewind(self) -> None:
         """Brings them back to where `mark` found them."""
-        python, numpy, tensor = self._process
-        random.setstate(python)
-        np.random.set_state(numpy)
-        torch.set_rng_state(tensor)
+        rewind_random_states(self._process)
         for generator, state in zip(self._own(), self._states, strict=True):
             generator.bit_generator.state = state
 

@@ -15,6 +15,19 @@ def seed_all(seed: int) -> None:
     torch.manual_seed(seed)
 
 
+def mark_random_states() -> Any:
+    """The same as `random_states`, quickly, for `rewind_random_states` in this process."""
+    return random.getstate(), np.random.get_state(legacy=False), torch.get_rng_state()
+
+
+def rewind_random_states(mark: Any) -> None:
+    """Takes back what was drawn since `mark_random_states`."""
+    python, numpy, tensor = mark
+    random.setstate(python)
+    np.random.set_state(numpy)
+    torch.set_rng_state(tensor)
+
+
 def random_states() -> dict[str, Any]:
     """All three, as texts and a tensor."""
     numpy_state: Any = np.random.get_state(legacy=False)

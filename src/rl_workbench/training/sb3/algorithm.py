@@ -8,17 +8,18 @@ import gymnasium
 import numpy as np
 import torch
 from gymnasium import spaces
-from stable_baselines3.common.logger import Logger
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.algorithm import Algorithm, Frame, Say
 from rl_workbench.training.run.files import write_atomically
 from rl_workbench.training.run.policy import Policy
-from rl_workbench.training.sb3.callback import FrameCallback, LossWriter
-from rl_workbench.training.sb3.model import make_model, repeatable_of
+from rl_workbench.training.sb3.buffer import cut_off
+from rl_workbench.training.sb3.callback import FrameCallback
+from rl_workbench.training.sb3.model import make_model
 from rl_workbench.training.sb3.network import greedy_network
 from rl_workbench.training.sb3.options import ON_POLICY
+from rl_workbench.training.sb3.positions import Positions
 from rl_workbench.training.sb3.state import FRAGMENTS, check_weights, restore, state_of
 
 # What the library raises in the midst of learning: weights or options that are no good.
@@ -27,10 +28,7 @@ MODEL = "model.zip"  # Stable-Baselines3's own form, for its own load()
 
 
 class SB3Training(Algorithm):
-    """A model of Stable-Baselines3.
-
-    Not in a checkpoint: the state of the environment and of the random generators, and a rollout
-    that isn't whole yet. So a resumed training begins a new episode, and isn't the same to the bit.
+    """A model of Stable-Baselines3; evaluated and saved between two rollouts.
 
     Args:
         options: what the user chose.
@@ -40,7 +38,8 @@ class SB3Training(Algorithm):
 
     def __init__(self, options: TrainingOptions, model: Any, env: gymnasium.Env[Any, Any]) -> None:
         self._run, self._name, self._model, self.env = options.run, options.kind.name, model, env
-        self._is_given_up = False  # the episode under way, whose robot was moved
+        self._positions = Positions(model)
+        self._course: FrameCallback | None = None  # of its learning
 
     @property
     def steps(self) -> int:
@@ -49,8 +48,8 @@ class SB3Training(Algorithm):
 
     @property
     def stride(self) -> int:
-        """A step of each environment."""
-        return int(self._model.n_envs)
+        """The steps of a rollout."""
+        return int(self._model.stride)
 
     def act_greedily(self, observation: np.ndarray) -> Any:
         """See `Algorithm.act_greedily`."""
@@ -59,11 +58,12 @@ class SB3Training(Algorithm):
     def learn(self, frame: Frame) -> None:
         """See `Algorithm.learn`."""
         remaining = max(self._run.total_timesteps - self.steps, 0)
-        self._model.set_logger(Logger(None, [LossWriter(frame)]))
+        self._course = self._callback(frame)
         try:
             self._model.learn(
                 remaining,
-                callback=self._callback(frame),
+                callback=self._course,
+                log_interval=None,  # losses are logged between two rollouts
                 reset_num_timesteps=False,
             )
         except WorkbenchError:
@@ -74,7 +74,11 @@ class SB3Training(Algorithm):
             raise WorkbenchError(f"{self._name} failed: {text}") from error
 
     def _callback(self, frame: Frame) -> FrameCallback:
-        return FrameCallback(frame, self._run.total_timesteps, self._take_loss)
+        return FrameCallback(frame, self._positions, self._run.log_frequency)
+
+    def settle(self) -> bool:
+        """Takes back what was played since the last rollout; what was learned by halves can't be."""
+        return self._course is not None and self._course.go_back()
 
     def check_weights(self) -> None:
         """See `Algorithm.check_weights`."""
@@ -90,38 +94,43 @@ class SB3Training(Algorithm):
             raise WorkbenchError(
                 "it was begun with --ray: it goes on with --ray, on whatever cluster"
             )
-        restore(self._model, state, self._run.seed)
+        restore(self._model, state, self._run.total_timesteps)
 
-    def environment_state(self) -> None:
-        """None: it can't be brought back."""
-        return
+    def environment_state(self) -> dict[str, Any] | None:
+        """Where all environments are; None before their first episodes."""
+        return self._positions.state_dict()
 
-    def start_environment(self, state: None, say: Say) -> None:
-        """Nothing to do: the model seeds it, and begins a new episode."""
-        if self.steps:
-            say("it goes on with a new episode and other random numbers")
+    def start_environment(self, state: dict[str, Any] | None, say: Say) -> None:
+        """Repeats the episodes under way. At the beginning, the model seeds and begins them."""
+        if state is not None:
+            for index in self._positions.load_state_dict(state):
+                self._say_lost(index, say)
+        elif self.steps:
+            self._begin_anew()
+            say(
+                "its checkpoint is of an earlier version, which kept no episodes: it goes on with new ones "
+                "and other random numbers"
+            )
 
-    def leave_environment(self) -> dict[str, Any] | None:
-        """See `Algorithm.leave_environment`."""
-        place = repeatable_of(self._model.get_env())
-        if not place.was_begun:
-            return None
-        return {"episode": place.state_dict(), "generator": place.generator}
+    def _begin_anew(self) -> None:
+        """Other episodes than at the start, or the same ones would be explored again."""
+        self._model.set_random_seed((self._run.seed + self.steps) % 2**31)
+        for index in range(self._model.n_envs):
+            cut_off(getattr(self._model, "replay_buffer", None), index)
 
-    def restore_environment(self, state: dict[str, Any] | None, say: Say) -> None:
+    def _say_lost(self, index: int, say: Say) -> None:
+        count = self._model.n_envs
+        which = "the environment" if count == 1 else f"environment {index + 1} of {count}"
+        say(f"{which} doesn't repeat itself: the episode under way is cut off")
+
+    def leave_environment(self) -> Any:
+        """See `Algorithm.leave_environment`; it is the first one that evaluations move."""
+        return self._positions.leave(0) if self._model._last_obs is not None else None
+
+    def restore_environment(self, state: Any, say: Say) -> None:
         """Repeats the episode under way; says so if it goes another way."""
-        if state is None:
-            return
-        place = repeatable_of(self._model.get_env())
-        place.generator = state["generator"]
-        self._is_given_up = place.load_state_dict(state["episode"]) is None
-        if self._is_given_up and len(state["episode"]["actions"]):
-            say("the environment doesn't repeat itself: the episode under way is cut off")
-
-    def _take_loss(self) -> bool:
-        """Whether the episode under way was given up since this was asked last."""
-        was, self._is_given_up = self._is_given_up, False
-        return was
+        if state is not None and not self._positions.bring_back(state):
+            self._say_lost(0, say)
 
     def export(self, folder: Path) -> None:
         """Writes model.zip, for Stable-Baselines3's own load()."""

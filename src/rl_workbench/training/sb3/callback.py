@@ -1,122 +1,139 @@
 """What Stable-Baselines3's loop tells the frame, and what the frame has it do."""
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
-import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import KVWriter
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.environments.answers import succeeded
 from rl_workbench.training.run.algorithm import Frame
-
-TAGS = {  # Stable-Baselines3's: ours
-    "train/loss": "losses/loss",
-    "train/value_loss": "losses/value_loss",
-    "train/policy_loss": "losses/policy_loss",
-    "train/policy_gradient_loss": "losses/policy_loss",
-    "train/actor_loss": "losses/actor_loss",
-    "train/critic_loss": "losses/critic_loss",
-}
+from rl_workbench.training.sb3.positions import Mark, Positions
+from rl_workbench.training.sb3.state import LOSSES, losses_of
 
 
-class LossWriter(KVWriter):
-    """Writes the losses that a model reports."""
+class Ended(NamedTuple):
+    """An episode that ended within a rollout."""
 
-    def __init__(self, frame: Frame) -> None:
-        self._frame = frame
-
-    def write(
-        self, key_values: dict[str, Any], key_excluded: dict[str, Any], step: int = 0
-    ) -> None:
-        found = {TAGS[key]: float(key_values[key]) for key in TAGS if key in key_values}
-        for tag, value in found.items():
-            check_finite(tag, value)
-        self._frame.log.add(step, found)
-
-    def close(self) -> None:
-        """The log is closed by who made it."""
+    step: int
+    total_reward: float
+    length: int  # [steps]
+    success: bool | None  # None if the environment doesn't say
 
 
 class FrameCallback(BaseCallback):
-    """Tells the frame of episodes and steps, and stops when it says so.
+    """Between two rollouts it has the frame evaluate and save, and stops when that says so.
+
+    On-policy, an interrupt breaks off a rollout, and what was played of it is taken back: its episodes are
+    told when it is whole. Off-policy, rollouts are short, and change what was learned: they go to their end.
 
     Args:
         frame: of the training.
-        total_timesteps: its length.
-        was_given_up: whether an evaluation has moved the robot, whose episode can't be brought back.
+        positions: of its model; None where workers have the environments.
+        log_frequency: steps between two points of losses.
     """
 
-    def __init__(
-        self, frame: Frame, total_timesteps: int, was_given_up: Callable[[], bool]
-    ) -> None:
+    def __init__(self, frame: Frame, positions: Positions | None, log_frequency: int) -> None:
         super().__init__()
-        self._frame, self._total, self._was_given_up = frame, total_timesteps, was_given_up
+        self._frame, self._positions, self._log_frequency = frame, positions, log_frequency
+        self._ended: list[Ended] = []  # not told yet
         self._episodes = 0
         self._held: int | None = None  # learning_starts, while hindsight has no whole episode
+        self._mark: Mark | None = None
+        self._can_go_back = False  # nothing has changed since that can't be taken back
 
     def _on_training_start(self) -> None:
         model: Any = self.model  # off-policy, where it has a replay buffer
-        self.num_timesteps = model.num_timesteps
+        self._arrived, self._is_on_policy = (
+            model.num_timesteps,
+            isinstance(model, OnPolicyAlgorithm),
+        )
         lengths = getattr(getattr(model, "replay_buffer", None), "ep_length", None)
         if lengths is not None and not lengths.any():
             self._held, model.learning_starts = model.learning_starts, math.inf
 
+    def goes_on(self) -> bool:
+        """Between two rollouts: whether there is to be another one."""
+        if self.model.num_timesteps > self._arrived:
+            self._arrive()
+        self._stand()
+        return not self._frame.is_over()
+
+    def _arrive(self) -> None:
+        model: Any = self.model
+        model.stride = model.num_timesteps - self._arrived
+        self._arrived = model.num_timesteps
+        self._log_losses(model)
+        self._stand()
+        self._frame.step_done()
+
+    def _stand(self) -> None:
+        self._can_go_back = True
+        if self._positions is not None:
+            self._mark = self._positions.mark()
+
+    def go_back(self) -> bool:
+        """Takes back what was done since the last rollout, to be saved; returns whether it could."""
+        if self._can_go_back and self._mark is not None and self._positions is not None:
+            self._positions.take_back(self._mark)
+        return self._can_go_back
+
+    def _log_losses(self, model: Any) -> None:
+        found = {LOSSES[name]: value for name, value in losses_of(model).items()}
+        for tag, value in found.items():
+            check_finite(tag, value)
+        steps, frequency = self._arrived, self._log_frequency
+        if found and steps // frequency > (steps - model.stride) // frequency:
+            self._frame.log.add(steps, found)
+            model.logger.dump(steps)  # nowhere: it forgets them
+
     def _on_step(self) -> bool:
+        steps = self.model.num_timesteps
         for info in self.locals["infos"]:
             if "episode" in info:
-                self._tell(*ended(info))
-        self._frame.step_done()
-        if self._was_given_up():
-            self._begin_anew()
+                self._ended.append(ended(info, steps))
+        if self._is_on_policy:
+            return not self._frame.is_interrupted()
+        self._can_go_back = False
+        self._tell()
         if self.locals["dones"].any():
             self._release()
-        # At its full length it ends by itself, and learns from the last rollout.
-        return self.num_timesteps >= self._total or not self._frame.is_over()
+        return True
 
-    def _tell(self, total_reward: float, length: int, success: bool | None) -> None:
-        self._episodes += 1
-        check_finite(f"the return of episode {self._episodes}", total_reward)
-        self._frame.episode_done(total_reward, length, {}, success=success)
+    def _on_rollout_end(self) -> None:
+        self._can_go_back = False
+        self._tell()
+
+    def _tell(self) -> None:
+        """Tells the frame of episodes, each at the step of its end."""
+        model: Any = self.model
+        now = model.num_timesteps
+        for episode in self._ended:
+            self._episodes += 1
+            check_finite(f"the return of episode {self._episodes}", episode.total_reward)
+            model.num_timesteps = episode.step
+            self._frame.episode_done(
+                episode.total_reward, episode.length, {}, success=episode.success
+            )
+        self._ended, model.num_timesteps = [], now
 
     def _on_training_end(self) -> None:
         self._release()
+        if not self.go_back() and self.model.num_timesteps > self._arrived:
+            self._arrive()
 
     def _release(self) -> None:
         model: Any = self.model
         if self._held is not None:
             self._held, model.learning_starts = None, self._held
 
-    def _begin_anew(self) -> None:
-        """Cuts the episode off at this step, as at a time limit, and begins another one.
 
-        The arrays are those that the loop goes on with. It is the first environment that was moved.
-        """
-        seen, dones, info = self.locals["new_obs"], self.locals["dones"], self.locals["infos"][0]
-        if not dones[0]:
-            dones[0], info["TimeLimit.truncated"] = True, True
-            info["terminal_observation"] = _first(seen)
-        envs: Any = self.training_env
-        begun, _ = envs.envs[0].reset()
-        parts = [(seen, begun)]
-        if isinstance(seen, dict):
-            parts = [(seen[name], begun[name]) for name in seen]
-        for array, first in parts:
-            array[0] = first
-
-
-def _first(seen: Any) -> Any:
-    """The first environment's observation, a copy."""
-    if isinstance(seen, dict):
-        return {name: np.array(part[0]) for name, part in seen.items()}
-    return np.array(seen[0])
-
-
-def ended(info: Mapping[str, Any]) -> tuple[float, int, bool | None]:
-    """Return, length [steps] and success of an episode, from its last info, where Monitor put them."""
-    return float(info["episode"]["r"]), int(info["episode"]["l"]), succeeded(info)
+def ended(info: Mapping[str, Any], step: int) -> Ended:
+    """An episode, from its last info, where Monitor put its figures."""
+    episode = info["episode"]
+    return Ended(step, float(episode["r"]), int(episode["l"]), succeeded(info))
 
 
 def check_finite(name: str, value: float) -> None:

@@ -1,42 +1,29 @@
 """Fragments of episodes, as Stable-Baselines3's own loop collects them in a worker's environment."""
 
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
-import numpy as np
-import torch
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from rl_workbench.training.environments.repeatable import RepeatableEnvironment
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.player import Player
 from rl_workbench.training.run.algorithm import environment_for
 from rl_workbench.training.run.random_states import random_states, restore_random_states
-from rl_workbench.training.sb3.callback import ended
-from rl_workbench.training.sb3.model import model_in
+from rl_workbench.training.sb3.callback import Ended, ended
+from rl_workbench.training.sb3.model import model_in, watched
+from rl_workbench.training.sb3.positions import Positions
 
 ARRAYS = ("observations", "actions", "rewards", "episode_starts", "values", "log_probs", "advantages",
           "returns")  # fmt: skip
-
-
-class Ended(NamedTuple):
-    """An episode that ended within a fragment."""
-
-    step: int  # the last one, counted in the fragment from 0 on
-    total_reward: float
-    length: int  # [steps]
-    success: bool | None  # None if the environment doesn't say
 
 
 class Fragment(NamedTuple):
     """One environment's part of a rollout."""
 
     arrays: dict[str, Any]  # of the buffer by name, (n_steps, 1, ...); observations may be a dict
-    ended: list[Ended]
+    ended: list[Ended]  # their steps are counted in the fragment, from 0 on
     was_cut: bool  # the episode under way before couldn't be brought back
     state: dict[str, Any]  # from which the next fragment goes on
 
@@ -56,11 +43,10 @@ class FragmentPlayer(Player):
         self._seed = (options.run.seed + index) % 2**31
         run = replace(options.run, seed=self._seed, device="cpu", num_envs=1)
         env = environment_for(options, run.training_environment)
-        self._place = RepeatableEnvironment(Monitor(env))
-        vector = DummyVecEnv([lambda: self._place])
+        vector = DummyVecEnv([partial(watched, env)])
         own = options.hyperparameters.own
         self._model: Any = model_in(vector, options._replace(run=run), own)
-        self._model.set_logger(Logger(None, []))
+        self._positions = Positions(self._model)
         self._generators = random_states()  # as the model begins with, after its weights
         self._told = _Told()
         self._done: int | None = None  # fragments
@@ -86,7 +72,7 @@ class FragmentPlayer(Player):
         if state is None or self._done != state["fragments"]:
             self._begin()
             if state is not None:
-                was_cut = self._repeat(state)
+                was_cut = bool(self._positions.load_state_dict(state["environment"]))
         if state is not None:
             restore_random_states(state["random"])
         return was_cut
@@ -97,25 +83,12 @@ class FragmentPlayer(Player):
         model.env.seed(self._seed)
         model._setup_learn(model.n_steps, self._told)
 
-    def _repeat(self, state: dict[str, Any]) -> bool:
-        model = self._model
-        self._place.generator = state["generator"]
-        if self._place.load_state_dict(state["episode"]) is None:
-            model._last_obs, model._last_episode_starts = model.env.reset(), np.ones(1, bool)
-            return True
-        model._last_obs = _apply(lambda part: part.numpy().copy(), state["last"])
-        model._last_episode_starts = np.array([state["begins"]])
-        return False
-
     def _state(self) -> dict[str, Any]:
         """Plain values and tensors."""
         return {
             "fragments": self._done,
             "random": random_states(),
-            "generator": self._place.generator,
-            "episode": self._place.state_dict(),
-            "last": _apply(torch.from_numpy, self._model._last_obs),
-            "begins": bool(self._model._last_episode_starts[0]),
+            "environment": self._positions.state_dict(),
         }
 
     def close(self) -> None:
@@ -137,13 +110,6 @@ class _Told(BaseCallback):
     def _on_step(self) -> bool:
         info = self.locals["infos"][0]
         if "episode" in info:
-            self.ended.append(Ended(self._steps, *ended(info)))
+            self.ended.append(ended(info, self._steps))
         self._steps += 1
         return True
-
-
-def _apply(function: Callable[[Any], Any], observation: Any) -> Any:
-    """The same of an array, or of each in a dict."""
-    if isinstance(observation, dict):
-        return {name: function(part) for name, part in observation.items()}
-    return function(observation)

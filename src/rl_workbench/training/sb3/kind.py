@@ -13,8 +13,6 @@ def _kind(name: str) -> AlgorithmKind:
     return AlgorithmKind(
         name=name,
         about=f"an agent by Stable-Baselines3's {CLASSES[name]} in any Gymnasium environment that fits it",
-        resuming="--resume goes on from there\nwith networks, optimizers, replay buffer and figures, "
-        "but a new episode and other random numbers",
         config="sb3.yaml",
         section=f"{name} {{env_id}}",
         implementation="rl_workbench.training.sb3.making",

@@ -61,12 +61,13 @@ def make_model(options: TrainingOptions, acts_in: gymnasium.Env[Any, Any] | None
     """
     from stable_baselines3.common.vec_env import DummyVecEnv
 
+    from rl_workbench.training.sb3.rollouts import asking_class
     from rl_workbench.training.sb3.side_by_side import SideBySide
 
     name, run, own = options.kind.name, options.run, options.hyperparameters.own
     vector: DummyVecEnv
     if acts_in is None:
-        vector = SideBySide([_watched(env) for env in training_environments(options)])
+        vector = SideBySide([watched(env) for env in training_environments(options)])
     else:
         vector = DummyVecEnv([lambda: acts_in])
         if name in ON_POLICY:  # of one environment as many steps as of all
@@ -75,8 +76,9 @@ def make_model(options: TrainingOptions, acts_in: gymnasium.Env[Any, Any] | None
             own["buffer_size"] = 1  # nothing is learned, so nothing is kept
     try:
         check_fit(name, run.env_id, vector.action_space)
-        replay = _hindsight(options, vector) if acts_in is None else {}
-        return model_in(vector, options, own, **replay)
+        if acts_in is not None:
+            return model_in(vector, options, own)
+        return model_in(vector, options, own, asking_class(name), **_hindsight(options, vector))
     except WorkbenchError:
         if acts_in is None:
             vector.close()
@@ -98,11 +100,13 @@ def model_in(
     Raises:
         WorkbenchError: if an option makes no sense.
     """
+    from stable_baselines3.common.logger import Logger
+
     name, run = options.kind.name, options.run
     sees_dict = isinstance(vector.observation_space, spaces.Dict)
     try:
         torch.empty(0, device=run.device)  # where there is none, the model would take the CPU
-        return (kind or algorithm_class(name))(
+        model = (kind or algorithm_class(name))(
             "MultiInputPolicy" if sees_dict else "MlpPolicy",
             vector,
             seed=run.seed,
@@ -116,25 +120,20 @@ def model_in(
             raise
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise WorkbenchError(f"{name} can't be made: {text}") from error
+    model.set_logger(Logger(None, []))  # it remembers what the model tells
+    return model
 
 
-def _watched(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
-    """An environment whose episodes are counted, and can be brought back."""
+def watched(env: gymnasium.Env[Any, Any]) -> RepeatableEnvironment:
+    """An environment whose episodes are counted, and can be brought back with what was counted."""
     from stable_baselines3.common.monitor import Monitor
 
-    watched: gymnasium.Env[Any, Any] = Monitor(RepeatableEnvironment(env))
-    return watched
-
-
-def repeatable_of(vector: Any) -> RepeatableEnvironment:
-    """The first environment of a model, below what counts its episodes."""
-    place: RepeatableEnvironment = vector.envs[0].env
-    return place
+    return RepeatableEnvironment(Monitor(env))
 
 
 def checked_of(vector: Any) -> CheckedEnvironment:
-    """The same, below what remembers its episodes, and what numbers it."""
-    env = repeatable_of(vector).env
+    """The first environment of a model, below what watches, and what numbers it."""
+    env = vector.envs[0].env.env
     checked = env.env if isinstance(env, NumberedEnvironment) else env
     assert isinstance(checked, CheckedEnvironment)
     return checked
@@ -208,8 +207,8 @@ def _rate(value: Any) -> float:
 
 
 def linear(start: float) -> Callable[[float], float]:
-    """A rate that falls to 0 with what remains of the training."""
-    return lambda remaining: start * remaining
+    """A rate that falls to 0 with what remains of the training; the last rollout may go beyond its end."""
+    return lambda remaining: start * max(remaining, 0.0)
 
 
 def _noise(deviation: Any, space: gymnasium.Space[Any]) -> Any:

@@ -6,7 +6,6 @@ from typing import Any
 
 import gymnasium
 from stable_baselines3 import A2C, PPO
-from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from rl_workbench.errors import WorkbenchError
@@ -21,6 +20,7 @@ from rl_workbench.training.sb3.algorithm import SB3Training
 from rl_workbench.training.sb3.callback import FrameCallback
 from rl_workbench.training.sb3.fragments import ARRAYS, Fragment
 from rl_workbench.training.sb3.model import check_fit, model_in
+from rl_workbench.training.sb3.rollouts import OnPolicy
 from rl_workbench.training.sb3.state import FRAGMENTS, restore
 
 
@@ -38,7 +38,7 @@ def _make_model(options: TrainingOptions, env: Elsewhere) -> Any:
     return model_in(vector, options, options.hyperparameters.own, _CLASSES[name])
 
 
-class FromFragments(OnPolicyAlgorithm):
+class FromFragments(OnPolicy):
     """Mix-in: rollouts come from workers; all else is the algorithm's own.
 
     Between two rollouts `states` tell where the environments are.
@@ -46,19 +46,17 @@ class FromFragments(OnPolicyAlgorithm):
 
     pool: Pool
     states: list[Any]
-    is_playing = False  # it has learned from all that was played before
 
     def collect_rollouts(
         self, env: Any, callback: Any, rollout_buffer: Any, n_rollout_steps: int
     ) -> bool:
         """Fills the buffer with the fragments side by side, in the order of the environments."""
-        self.is_playing = True
-        callback.on_rollout_start()
+        if not callback.goes_on():
+            return False
         policy = {name: each.cpu() for name, each in self.policy.state_dict().items()}
         fragments = callback.collect(self.pool, policy, self.states)
         if fragments is None:
             return False
-        self.is_playing = False
         self.states = [each.state for each in fragments]
         rollout_buffer.reset()
         for index, fragment in enumerate(fragments):
@@ -108,17 +106,8 @@ class RemoteTraining(SB3Training):
         super().__init__(options, model, env)
         model.pool, model.states = pool, [None] * options.run.num_envs
 
-    @property
-    def stride(self) -> int:
-        """The steps of a rollout."""
-        return int(self._model.n_envs * self._model.n_steps)
-
     def _callback(self, frame: Frame) -> FrameCallback:
-        return FragmentCallback(frame, self._run.total_timesteps)
-
-    def settle(self) -> bool:
-        """Fragments that are being played change nothing; what was learned from others is whole."""
-        return bool(self._model.is_playing)
+        return FragmentCallback(frame, None, self._run.log_frequency)
 
     def state_dict(self) -> dict[str, Any]:
         """See `Algorithm.state_dict`."""
@@ -128,11 +117,14 @@ class RemoteTraining(SB3Training):
         """See `Algorithm.load_state_dict`."""
         if FRAGMENTS not in state:
             raise WorkbenchError("it was begun without --ray: it goes on without")
-        restore(self._model, state, self._run.seed)
+        restore(self._model, state, self._run.total_timesteps)
         with fitting("environments"):
             self._model.states = sequence(state[FRAGMENTS], self._model.n_envs)
 
-    def start_environment(self, state: None, say: Say) -> None:
+    def environment_state(self) -> None:
+        """None: the workers tell where their environments are."""
+
+    def start_environment(self, state: Any, say: Say) -> None:
         """Nothing to do: the workers are told where their environments are."""
 
     def close(self) -> None:
@@ -141,29 +133,14 @@ class RemoteTraining(SB3Training):
 
 
 class FragmentCallback(FrameCallback):
-    """Tells the frame of the episodes of whole rollouts, and of their steps once they were learned from.
-
-    Args:
-        frame: of the training.
-        total_timesteps: its length.
-    """
-
-    def __init__(self, frame: Frame, total_timesteps: int) -> None:
-        super().__init__(frame, total_timesteps, lambda: False)
-        self._has_learned = False
-
-    def _on_rollout_start(self) -> None:
-        if self._has_learned:
-            self._frame.step_done()
+    """Tells the frame of the episodes of whole rollouts; one that is broken off changes nothing."""
 
     def collect(self, pool: Pool, policy: Any, states: Sequence[Any]) -> list[Fragment] | None:
         """The fragments; None if the training is over."""
-        if self._frame.is_over():
-            return None
         return pool.play(policy, states, self._frame.is_interrupted)
 
     def take(self, fragments: Sequence[Fragment], length: int) -> None:
-        """Tells of the episodes in the order in which they ended.
+        """Takes down the episodes in the order in which they ended.
 
         Args:
             fragments: of a rollout.
@@ -173,12 +150,13 @@ class FragmentCallback(FrameCallback):
         before, count = model.num_timesteps, len(fragments)
         for index, fragment in enumerate(fragments):
             if fragment.was_cut:
-                tell(f"environment {index} doesn't repeat itself: its episode was cut off")
+                tell(
+                    f"environment {index + 1} of {count} doesn't repeat itself: its episode was cut off"
+                )
         ended = [
             (each.step, index, each) for index, one in enumerate(fragments) for each in one.ended
         ]
-        for step, _, episode in sorted(ended):
-            model.num_timesteps = before + (step + 1) * count
-            self._tell(episode.total_reward, episode.length, episode.success)
+        self._ended = [
+            each._replace(step=before + (step + 1) * count) for step, _, each in sorted(ended)
+        ]
         model.num_timesteps = before + length * count
-        self._has_learned = True

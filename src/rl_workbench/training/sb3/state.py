@@ -1,30 +1,33 @@
-"""All that a model of Stable-Baselines3 needs to go on learning, as plain values and tensors.
+"""All that a model of Stable-Baselines3 has learned, and needs to go on, as plain values and tensors.
 
-Not in it: the state of the environment and of the random generators, and a rollout that isn't
-whole yet. So a resumed training begins a new episode, and isn't the same to the bit.
+Not in it: where its environments are (`positions.py`), and the generators of the process.
 """
 
-import warnings
 from operator import attrgetter
 from typing import Any
 
-import numpy as np
 import torch
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.states import array, check_optimizer, switch, whole
+from rl_workbench.states import array, check_optimizer, number, whole
 from rl_workbench.training.run.checkpoints import fitting
+from rl_workbench.training.sb3.buffer import buffer_state, restore_buffer
 
-COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_n_calls")
+COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_n_calls", "stride")
 ENTROPY = "log_ent_coef"  # SAC's, no part of a network
-ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts",
-          "ep_start", "ep_length")  # fmt: skip
 FRAGMENTS = "fragments"  # where the environments are of which workers play fragments
-EPISODES = "_current_ep_start"  # of a buffer for hindsight
+LOSSES = {  # Stable-Baselines3's names: our tags
+    "train/loss": "losses/loss",
+    "train/value_loss": "losses/value_loss",
+    "train/policy_loss": "losses/policy_loss",
+    "train/policy_gradient_loss": "losses/policy_loss",
+    "train/actor_loss": "losses/actor_loss",
+    "train/critic_loss": "losses/critic_loss",
+}
 
 
 def state_of(model: Any) -> dict[str, Any]:
-    """Networks, optimizers, counters and the filled part of a replay buffer.
+    """Networks, optimizers, counters, losses to be logged, and the filled part of a replay buffer.
 
     Raises:
         WorkbenchError: if a weight isn't a number any more.
@@ -38,8 +41,15 @@ def state_of(model: Any) -> dict[str, Any]:
         "optimizers": parameters,
         "entropy": None if entropy is None else entropy.detach(),
         "counters": {name: getattr(model, name) for name in COUNTERS if hasattr(model, name)},
-        "buffer": _buffer_state(getattr(model, "replay_buffer", None)),
+        "losses": losses_of(model),
+        "buffer": buffer_state(getattr(model, "replay_buffer", None)),
     }
+
+
+def losses_of(model: Any) -> dict[str, float]:
+    """The last ones that the model has told since they were logged, by its own names."""
+    told = model.logger.name_to_value
+    return {name: float(told[name]) for name in LOSSES if name in told}
 
 
 def check_weights(model: Any) -> None:
@@ -54,85 +64,47 @@ def check_weights(model: Any) -> None:
         )
 
 
-def restore(model: Any, state: dict[str, Any], seed: int) -> None:
+def restore(model: Any, state: dict[str, Any], total_timesteps: int) -> None:
     """Lets a new model go on from what `state_of` gave.
 
     Args:
-        seed: of the training.
+        model: new.
+        state: what it gave; by an earlier version without `losses` and `stride`.
+        total_timesteps: of the training: rates that fall over its length depend on it.
 
     Raises:
         WorkbenchError: if the state is another model's.
     """
     with fitting("model"):
         new = state_of(model)
-        for part in ("optimizers", "counters"):
-            if not isinstance(state[part], dict) or set(state[part]) != set(new[part]):
-                raise ValueError(f"{part} are {state[part]!r}")
+        counters, losses = state["counters"], state.get("losses", {})
+        if isinstance(counters, dict):
+            counters = {"stride": model.n_envs, **counters}
+        for part, found in (("optimizers", state["optimizers"]), ("counters", counters)):
+            if not isinstance(found, dict) or set(found) != set(new[part]):
+                raise ValueError(f"{part} are {found!r}")
         for name, optimizer in state["optimizers"].items():
             check_optimizer(attrgetter(name)(model), optimizer)
         model.set_parameters({"policy": state["policy"], **state["optimizers"]})
         if new["entropy"] is not None:
             entropy = array(state["entropy"], new["entropy"].dtype, tuple(new["entropy"].shape))
             getattr(model, ENTROPY).data.copy_(torch.from_numpy(entropy))
-        for name, value in state["counters"].items():
+        if counters["num_timesteps"] != whole(state["steps"]):
+            raise ValueError(f"{counters['num_timesteps']} steps of {state['steps']}")
+        for name, value in counters.items():
             setattr(model, name, whole(value))
+        if not isinstance(losses, dict) or not set(losses) <= set(LOSSES):
+            raise ValueError(f"losses are {losses!r}")
+        for name, value in losses.items():
+            model.logger.record(name, number(value))
         if new["buffer"] is not None:
-            _restore_buffer(model.replay_buffer, state["buffer"])
-        # Another seed than at the start, or the same episodes would be explored again.
-        model.set_random_seed((seed + whole(state["steps"])) % 2**31)
+            restore_buffer(model.replay_buffer, state["buffer"])
+        if model.num_timesteps:
+            _set_progress(model, total_timesteps)
 
 
-def _buffer_state(buffer: Any) -> dict[str, Any] | None:
-    if buffer is None:
-        return None
-    count = buffer.size()
-    state = {
-        "position": buffer.pos,
-        "full": buffer.full,
-        "arrays": {name: torch.from_numpy(own[:count]) for name, own in _arrays(buffer).items()},
-    }
-    if hasattr(buffer, EPISODES):
-        state["episodes"] = torch.from_numpy(getattr(buffer, EPISODES))
-    return state
-
-
-def _arrays(buffer: Any) -> dict[str, np.ndarray]:
-    """All that it holds of each step; of a Dict of observations each part."""
-    found: dict[str, np.ndarray] = {}
-    for name in ARRAYS:
-        own = getattr(buffer, name, None)
-        if isinstance(own, dict):
-            found |= {f"{name}/{key}": part for key, part in own.items()}
-        elif isinstance(own, np.ndarray):
-            found[name] = own
-    return found
-
-
-def _restore_buffer(buffer: Any, state: dict[str, Any]) -> None:
-    position, is_full = whole(state["position"]), switch(state["full"])
-    count = buffer.buffer_size if is_full else position
-    if position >= buffer.buffer_size:
-        raise ValueError(f"place {position} in a buffer of {buffer.buffer_size}")
-    for name, own in _arrays(buffer).items():
-        own[:count] = _like(own, state["arrays"][name], (count, *own.shape[1:]))
-    buffer.pos, buffer.full = position, is_full
-    if hasattr(buffer, EPISODES):
-        own = getattr(buffer, EPISODES)
-        own[:] = _like(own, state["episodes"], own.shape)
-        _check_episodes(buffer)
-        with warnings.catch_warnings():  # that it does so
-            warnings.simplefilter("ignore")
-            buffer.truncate_last_trajectory()
-
-
-def _like(own: np.ndarray, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    return array(value, torch.from_numpy(own[:0]).dtype, shape)
-
-
-def _check_episodes(buffer: Any) -> None:
-    """Episodes that lie elsewhere would be looked up there."""
-    size = buffer.buffer_size
-    for name in ("ep_start", "ep_length", EPISODES):
-        own = getattr(buffer, name)
-        if own.min() < 0 or own.max() > size:
-            raise ValueError(f"{name} beyond a buffer of {size}")
+def _set_progress(model: Any, total_timesteps: int) -> None:
+    """What follows from how far it is."""
+    model._update_current_progress_remaining(model.num_timesteps, total_timesteps)
+    if hasattr(model, "exploration_schedule"):
+        model.exploration_rate = model.exploration_schedule(model._current_progress_remaining)

@@ -109,9 +109,7 @@ def test_a_training_by_fragments_goes_on_to_the_same_bits(tmp_path: Path, asked:
     whole = train(tmp_path / "whole", "ppo", PoolHere, **FRAGMENTS)
     run = train(tmp_path / "run", "ppo", PoolHere, InterruptAfter(asked), **FRAGMENTS)
     assert not summary(run)["complete"]
-    resume(run, LOSING)
-    for name in ("last.pt", "best.pt"):
-        assert_same(checkpoint(whole, name), checkpoint(run, name), name)
+    assert_same_run(whole, resume(run, LOSING))
 
 
 @with_sb3

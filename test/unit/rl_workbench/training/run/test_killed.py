@@ -16,7 +16,6 @@ import pytest
 from stress.trainings import OPTIONS, forked, new, wait_for_newer_checkpoint
 from training_runs import (
     EXACT,
-    OTHERS,
     assert_no_doubles,
     assert_same_run,
     summary,
@@ -91,7 +90,8 @@ def test_killed_at_random_moments(whole, tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "number"),
     [("dqn", signal.SIGINT), ("dqn", signal.SIGTERM), ("reinforce", signal.SIGHUP),
-     ("reinforce-document", signal.SIGINT)],
+     ("reinforce-document", signal.SIGINT),
+     pytest.param("ppo", signal.SIGINT, marks=pytest.mark.extras("stable_baselines3"))],
 )  # fmt: skip
 def test_a_signal_saves_and_tells_how_to_go_on(
     start: Start, whole, tmp_path: Path, name: str, number: int
@@ -117,19 +117,6 @@ def test_the_soft_limit_of_cpu_time_is_such_a_signal(start: Start, whole, tmp_pa
     assert summary(run)["interrupted"]
     ended(start("--resume", str(run)))
     assert_same_run(whole("dqn"), run)
-
-
-@pytest.mark.parametrize("name", OTHERS[:1])
-def test_one_to_stable_baselines(start: Start, tmp_path: Path, name: str) -> None:
-    run = tmp_path / "run"
-    process = start(*new(name, run))
-    newer_checkpoint(run, process)
-    process.send_signal(signal.SIGINT)
-    assert f"--resume {run} goes on" in ended(process, 130)
-    before = summary(run)
-    assert before["interrupted"] and 0 < before["steps"] < 5000
-    ended(start("--resume", str(run)))
-    assert summary(run)["complete"]
 
 
 def test_a_closed_terminal_under_nohup_is_ignored(start: Start, whole, tmp_path: Path) -> None:

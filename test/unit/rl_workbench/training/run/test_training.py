@@ -160,7 +160,7 @@ def test_evaluations_and_checkpoints_change_nothing_that_is_learned(
     none = {"eval_frequency": 0, "checkpoint_frequency": 0}
     plain = train(tmp_path / "plain", name, **none)
     evaluated = train(tmp_path / "evaluated", name, eval_frequency=40, checkpoint_frequency=7)
-    assert len(summary(evaluated)["evaluations"]) > 4
+    assert len(summary(evaluated)["evaluations"]) >= 4
     assert summary(plain)["returns"] == summary(evaluated)["returns"]
     mine, other = checkpoint(plain), checkpoint(evaluated)
     for content in (mine, other):
@@ -241,4 +241,5 @@ def test_stable_baselines_needs_a_number_of_steps(tmp_path: Path, name: str) -> 
     with pytest.raises(WorkbenchError, match="ppo needs total_timesteps"):
         train(tmp_path, name, total_timesteps=0, episodes=4)
     stopped = summary(train(tmp_path / "run", name, episodes=4))
-    assert stopped["episodes"] == 4 and stopped["complete"]
+    assert stopped["episodes"] >= 4 and stopped["steps"] % 64 == 0, "it ends with a rollout"
+    assert stopped["complete"] and stopped["steps"] < 256
