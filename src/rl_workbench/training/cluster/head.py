@@ -29,7 +29,9 @@ def check_head(address: str) -> None:
         except grpc.RpcError as error:
             code = error.code()
             if code == grpc.StatusCode.UNAUTHENTICATED:
-                raise WorkbenchError(f"can't join the Ray cluster at {address}: {ANOTHER_TOKEN}") from error
+                raise WorkbenchError(
+                    f"can't join the Ray cluster at {address}: {ANOTHER_TOKEN}"
+                ) from error
             if code == grpc.StatusCode.UNIMPLEMENTED:
                 raise no_head(address) from error
             text = " ".join(error.details().split())

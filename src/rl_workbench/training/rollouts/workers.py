@@ -31,7 +31,7 @@ from rl_workbench.training.run.algorithm import Say
 
 POLL = 0.1  # [s] between two looks for an interruption
 PATIENCE = 15.0  # [s] after which the user hears that workers haven't begun
-DEADLINE = 180.0  # [s] after which a silent one is replaced, at least; twice as long each further time
+DEADLINE = 180.0  # [s] at least until a silent one is replaced; twice that each further time
 TIMES = 10.0  # as long as the longest part took so far, before one that plays is given up
 ANSWER = 1.0  # [s] that a node has to answer in
 GRACE = 3.0  # [s] that environments have to close in
@@ -201,9 +201,9 @@ class Workers:
         return max(DEADLINE, TIMES * self._longest) if self._longest else without
 
     def _silent(self, seconds: float, lost: Sequence[int]) -> list[tuple[Any, int]]:
-        """Those that were asked so long ago and haven't answered; twice as long for each that was lost before.
+        """Those that were asked so long ago and haven't answered.
 
-        A part that only takes longer than all before is so played to its end.
+        With each loss the time is doubled: a part that only takes long is so played to its end.
         """
         now = time.monotonic()
         return [

@@ -80,7 +80,10 @@ def test_a_head_may_be_there(answering: Answering) -> None:
 @pytest.mark.parametrize(
     ("code", "line"),
     [
-        ("UNAUTHENTICATED", "^can't join the Ray cluster at .*: its token is another than this machine's"),
+        (
+            "UNAUTHENTICATED",
+            "^can't join the Ray cluster at .*: its token is another than this machine's",
+        ),
         ("UNIMPLEMENTED", "^what answers at .* is no Ray cluster's head"),
         ("UNAVAILABLE", "^no Ray cluster answers at .*: Not now."),
     ],
