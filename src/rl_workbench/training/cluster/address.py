@@ -39,9 +39,14 @@ def check_address(address: str) -> None:
         reason = getattr(error, "strerror", "") or str(error) or type(error).__name__
         raise WorkbenchError(f"no Ray cluster answers at {address}: {reason}") from error
     if answer[KIND] != SETTINGS:
-        raise WorkbenchError(
-            f"what answers at {address} is no Ray cluster's head; its port is 6379 unless chosen otherwise"
-        )
+        raise no_head(address)
+
+
+def no_head(address: str) -> WorkbenchError:
+    """Something else answers there."""
+    return WorkbenchError(
+        f"what answers at {address} is no Ray cluster's head; its port is 6379 unless chosen otherwise"
+    )
 
 
 def without_auto(address: str) -> str:

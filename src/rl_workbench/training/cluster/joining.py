@@ -13,6 +13,7 @@ from typing import Any
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.extras import need
 from rl_workbench.training.cluster.address import AUTO, LOCAL, check_address, without_auto
+from rl_workbench.training.cluster.head import ANOTHER_TOKEN, check_head
 from rl_workbench.training.cluster.nodes import Cluster
 from rl_workbench.training.cluster.obituary import obituary
 from rl_workbench.training.cluster.scratch import scratch_folder
@@ -30,6 +31,8 @@ QUIET = {
     "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
     "RAY_DEDUP_LOGS_SKIP_REGEX": ".",  # what its daemons say of workers and nodes that die: pages
 }
+LOCAL_GCS = "RAY_gcs_rpc_server_reconnect_timeout_s"  # a minute, unless told otherwise
+LOCAL_GCS_PATIENCE = 10  # [s]: on the same machine it is either there or lost
 PATIENCE = 60.0  # [s] until every node has started a worker that answers
 LOST = "this process was ended from outside, as by kill -9, or by Ray, since its node on this machine is lost"
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -53,8 +56,11 @@ def joined(address: str, going_on: str, say: Callable[[str], None] = warn) -> It
     for name, value in QUIET.items():
         os.environ.setdefault(name, value)
     with contextlib.ExitStack() as stack:
-        stack.enter_context(obituary(f"{LOST}; {going_on}"))
-        ray = _started(stack) if address == LOCAL else _found(without_auto(address))
+        last_words = f"{LOST}; {going_on}"
+        if address == LOCAL:
+            ray = _started(stack, last_words)
+        else:
+            ray = _found(stack, without_auto(address), last_words)
         stack.callback(ray.shutdown)
         cluster = Cluster(ray, say)
         cluster.update(PATIENCE)
@@ -63,12 +69,13 @@ def joined(address: str, going_on: str, say: Callable[[str], None] = warn) -> It
         yield cluster
 
 
-def _started(stack: contextlib.ExitStack) -> Any:
+def _started(stack: contextlib.ExitStack, last_words: str) -> Any:
     """A cluster on this machine that nobody else can use; its files go with it."""
     place = tempfile.gettempdir()
     if len(os.fsencode(place)) + SESSION > SOCKETS:
         place = "/tmp"
     folder = stack.enter_context(scratch_folder("ray", place))
+    stack.enter_context(obituary(last_words, folder))
     _keep_for_oneself()
     return _init(
         "a local cluster",
@@ -90,11 +97,14 @@ def _keep_for_oneself() -> None:
     if "ray" not in sys.modules:
         os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
     os.environ.setdefault("RAY_worker_niceness", "0")
+    os.environ.setdefault(LOCAL_GCS, str(LOCAL_GCS_PATIENCE))
 
 
-def _found(address: str) -> Any:
+def _found(stack: contextlib.ExitStack, address: str, last_words: str) -> Any:
+    stack.enter_context(obituary(last_words))
     if address != AUTO:
         check_address(address)
+        check_head(address)
     return _init(f"the Ray cluster at {address}", address=address)
 
 
@@ -120,10 +130,8 @@ def _init(what: str, **options: Any) -> Any:
     except Exception as error:  # Ray raises that itself, where a node is too slow to start
         ray.shutdown()
         text = " ".join(str(error).split())
-        if isinstance(error, ConnectionError):  # what answers speaks as a head does
-            text += (
-                "; it answers, but its token (RAY_AUTH_TOKEN, ray get-auth-token) may be another"
-            )
+        if isinstance(error, ConnectionError):
+            text += f"; it may have ended, or {ANOTHER_TOKEN}"
         raise WorkbenchError(f"can't join {what}: {text}") from error
     finally:
         for number, handler in before.items():  # Ray's own would leave out what ours save

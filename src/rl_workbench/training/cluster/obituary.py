@@ -3,17 +3,31 @@
 import contextlib
 import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 
-# A constant text: the line comes as an argument, so nothing of it is parsed.
-WAIT_FOR_THE_END = 'read -r orderly || printf "%s\\n" "$0" >&2'
+# A constant text: line and folder come as arguments, so nothing of them is parsed. Of those who have files
+# of the folder open, only who writes there belongs to the cluster.
+WAIT_FOR_THE_END = r"""
+read -r orderly && exit
+printf "%s\n" "$0" >&2
+[ -z "$1" ] && exit
+find /proc/[0-9]*/fd -perm -u+w -lname "$1/*" 2> /dev/null | cut -d / -f 3 | sort -u | xargs -r kill -9
+"""
 
 
 @contextlib.contextmanager
-def obituary(line: str) -> Iterator[None]:
-    """As long as it is entered, another process waits to say the line on standard error."""
+def obituary(line: str, folder: Path | None = None) -> Iterator[None]:
+    """As long as it is entered, another process waits to say the line on standard error.
+
+    Args:
+        folder: of a cluster that is this process's own; what writes its logs there ends with it: Ray's
+            agents would outlive it by a minute.
+    """
     # Ctrl-C in the terminal isn't meant for it.
     speaker = subprocess.Popen(
-        ["/bin/sh", "-c", WAIT_FOR_THE_END, line], stdin=subprocess.PIPE, start_new_session=True
+        ["/bin/sh", "-c", WAIT_FOR_THE_END, line, str(folder or "")],
+        stdin=subprocess.PIPE,
+        start_new_session=True,
     )
     assert speaker.stdin is not None
     try:

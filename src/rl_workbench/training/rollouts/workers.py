@@ -31,9 +31,8 @@ from rl_workbench.training.run.algorithm import Say
 
 POLL = 0.1  # [s] between two looks for an interruption
 PATIENCE = 15.0  # [s] after which the user hears that workers haven't begun
-BEGINNING = (
-    180.0  # [s] after which one that hasn't is replaced, and the user hears of those that only play
-)
+DEADLINE = 180.0  # [s] at least until a silent one is replaced; twice that each further time
+TIMES = 10.0  # as long as the longest part took so far, before one that plays is given up
 ANSWER = 1.0  # [s] that a node has to answer in
 GRACE = 3.0  # [s] that environments have to close in
 ATTEMPTS = 5  # of workers at the same part, before the part is taken for the cause
@@ -62,13 +61,14 @@ class Workers:
         check_processors(self._count, cluster.cpus)
         self._home = _home_of(options.run.env_id)
         self._nodes = [""] * self._count  # where each worker is
+        self._longest = 0.0  # [s] that a part took so far; 0: none was played yet
         self._playing: dict[Any, int] = {}
         self._asked = [0.0] * self._count  # when each was [s of the monotonic clock]
         self._actors: list[Any] = []
         try:
             for index in range(self._count):
                 self._actors.append(self._start(index, processors=1))
-            self._check_kinds(self._gather(self._beginning, lambda: False, BEGINNING) or [])
+            self._check_kinds(self._gather(self._beginning, lambda: False, True) or [])
         except BaseException:  # Ctrl-C as well
             self.close()
             raise
@@ -138,18 +138,18 @@ class Workers:
         self,
         asking: Callable[[int], Callable[[], Any]],
         should_stop: Callable[[], bool],
-        limit: float = math.inf,
+        begins: bool = False,
     ) -> list[Any] | None:
         """What all workers answer; one that is lost is replaced, and its successor asked the same.
 
         Args:
             asking: makes of a worker's number what asks it, and gives Ray's reference to the answer.
             should_stop: is asked all the time.
-            limit: seconds after which one that hasn't answered is lost; an episode may take any time.
+            begins: whether they are to begin, for which there is a time; else they play a part.
         """
         found: dict[int, Any] = {}
         lost = [0] * self._count
-        tell_at = time.monotonic() + (PATIENCE if limit < math.inf else BEGINNING)
+        asked_at, is_told = time.monotonic(), False
         with _told():
             for index in range(self._count):
                 self._ask(index, asking)
@@ -161,19 +161,26 @@ class Workers:
                     index = self._playing.pop(reference)
                     try:
                         found[index] = self._checked(index, ray.get(reference))
+                        if not begins:
+                            took = time.monotonic() - self._asked[index]
+                            self._longest = max(self._longest, took)
                     except (RayTaskError, ObjectStoreFullError, OutOfDiskError):
                         raise
                     except RayError as error:
                         lost[index] += 1
                         self._replace(index, _line_of(error), lost[index])
                         self._ask(index, asking)
-                for reference, index in self._silent_for(limit):
+                limit = DEADLINE if begins else self._limit()
+                for reference, index in self._silent(limit, lost):
                     del self._playing[reference]
+                    seconds = limit * 2 ** lost[index]
                     lost[index] += 1
-                    self._replace(index, f"it hasn't begun within {limit:.0f} s", lost[index])
+                    what = "begun" if begins else "answered"
+                    self._replace(index, f"it hasn't {what} within {seconds:.0f} s", lost[index])
                     self._ask(index, asking)
-                if self._playing and time.monotonic() > tell_at:
-                    tell_at = math.inf
+                tell_at = asked_at + (PATIENCE if begins else self._limit(DEADLINE) / 2)
+                if self._playing and not is_told and time.monotonic() > tell_at:
+                    is_told = True
                     self._tell_of_silence()
         return [found[index] for index in range(self._count)]
 
@@ -181,10 +188,25 @@ class Workers:
         self._playing[asking(index)()] = index
         self._asked[index] = time.monotonic()
 
-    def _silent_for(self, seconds: float) -> list[tuple[Any, int]]:
-        """Those that were asked so long ago, and haven't answered."""
-        until = time.monotonic() - seconds
-        return [each for each in self._playing.items() if self._asked[each[1]] < until]
+    def _limit(self, without: float = math.inf) -> float:
+        """Seconds that a part may take, by what others took.
+
+        Args:
+            without: where nothing was played yet.
+        """
+        return max(DEADLINE, TIMES * self._longest) if self._longest else without
+
+    def _silent(self, seconds: float, lost: Sequence[int]) -> list[tuple[Any, int]]:
+        """Those that were asked so long ago and haven't answered.
+
+        With each loss the time is doubled: a part that only takes long is so played to its end.
+        """
+        now = time.monotonic()
+        return [
+            (reference, index)
+            for reference, index in self._playing.items()
+            if now - self._asked[index] > seconds * 2 ** lost[index]
+        ]
 
     def _tell_of_silence(self) -> None:
         numbers = sorted(self._playing.values())

@@ -105,7 +105,7 @@ class RayNodes:
         if not self._blind:
             return f"all see {folder}, and write there"
         names = ", ".join(self._blind)
-        return f"{names}: doesn't see {folder}; what is trained there is {CARRIED} home by Ray"
+        return f"{folder} isn't seen by {names}: what is trained there is {CARRIED} home by Ray"
 
     def free(self) -> int:
         """See Machines."""

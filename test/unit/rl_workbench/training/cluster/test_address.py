@@ -4,6 +4,7 @@ import os
 import socket
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -74,6 +75,42 @@ def test_where_something_listens_and_says_nothing(monkeypatch: pytest.MonkeyPatc
 
 def test_a_head_may_be_there(answering: Answering) -> None:
     check_address(answering(bytes(3) + b"\x04" + bytes(5)))
+
+
+@pytest.mark.extras("ray")
+@pytest.mark.parametrize(
+    ("code", "line"),
+    [
+        (
+            "UNAUTHENTICATED",
+            "^can't join the Ray cluster at .*: its token is another than this machine's",
+        ),
+        ("UNIMPLEMENTED", "^what answers at .* is no Ray cluster's head"),
+        ("UNAVAILABLE", "^no Ray cluster answers at .*: Not now."),
+    ],
+)
+def test_what_speaks_as_a_head_does_and_refuses(code: str, line: str) -> None:
+    """Another port of Ray's, or another token."""
+    import grpc
+
+    from rl_workbench.training.cluster.head import check_head
+
+    class Refusing(grpc.GenericRpcHandler):
+        def service(self, details: grpc.HandlerCallDetails) -> grpc.RpcMethodHandler:
+            def refuse(request: bytes, context: grpc.ServicerContext) -> bytes:
+                context.abort(grpc.StatusCode[code], "Not now.\nPages.")
+
+            return grpc.unary_unary_rpc_method_handler(refuse)
+
+    server = grpc.server(ThreadPoolExecutor(1), handlers=[Refusing()])
+    port = server.add_insecure_port("127.0.0.1:0")
+    server.start()
+    try:
+        with pytest.raises(WorkbenchError, match=line) as raised:
+            check_head(f"127.0.0.1:{port}")
+    finally:
+        server.stop(None).wait()
+    assert "\n" not in str(raised.value)
 
 
 @pytest.mark.extras("ray")

@@ -60,7 +60,7 @@ def test_what_a_node_is_asked_tells_of_this_one() -> None:
 
 
 def test_a_cluster_none_of_whose_nodes_can_be_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(joining, "_found", lambda address: FakeRay({"a1b2c3": {}}))
+    monkeypatch.setattr(joining, "_found", lambda stack, address: FakeRay({"a1b2c3": {}}))
     monkeypatch.setattr(joining, "need", lambda *_: None)
     said: list[str] = []
     with (
@@ -86,6 +86,7 @@ def test_another_version_of_ray_or_python_is_a_line(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(ray, "init", differ)
     monkeypatch.setattr(joining, "check_address", lambda address: None)
+    monkeypatch.setattr(joining, "check_head", lambda address: None)
     with (
         pytest.raises(WorkbenchError) as raised,
         joining.joined("10.0.0.1:6379", "", pytest.fail),

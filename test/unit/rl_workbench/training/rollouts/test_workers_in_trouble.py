@@ -153,14 +153,42 @@ def test_one_that_does_not_begin_is_replaced(make) -> None:
     assert len(fake.made) == 3 and fake.killed == [fake.made[1]]
 
 
-def test_one_that_plays_for_long_is_told_of_once_and_waited_for(make) -> None:
+def test_one_that_falls_silent_as_it_plays_is_told_of_and_replaced(make) -> None:
+    """As one is that was stopped, or whose machine is out of reach with its connection open."""
     said: list[str] = []
     fake = FakeRay([mine()])
     workers = make(fake, 2, said)
+    stopped = workers._actors[0] = Actor(SILENT)
+    assert workers.play("policy", [None, None], lambda: False) == [mine()] * 2
+    assert said == [
+        "for 91 s nothing has come from worker 1 of 2",
+        "worker 1 of 2 is lost (it hasn't answered within 180 s): another one plays its part again",
+    ]
+    assert fake.killed == [stopped]
+
+
+def test_a_part_that_only_takes_long_is_played_to_its_end(make) -> None:
+    """Each time it is given twice as long."""
+    said: list[str] = []
+    fake = FakeRay([mine(), mine(), SILENT])
+    workers = make(fake, 2, said)
     workers._actors[0] = Actor(SILENT)
-    fake.speaks = fake.now + 1000.0
+    fake.speaks = fake.now + 180.0 + 360.0 + 700.0
     assert workers.play("policy", [None, None], lambda: False) == [SILENT, mine()]
-    assert said == ["for 181 s nothing has come from worker 1 of 2"]
+    assert len(fake.killed) == 2 and "within 360 s" in said[-1]
+    fake.speaks = fake.now + 5000.0
+    workers.play("policy", [None, None], lambda: False)
+    assert len(fake.killed) == 2, "parts took 700 s before"
+
+
+def test_the_first_part_of_all_may_take_any_time(make) -> None:
+    said: list[str] = []
+    fake = FakeRay([mine()])
+    workers = make(fake, 2, said)
+    workers._actors[:] = [Actor(SILENT), Actor(SILENT)]
+    fake.speaks = fake.now + 5000.0
+    assert workers.play("policy", [None, None], lambda: False) == [SILENT] * 2
+    assert said == ["for 91 s nothing has come from worker 1, 2 of 2"]
     assert not fake.killed
 
 
