@@ -6,8 +6,8 @@
 A step is 8 physics steps of 1 ms of the cart-pole with its position controller, resets included. The same
 simulators are measured 1, 2, 4, ... at a time, all numbers in each round one after the other; ratios are
 medians over rounds of what was measured in the same round. Processor time is the client's own, with all that
-its environments do, and the simulators' own. Then it says where the processor time of a step goes with as many
-simulators as cores, and how much of the cores that is. Prints tables and writes many_simulators.json.
+its environments do, and the simulators' own. Then it says where the processor time of a step goes with as
+many simulators as cores, and how much of the cores that is. Prints tables and writes many_simulators.json.
 """
 
 import os
@@ -56,7 +56,9 @@ def measured(env: gymnasium.vector.VectorEnv[Any, Any, Any], seconds: float) -> 
             env.step(action)
         steps += BATCH * env.num_envs
     client = time.process_time() - client
-    both, kernel = (now - then for now, then in zip(used([os.getpid(), *pids]), before, strict=True))
+    both, kernel = (
+        now - then for now, then in zip(used([os.getpid(), *pids]), before, strict=True)
+    )
     others = used_by_all() - machine - both
     each = 1e6 / steps
     return Measured(
@@ -161,8 +163,8 @@ def budget(here: dict[str, float], there: dict[str, float], ticks: float, cores:
     }.items():
         print(f"  {what:60} {value:7.1f} us")
     print(
-        f"  {there['busy']:.2f} of {cores} cores were busy with that, {there['others']:.2f} with others; full "
-        f"cores would make {cores * 1e6 / whole:,.0f} steps/s"
+        f"  {there['busy']:.2f} of {cores} cores were busy with that, {there['others']:.2f} with others; "
+        f"full cores would make {cores * 1e6 / whole:,.0f} steps/s"
     )
 
 

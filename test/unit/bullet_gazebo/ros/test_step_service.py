@@ -25,8 +25,8 @@ from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.robot import ControlledRobot
-from bullet_gazebo.ros.services.stepping.addresses import MOST_LISTS
 from bullet_gazebo.ros.services.stepping import step_service
+from bullet_gazebo.ros.services.stepping.addresses import MOST_LISTS
 from bullet_gazebo.ros.services.stepping.step_service import StepService
 from bullet_gazebo.ros.services.stepping.usual_requests import UsualRequest, UsualRequests
 from bullet_gazebo.simulator import Simulator

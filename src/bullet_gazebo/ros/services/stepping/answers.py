@@ -43,7 +43,7 @@ class ToldJoints:
         self._names_on_the_wire = b"".join(whole)
         # The names; of each joint one number, their count in front, three times; and nothing more.
         count, size = len(self.names), len(self._names_on_the_wire)
-        self._struct = struct.Struct("<%ds%s%ds" % (size, 3 * f"I{count}d", len(NOTHING_MORE)))
+        self._struct = struct.Struct(f"<{size}s{3 * f'I{count}d'}{len(NOTHING_MORE)}s")
 
     def read(self) -> Numbers:
         """Positions, velocities and efforts as they are; the caller holds the simulator's lock."""
@@ -69,7 +69,7 @@ class ToldJoints:
 
 
 class JointsAnswer(StepWorldResponse):
-    """The answer to who asks for joints only; most hear but its bytes, so fields are made when they are read."""
+    """The answer to who asks for joints only; fields are made when they are read: a client gets the bytes."""
 
     success, status_message = True, ""
     model_names = model_poses = model_twists = link_poses = link_twists = contacts = ()

@@ -82,8 +82,6 @@ def _poll(transport: TCPROSTransport, polling: AdaptivePoll, reader: Reader) -> 
             raise TransportTerminated("the client has gone")
         known = reader.read(data)
         if known is not None:
-            transport.stat_bytes += len(data)
-            transport.stat_num_msg += 1
             return [known]
         buffer.write(data)
         received: list[Any] = receive()
