@@ -199,6 +199,8 @@ def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
     Raises:
         CallFailed: if the fields are not the request's.
     """
+    if len(request) == 1 and isinstance(request[0], kind._request_class):
+        return request[0]
     try:
         return rospy.msg.args_kwds_to_message(kind._request_class, request, {})
     except TypeError as fault:
@@ -219,10 +221,12 @@ def _finite(timeout: float) -> float:
 def _serialized(message: genpy.Message) -> bytes:
     """The request with its length in front."""
     buffer = io.BytesIO()
-    buffer.write(LENGTH.pack(0))
+    buffer.seek(LENGTH.size)
     try:
         message.serialize(buffer)
     except (TypeError, genpy.SerializationError, struct.error) as fault:
         raise CallFailed(f"the request can't be sent: {fault}") from fault
-    buffer.getbuffer()[: LENGTH.size] = LENGTH.pack(buffer.tell() - LENGTH.size)
+    size = buffer.tell() - LENGTH.size
+    buffer.seek(0)
+    buffer.write(LENGTH.pack(size))
     return buffer.getvalue()

@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 
 import rospy
-from bullet_gazebo_msgs.srv import AdvanceWorld, StepWorld
 
 from bullet_gazebo.heap import use_one_arena
 from bullet_gazebo.physics.engine import Engine
@@ -46,7 +45,6 @@ from bullet_gazebo.ros.wire.rospy_patches.connections import (
     bound_messages,
     hang_up_on_nonsense,
 )
-from bullet_gazebo.ros.wire.rospy_patches.polling import poll_for_requests
 from bullet_gazebo.ros.wire.rospy_patches.registration import outlive_lack_of_threads
 from bullet_gazebo.ros.wire.rospy_patches.topics import free_polls_at_once
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
@@ -90,8 +88,6 @@ class GazeboNode:
         bound_calls()
         Reception.open()
         hang_up_on_nonsense()
-        if self.sim.lockstep:
-            poll_for_requests(StepWorld, AdvanceWorld)
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
         plugins = PluginRegistry(

@@ -4,13 +4,13 @@ import contextlib
 import io
 import itertools
 import random
+import struct
 import sys
 import threading
 from functools import lru_cache
 
 import numpy as np
 import pytest
-import rospy
 import xacro
 import yaml
 from bullet_gazebo_msgs.srv import StepWorldRequest, StepWorldResponse
@@ -25,8 +25,10 @@ from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.robot import ControlledRobot
+from bullet_gazebo.ros.services.stepping import step_service
 from bullet_gazebo.ros.services.stepping.addresses import MOST_LISTS
 from bullet_gazebo.ros.services.stepping.step_service import StepService
+from bullet_gazebo.ros.services.stepping.usual_requests import UsualRequest, UsualRequests
 from bullet_gazebo.simulator import Simulator
 
 WORLD = StepWorldRequest.WORLD
@@ -50,6 +52,7 @@ class Slides:
         self._urdf = slides(root)
         self._params = yaml.safe_load((root / "test/data/robots/slides.yaml").read_text())
         self.service = StepService(self.sim, contextlib.nullcontext(), threading.Lock())
+        self._usual = UsualRequests()
 
     def add(self, name, *controllers):
         model = self.sim.world.spawn(name, parse_urdf(self._urdf), Pose())
@@ -61,7 +64,19 @@ class Slides:
         robot.manager.switch(list(controllers), [], STRICT)
 
     def call(self, ticks=0, **fields):
-        return self.service._step(StepWorldRequest(ticks=ticks, **fields))
+        return self.service._step(self._read(StepWorldRequest(ticks=ticks, **fields)))
+
+    def _read(self, request):
+        """As it comes from a lasting connection: by genpy, or in less time if it is a usual one."""
+        data = on_the_wire(request)
+        usual = self._usual.read(data)
+        genpys = StepWorldRequest().deserialize(data[4:])
+        if usual is None:
+            self._usual.learn(data, genpys)
+            return genpys
+        for name in genpys.__slots__:
+            assert repr(tuple_of(getattr(usual, name))) == repr(tuple_of(getattr(genpys, name)))
+        return usual
 
     def step(self, ticks, **fields):
         """Joints by name: (position, velocity, effort)."""
@@ -79,10 +94,21 @@ class Slides:
 
 @pytest.fixture
 def world(root, monkeypatch):
-    monkeypatch.setattr(rospy, "Service", lambda *args: None)
+    monkeypatch.setattr(step_service, "PolledService", lambda *args: None)
     made = Slides(root)
     yield made
     made.sim.world.close()
+
+
+def on_the_wire(request):
+    """Its bytes, with their number in front."""
+    buffer = io.BytesIO()
+    request.serialize(buffer)
+    return struct.pack("<I", buffer.tell()) + buffer.getvalue()
+
+
+def tuple_of(value):
+    return tuple(value) if isinstance(value, list) else value
 
 
 def drawn():
@@ -234,7 +260,7 @@ def test_nothing_is_told_that_was_not_asked_for(objects):
     answer = objects.call(1)
     assert answer.success
     for name in ("model_names", "model_poses", "link_poses", "link_twists", "contacts"):
-        assert getattr(answer, name) == [], name
+        assert list(getattr(answer, name)) == [], name
 
 
 def test_links_models_and_contacts_are_told_after_the_ticks(objects):
@@ -454,6 +480,40 @@ def test_no_more_lists_of_names_are_kept_than_clients_send(world):
         assert world.step(1, commanded_joints=names, joint_commands=numbers)
     assert len(world.service._addresses._movable_joints) == MOST_LISTS
     assert len(world.service._addresses._free_joints) == MOST_LISTS
+
+
+@pytest.mark.parametrize(
+    ("usual", "fields"),
+    [
+        (True, {}),
+        (True, {"controllers": ["r\u00f6bot"], "commands": [-0.0, float("nan")]}),
+        (False, {"seed": 1}),
+        (False, {"reset": WORLD}),
+        (False, {"contacts": True}),
+        (False, {"contacts_of": ["a"]}),
+        (False, {"model_states": True}),
+        (False, {"joints": ["a"]}),
+        (False, {"velocities": [0.0]}),
+        (False, {"twists": [Twist()]}),
+        (False, {"commanded_joints": [""]}),
+        (False, {"joint_commands": [0.0]}),
+    ],
+)
+def test_requests_for_commands_and_ticks_alone_are_read_by_their_numbers(usual, fields):
+    """Any other one, one that isn't whole and one that comes with the next are genpy's to read."""
+    reader = UsualRequests()
+    request = StepWorldRequest(ticks=8, **fields)
+    data = on_the_wire(request)
+    assert reader.read(data) is None
+    reader.learn(data, request)
+    found = reader.read(data)
+    assert isinstance(found, UsualRequest) is usual
+    for cut in (data[:-1], data + data, data[:4], data[:40]):
+        assert reader.read(cut) is None
+        reader.learn(cut, request)
+        assert reader.read(cut) is None
+    others = on_the_wire(StepWorldRequest(ticks=9, **fields))
+    assert reader.read(others) is None
 
 
 def test_an_answer_is_on_the_wire_what_its_fields_are(world):

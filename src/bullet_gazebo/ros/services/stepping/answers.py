@@ -17,12 +17,15 @@ from bullet_gazebo.ros.wire.conversions import (
     to_time,
     to_twist_msg,
 )
+from bullet_gazebo.simulator import NANOSECONDS
 from bullet_gazebo.state.query import StateAnswer
 
 # As StepWorld.srv has them: success, length of no text, sim_time; the joints' header: seq, stamp, no frame.
 HEAD = struct.Struct("<BId3II")
 LENGTH = struct.Struct("<I")
 NOTHING_MORE = bytes(6 * LENGTH.size)  # models, links and contacts: six empty lists
+Numbers = tuple[list[float], list[float], list[float]]
+"""Positions [rad, m], velocities [rad/s, m/s] and efforts [N m, N], in the joints' order."""
 
 
 class ToldJoints:
@@ -37,38 +40,57 @@ class ToldJoints:
         for name in self.names:
             text = name.encode()
             whole += [LENGTH.pack(len(text)), text]
-        self.names_on_the_wire = b"".join(whole)
-        self.numbers = struct.Struct(
-            f"<I{len(self.names)}d"
-        )  # of each joint one, their count in front
+        self._names_on_the_wire = b"".join(whole)
+        # The names; of each joint one number, their count in front, three times; and nothing more.
+        count, size = len(self.names), len(self._names_on_the_wire)
+        self._struct = struct.Struct(f"<{size}s{3 * f'I{count}d'}{len(NOTHING_MORE)}s")
 
-    def message(self, now: int) -> JointState:
-        """Their state; `now` [ns]."""
+    def read(self) -> Numbers:
+        """Positions, velocities and efforts as they are; the caller holds the simulator's lock."""
         joints = self.joints
-        return JointState(
-            header=Header(stamp=to_time(now)),
-            name=self.names,
-            position=[joint.position for joint in joints],
-            velocity=[joint.velocity for joint in joints],
-            effort=[joint.effort for joint in joints],
+        return (
+            [joint.position for joint in joints],
+            [joint.velocity for joint in joints],
+            [joint.effort for joint in joints],
         )
+
+    def message(self, now: int, numbers: Numbers | None = None) -> JointState:
+        """Their state; `now` [ns]; without numbers as it is."""
+        return JointState(Header(stamp=to_time(now)), self.names, *(numbers or self.read()))
+
+    def on_the_wire(self, numbers: Numbers) -> bytes:
+        """All that follows the header of their state."""
+        positions, velocities, efforts = numbers
+        count = len(positions)
+        return self._struct.pack(
+            self._names_on_the_wire, count, *positions, count, *velocities, count, *efforts,
+            NOTHING_MORE,
+        )  # fmt: skip
 
 
 class JointsAnswer(StepWorldResponse):
-    """The answer to who asks for joints only. Their names are put together once, not for each answer."""
+    """The answer to who asks for joints only; fields are made when they are read: a client gets the bytes."""
 
-    def __init__(self, told: ToldJoints, sim_time: float, now: int) -> None:
-        super().__init__(success=True, sim_time=sim_time, joint_states=told.message(now))
-        self._told = told
+    success, status_message = True, ""
+    model_names = model_poses = model_twists = link_poses = link_twists = contacts = ()
+
+    def __init__(self, told: ToldJoints, now: int) -> None:
+        """`now` [ns]."""
+        self._told, self._now, self._numbers = told, now, told.read()
+
+    @property
+    def sim_time(self) -> float:
+        return self._now / NANOSECONDS
+
+    @property
+    def joint_states(self) -> JointState:
+        return self._told.message(self._now, self._numbers)
 
     def serialize(self, buff: BytesIO) -> None:
-        states, told = self.joint_states, self._told
-        count, stamp, numbers = len(told.names), states.header.stamp, told.numbers
-        buff.write(HEAD.pack(True, 0, self.sim_time, states.header.seq, stamp.secs, stamp.nsecs, 0))
-        buff.write(told.names_on_the_wire)
-        for values in (states.position, states.velocity, states.effort):
-            buff.write(numbers.pack(count, *values))
-        buff.write(NOTHING_MORE)
+        now = self._now
+        secs, nsecs = divmod(now, NANOSECONDS)
+        buff.write(HEAD.pack(True, 0, now / NANOSECONDS, 0, secs, nsecs, 0))
+        buff.write(self._told.on_the_wire(self._numbers))
 
 
 def fields_of(answer: StateAnswer) -> dict[str, Sequence[Any]]:

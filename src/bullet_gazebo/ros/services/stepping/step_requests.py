@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from bullet_gazebo_msgs.srv import StepWorldRequest
 
 from bullet_gazebo.control.errors import ControlError, faults
+from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import AT_REST, Model
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.ros.services.stepping.addresses import Addresses
+from bullet_gazebo.ros.services.stepping.usual_requests import UsualRequest
 from bullet_gazebo.ros.wire.checks import LARGEST, bad_number
 from bullet_gazebo.ros.wire.conversions import from_pose_msg, from_twist_msg
 from bullet_gazebo.simulator import Simulator
@@ -33,13 +35,24 @@ class StepPlan:
         """
         self._sim = sim
         self._addresses = addresses
-        self.query = _query(request)
-        _check_ticks(request, self.query is not NOTHING)
-        self.placed_models = self._models(request)
-        self.placed = self._placing(request)
+        self.query = NOTHING
+        self.placed_models: list[tuple[Model, Pose, Twist]] = []
+        self.placed: dict[Model, Placing] = {}
+        self._held: Sequence[JointHandle] = ()
+        self._held_commands: Sequence[float] = ()
+        usual = isinstance(request, UsualRequest)
+        if usual:
+            _check_ticks(request, False)
+        else:
+            self.query = _query(request)
+            _check_ticks(request, self.query is not NOTHING)
+            self.placed_models = self._models(request)
+            self.placed = self._placing(request)
         _check_numbers("commands", request.commands)
         self._commands = list(request.commands)
         self._ports = addresses.command_ports(request.controllers, len(request.commands)).ports
+        if usual:
+            return
         _check_list(
             "commanded_joints", request.commanded_joints, "joint_commands", request.joint_commands
         )

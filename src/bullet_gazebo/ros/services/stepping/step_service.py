@@ -3,13 +3,14 @@
 import threading
 from contextlib import AbstractContextManager
 
-import rospy
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.ros.services.stepping.addresses import Addresses
 from bullet_gazebo.ros.services.stepping.answers import JointsAnswer, fields_of
 from bullet_gazebo.ros.services.stepping.step_requests import StepPlan
+from bullet_gazebo.ros.services.stepping.usual_requests import UsualRequests
+from bullet_gazebo.ros.wire.rospy_patches.polling import PolledService
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state.names import UnknownName
@@ -36,7 +37,7 @@ class StepService:
         self._reader = StateReader(sim.world, NOTHING)
         self._addresses = Addresses(sim)
         self._knows_contacts = False  # the last tick's, which a reset or a placing makes void
-        self._service = rospy.Service("~step_world", StepWorld, self._step)
+        self._service = PolledService("~step_world", StepWorld, self._step, UsualRequests)
 
     def _step(self, request: StepWorldRequest) -> StepWorldResponse:
         with self._one_at_a_time, self._sim.lock:
@@ -114,7 +115,7 @@ class StepService:
     def _answer(self, reader: StateReader | None, stepped: bool) -> StepWorldResponse:
         sim, joints = self._sim, self._found().told_joints
         if reader is None:
-            return JointsAnswer(joints, sim.sim_time, sim.now)
+            return JointsAnswer(joints, sim.now)
         return StepWorldResponse(
             success=True,
             sim_time=sim.sim_time,

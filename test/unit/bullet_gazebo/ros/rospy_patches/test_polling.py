@@ -1,19 +1,22 @@
-"""Persistent connections to some services are polled for their next request; all others aren't."""
+"""Lasting connections to some services are polled for their next request, and some requests read by a
+reader of the service's own."""
 
 from __future__ import annotations
 
 import io
 import socket
 import struct
+import threading
 from collections.abc import Callable, Iterator
 
 import pytest
 from rospy.exceptions import TransportTerminated
 from rospy.impl.tcpros_base import TCPROSTransport
 from rospy.impl.tcpros_service import ServiceImpl, TCPService
-from std_srvs.srv import Empty, SetBool, SetBoolRequest
+from std_srvs.srv import SetBool, SetBoolRequest
 
 from bullet_gazebo.ros.wire.rospy_patches import polling
+from bullet_gazebo.ros.wire.rospy_patches.polling import PolledService
 from ros_calls import polling as general
 from ros_calls.polling import RECENT, AdaptivePoll
 
@@ -45,7 +48,6 @@ class Served:
         monkeypatch.setattr(
             ServiceImpl, "handle", lambda _self, transport, _header: self.handled.append(transport)
         )
-        polling.poll_for_requests(SetBool)
         self._ends: list[socket.socket] = []
 
     def _make(self) -> AdaptivePoll:
@@ -54,7 +56,7 @@ class Served:
         return self.polls[-1]
 
     def connect(
-        self, kind: type, header: dict[str, str]
+        self, header: dict[str, str], reader: Callable[[], polling.Reader] = polling.NoReader
     ) -> tuple[socket.socket, Callable[[], list[bool]]]:
         """The client's end, and what reads the requests that have come."""
         client, own = socket.socketpair()
@@ -62,9 +64,9 @@ class Served:
         self._ends += [client, own]
         transport = TCPROSTransport(TCPService("/served", SetBool), "/served")
         transport.set_socket(own, "/client")
-        service = ServiceImpl.__new__(ServiceImpl)
-        service.request_class = kind._request_class
-        ServiceImpl.handle(service, transport, header)
+        service = PolledService.__new__(PolledService)
+        service._reader = reader
+        service.handle(transport, header)
         assert self.handled[-1] is transport
         return client, lambda: [request.data for request in self.handled[-1].receive_once()]
 
@@ -81,7 +83,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
 
 
 def test_requests_are_the_same_and_polled_for_once_they_follow_each_other(served: Served) -> None:
-    client, receive = served.connect(SetBool, PERSISTENT)
+    client, receive = served.connect(PERSISTENT)
     for count in range(20):
         client.sendall(on_the_wire(count % 2 == 0))
         assert receive() == [count % 2 == 0]
@@ -92,7 +94,7 @@ def test_requests_are_the_same_and_polled_for_once_they_follow_each_other(served
 
 
 def test_one_that_has_come_with_another_is_not_polled_for(served: Served) -> None:
-    client, receive = served.connect(SetBool, PERSISTENT)
+    client, receive = served.connect(PERSISTENT)
     for _ in range(RECENT):
         client.sendall(on_the_wire(True))
         receive()
@@ -104,13 +106,45 @@ def test_one_that_has_come_with_another_is_not_polled_for(served: Served) -> Non
     assert served.polls[0].looks == 1
 
 
-@pytest.mark.parametrize(
-    ("kind", "header"), [(SetBool, {}), (SetBool, {"persistent": "0"}), (Empty, PERSISTENT)]
-)
-def test_single_calls_and_other_services_are_slept_for(
-    served: Served, kind: type, header: dict[str, str]
-) -> None:
-    client, receive = served.connect(kind, header)
+@pytest.mark.parametrize("header", [{}, {"persistent": "0"}])
+def test_single_calls_are_slept_for(served: Served, header: dict[str, str]) -> None:
+    client, receive = served.connect(header)
     client.sendall(on_the_wire(True))
     assert receive() == [True]
     assert not served.polls
+
+
+class Trues:
+    """Knows the request that says True, once it has been told of one."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[bytes, bool]] = []
+
+    def read(self, data: bytes) -> SetBoolRequest | None:
+        return SetBoolRequest(data="known") if (data, True) in self.told else None
+
+    def learn(self, data: bytes, request: SetBoolRequest) -> None:
+        self.told.append((data, request.data))
+
+
+def test_a_reader_learns_what_comes_and_reads_what_it_knows(served: Served) -> None:
+    """What comes in two parts, and what comes with another one, included."""
+    reader = Trues()
+    client, receive = served.connect(PERSISTENT, lambda: reader)
+    one, other = on_the_wire(True), on_the_wire(False)
+    for data, read in ((other, [False]), (one, [True]), (one, ["known"]), (other, [False])):
+        client.sendall(data)
+        assert receive() == read
+    assert reader.told == [(other, False), (one, True), (other, False)]
+    client.sendall(one + other)
+    assert receive() == [True, False]
+    client.sendall(one[:2])
+    late = threading.Timer(0.05, client.sendall, [one[2:]])
+    late.start()
+    assert receive() == [True]
+    late.join()
+    client.sendall(one)
+    assert receive() == ["known"]
+    client.close()
+    with pytest.raises(TransportTerminated):
+        receive()
