@@ -108,7 +108,7 @@ def test_no_further_job_begins_after_ctrl_c(tmp_path: Path, monkeypatch) -> None
 def test_the_training_is_told_all_of_its_options(tmp_path: Path) -> None:
     variant = make_variant("t", "wide", {"preset": "tutorial", "hidden_sizes": [64, 32]})
     flags = tuple(training_flags(variant, 1))
-    told = command(Job("wide", tmp_path / "run", flags), tmp_path / "run", PROGRAM)[3:]
+    told = command(Job("wide", tmp_path / "run", flags), tmp_path / "run", PROGRAM)[len(PROGRAM) :]
     assert told[:4] == ["train", f"--run-dir={tmp_path / 'run'}", "--algo", "dqn"]
     assert {"--preset=tutorial", "--seed=1", "--exp-name=wide"} <= set(told)
     assert told[told.index("--params") + 1 :] == ["hidden_sizes=[64,32]"]
