@@ -53,6 +53,7 @@ class Frame(Protocol):
         scalars: Mapping[str, float],
         note: str = "",
         success: bool | None = None,
+        step: int | None = None,
     ) -> None:
         """Takes an episode down.
 
@@ -62,6 +63,7 @@ class Frame(Protocol):
             scalars: of the algorithm's own, logged at the step of the episode's end.
             note: for the line of every 20th episode; else the speed stands there.
             success: whether it reached its goal; None if the environment doesn't say.
+            step: of its end; None: now.
         """
         ...
 

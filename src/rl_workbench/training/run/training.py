@@ -196,6 +196,7 @@ class Training:
         scalars: Mapping[str, float],
         note: str = "",
         success: bool | None = None,
+        step: int | None = None,
     ) -> None:
         """Takes an episode down, logs it, shows it; see `Frame.episode_done`."""
         history, steps = self._history, self._algorithm.steps
@@ -211,7 +212,7 @@ class Training:
         }
         if success is not None:
             charts[SUCCESS] = history.success_rate
-        self.log.add(steps, {**charts, **scalars})
+        self.log.add(steps if step is None else step, {**charts, **scalars})
         told = [f"success: {history.success_rate:.0%}"] if history.successes else []
         note = ", ".join([*told, *([note] if note else [])])
         self._shown.episode_done(history.returns, length, f"{speed:.0f} steps/s", note)

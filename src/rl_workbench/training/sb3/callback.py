@@ -107,17 +107,13 @@ class FrameCallback(BaseCallback):
         self._tell()
 
     def _tell(self) -> None:
-        """Tells the frame of episodes, each at the step of its end."""
-        model: Any = self.model
-        now = model.num_timesteps
+        """Tells the frame of episodes, each with the step of its end."""
         for episode in self._ended:
             self._episodes += 1
             check_finite(f"the return of episode {self._episodes}", episode.total_reward)
-            model.num_timesteps = episode.step
-            self._frame.episode_done(
-                episode.total_reward, episode.length, {}, success=episode.success
-            )
-        self._ended, model.num_timesteps = [], now
+            step, total_reward, length, success = episode
+            self._frame.episode_done(total_reward, length, {}, success=success, step=step)
+        self._ended = []
 
     def _on_training_end(self) -> None:
         self._release()
