@@ -6,11 +6,9 @@ its part depends on, so what it plays is the same to the bit.
 """
 
 import contextlib
-import math
 import pickle
 import socket
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
@@ -25,14 +23,13 @@ from rl_workbench.training.cluster.nodes import Cluster, Node, check_processors
 from rl_workbench.training.environments.checked import EnvironmentFailure
 from rl_workbench.training.environments.several import numbered
 from rl_workbench.training.options.training_options import TrainingOptions
+from rl_workbench.training.rollouts.deadlines import Deadlines
 from rl_workbench.training.rollouts.fingerprint import fingerprint
 from rl_workbench.training.rollouts.worker import Failure, Home, Worker, kin_of
 from rl_workbench.training.run.algorithm import Say
 
 POLL = 0.1  # [s] between two looks for an interruption
-PATIENCE = 15.0  # [s] after which the user hears that workers haven't begun
-DEADLINE = 180.0  # [s] at least until a silent one is replaced; twice that each further time
-TIMES = 10.0  # as long as the longest part took so far, before one that plays is given up
+PATIENCE = 15.0  # [s] for nodes, where there are none
 ANSWER = 1.0  # [s] that a node has to answer in
 GRACE = 3.0  # [s] that environments have to close in
 ATTEMPTS = 5  # of workers at the same part, before the part is taken for the cause
@@ -61,9 +58,8 @@ class Workers:
         check_processors(self._count, cluster.cpus)
         self._home = _home_of(options.run.env_id)
         self._nodes = [""] * self._count  # where each worker is
-        self._longest = 0.0  # [s] that a part took so far; 0: none was played yet
         self._playing: dict[Any, int] = {}
-        self._asked = [0.0] * self._count  # when each was [s of the monotonic clock]
+        self._deadlines = Deadlines(self._count)
         self._actors: list[Any] = []
         try:
             for index in range(self._count):
@@ -149,7 +145,7 @@ class Workers:
         """
         found: dict[int, Any] = {}
         lost = [0] * self._count
-        asked_at, is_told = time.monotonic(), False
+        is_told = False
         with _told():
             for index in range(self._count):
                 self._ask(index, asking)
@@ -162,57 +158,37 @@ class Workers:
                     try:
                         found[index] = self._checked(index, ray.get(reference))
                         if not begins:
-                            took = time.monotonic() - self._asked[index]
-                            self._longest = max(self._longest, took)
+                            self._deadlines.played(index)
                     except (RayTaskError, ObjectStoreFullError, OutOfDiskError):
                         raise
                     except RayError as error:
                         lost[index] += 1
                         self._replace(index, _line_of(error), lost[index])
                         self._ask(index, asking)
-                limit = DEADLINE if begins else self._limit()
-                for reference, index in self._silent(limit, lost):
-                    del self._playing[reference]
-                    seconds = limit * 2 ** lost[index]
-                    lost[index] += 1
-                    what = "begun" if begins else "answered"
-                    self._replace(index, f"it hasn't {what} within {seconds:.0f} s", lost[index])
-                    self._ask(index, asking)
-                tell_at = asked_at + (PATIENCE if begins else self._limit(DEADLINE) / 2)
-                if self._playing and not is_told and time.monotonic() > tell_at:
-                    is_told = True
-                    self._tell_of_silence()
+                for reference, index in list(self._playing.items()):
+                    limit = self._deadlines.limit(begins, lost[index])
+                    if self._deadlines.since(index) > limit:
+                        del self._playing[reference]
+                        lost[index] += 1
+                        what = "begun" if begins else "answered"
+                        self._replace(index, f"it hasn't {what} within {limit:.0f} s", lost[index])
+                        self._ask(index, asking)
+                is_told = is_told or self._tell_of_silence(self._deadlines.silence(begins))
         return [found[index] for index in range(self._count)]
 
     def _ask(self, index: int, asking: Callable[[int], Callable[[], Any]]) -> None:
         self._playing[asking(index)()] = index
-        self._asked[index] = time.monotonic()
+        self._deadlines.ask(index)
 
-    def _limit(self, without: float = math.inf) -> float:
-        """Seconds that a part may take, by what others took.
-
-        Args:
-            without: where nothing was played yet.
-        """
-        return max(DEADLINE, TIMES * self._longest) if self._longest else without
-
-    def _silent(self, seconds: float, lost: Sequence[int]) -> list[tuple[Any, int]]:
-        """Those that were asked so long ago and haven't answered.
-
-        With each loss the time is doubled: a part that only takes long is so played to its end.
-        """
-        now = time.monotonic()
-        return [
-            (reference, index)
-            for reference, index in self._playing.items()
-            if now - self._asked[index] > seconds * 2 ** lost[index]
-        ]
-
-    def _tell_of_silence(self) -> None:
-        numbers = sorted(self._playing.values())
-        seconds = time.monotonic() - min(self._asked[index] for index in numbers)
-        names = ", ".join(str(index + 1) for index in numbers)
+    def _tell_of_silence(self, least: float) -> bool:
+        """Tells of those that haven't answered for so long [s]; returns whether there are any."""
+        silent = {index: self._deadlines.since(index) for index in sorted(self._playing.values())}
+        if max(silent.values(), default=0.0) <= least:
+            return False
+        names = ", ".join(str(index + 1) for index, since in silent.items() if since > least)
+        seconds = max(silent.values())
         self._say(f"for {seconds:.0f} s nothing has come from worker {names} of {self._count}")
+        return True
 
     def _checked(self, index: int, answer: Any) -> Any:
         if not isinstance(answer, Failure):

@@ -65,7 +65,7 @@ class FakeRay:
 @pytest.fixture
 def make(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Makes workers on a fake of Ray."""
-    from rl_workbench.training.rollouts import workers
+    from rl_workbench.training.rollouts import deadlines, workers
 
     def made(fake: FakeRay, count: int, said: list[str], cpus: int = 4) -> workers.Workers:
         node = Node("a1b2c3", "10.0.0.7 (a1b2)", cpus)
@@ -73,7 +73,7 @@ def make(monkeypatch: pytest.MonkeyPatch) -> Any:
         run = SimpleNamespace(num_envs=count, env_id="CartPole-v1")
         options = SimpleNamespace(run=run, record=dict)
         monkeypatch.setattr(workers, "ray", fake)
-        monkeypatch.setattr(workers, "time", fake)
+        monkeypatch.setattr(deadlines, "time", fake)
         monkeypatch.setattr(workers.Workers, "_start", fake.start)
         return workers.Workers(cluster, options, said.append)
 
