@@ -1,7 +1,7 @@
-"""Asking a cluster's head for its id: Ray itself would ask again for 20 s, whatever the answer is."""
+"""A cluster's head: where it is, and what it answers. Ray itself would ask for 20 s, whatever the answer is."""
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.cluster.address import PATIENCE, no_head
+from rl_workbench.training.cluster.address import AUTO, PATIENCE, no_head
 
 METHOD = "/ray.rpc.NodeInfoGcsService/GetClusterId"
 NOTHING = b""  # the request has no fields
@@ -9,6 +9,23 @@ ANOTHER_TOKEN = (
     "its token is another than this machine's: RAY_AUTH_MODE=token, and RAY_AUTH_TOKEN or "
     "~/.ray/auth_token (ray get-auth-token) have to be as on the head"
 )
+
+
+def head_of_this_machine() -> str:
+    """HOST:PORT of the head of the cluster that this machine belongs to.
+
+    Raises:
+        WorkbenchError: if it belongs to none.
+    """
+    from ray._private.services import canonicalize_bootstrap_address_or_die
+
+    try:
+        return str(canonicalize_bootstrap_address_or_die(AUTO))
+    except ConnectionError as error:
+        raise WorkbenchError(
+            f"--ray {AUTO}: this machine belongs to no Ray cluster, or to several; name one by its head's "
+            "HOST:PORT, or have RAY_ADDRESS name it"
+        ) from error
 
 
 def check_head(address: str) -> None:

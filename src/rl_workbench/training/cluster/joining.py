@@ -13,7 +13,7 @@ from typing import Any
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.extras import need
 from rl_workbench.training.cluster.address import AUTO, LOCAL, check_address, without_auto
-from rl_workbench.training.cluster.head import ANOTHER_TOKEN, check_head
+from rl_workbench.training.cluster.head import ANOTHER_TOKEN, check_head, head_of_this_machine
 from rl_workbench.training.cluster.nodes import Cluster
 from rl_workbench.training.cluster.obituary import obituary
 from rl_workbench.training.cluster.scratch import scratch_folder
@@ -102,9 +102,10 @@ def _keep_for_oneself() -> None:
 
 def _found(stack: contextlib.ExitStack, address: str, last_words: str) -> Any:
     stack.enter_context(obituary(last_words))
-    if address != AUTO:
-        check_address(address)
-        check_head(address)
+    if address == AUTO:
+        address = head_of_this_machine()
+    check_address(address)
+    check_head(address)
     return _init(f"the Ray cluster at {address}", address=address)
 
 

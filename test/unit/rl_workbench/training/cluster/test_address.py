@@ -78,6 +78,21 @@ def test_a_head_may_be_there(answering: Answering) -> None:
 
 
 @pytest.mark.extras("ray")
+def test_a_machine_without_a_cluster(monkeypatch: pytest.MonkeyPatch) -> None:
+    from ray._private import services
+
+    from rl_workbench.training.cluster.head import head_of_this_machine
+
+    monkeypatch.setattr(services, "canonicalize_bootstrap_address", lambda *_, **__: None)
+    for found in (set(), {"10.0.0.1:6379", "10.0.0.2:6379"}):
+        monkeypatch.setattr(services, "find_gcs_addresses", lambda found=found: found)
+        with pytest.raises(
+            WorkbenchError, match="^--ray auto: this machine belongs to no Ray cluster"
+        ):
+            head_of_this_machine()
+
+
+@pytest.mark.extras("ray")
 @pytest.mark.parametrize(
     ("code", "line"),
     [
