@@ -1,4 +1,4 @@
-"""A cluster's head: where it is, and what it answers. Ray itself would ask for 20 s, whatever the answer is."""
+"""A cluster's head: where it is, and what it answers. Ray itself would ask for 20 s, whatever that is."""
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.cluster.address import AUTO, PATIENCE, no_head
