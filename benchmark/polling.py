@@ -5,8 +5,9 @@
 
 The cart-pole's environment in lock-step, with two simulators: for one LOCKSTEP_POLLING is 0 at both ends of
 its connection. Only one is stepped at a time. For an idle machine with two cores or more: where more threads
-want to run than there are cores, nothing is polled, and the ratio is 1. Prints a table and writes
-polling.json. It starts the simulators on masters of its own.
+want to run than there are cores, nothing is polled, and the ratio is 1. What waking a process costs on this
+machine is measured as well (waking.py): a step has two such waits, and no more can be spared. Prints a table
+and writes polling.json. It starts the simulators on masters of its own.
 """
 
 import os
@@ -16,6 +17,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 import reporting
+import waking
 from cartpole_world import add_cartpole
 from realtime import processor_time, simulator_process
 
@@ -88,6 +90,7 @@ def idle(pairs: list[Pair]) -> list[float]:
 
 def main() -> None:
     options = reporting.options(__doc__ or "", seconds=2.0, rounds=8)
+    wake = waking.measured()  # first: it forks, and this process has no threads yet
     with ExitStack() as stack:
         pairs = {name: pair(name == "on", stack) for name in ("off", "on")}
         for each in pairs.values():
@@ -118,6 +121,8 @@ def main() -> None:
         f"on makes {statistics.median(ratios):.2f} times as many (target {TARGETS['times as many']}; "
         f"rounds: {', '.join(f'{ratio:.2f}' for ratio in ratios)})"
     )
+    spared = 2.0 * wake * results["on"]["steps/s"]
+    print(f"waking takes {1e6 * wake:.0f} us here: at most {1.0 + spared:.2f} times as many")
     print(
         f"idle: client {client:.3f}, simulators {' and '.join(f'{each:.3f}' for each in simulators)} cores "
         f"(target {TARGETS['idle']})"
@@ -128,6 +133,7 @@ def main() -> None:
         {
             **results,
             "times as many": statistics.median(ratios),
+            "waking": wake,
             "idle": {"client": client, "off": simulators[0], "on": simulators[1]},
         },
     )
