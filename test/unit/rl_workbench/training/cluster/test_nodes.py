@@ -60,7 +60,7 @@ def test_what_a_node_is_asked_tells_of_this_one() -> None:
 
 
 def test_a_cluster_none_of_whose_nodes_can_be_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(joining, "_found", lambda stack, address: FakeRay({"a1b2c3": {}}))
+    monkeypatch.setattr(joining, "_found", lambda *_: FakeRay({"a1b2c3": {}}))
     monkeypatch.setattr(joining, "need", lambda *_: None)
     said: list[str] = []
     with (
