@@ -16,6 +16,8 @@ Progressed = Callable[[Job, str], None]  # is told a job, and the node that it r
 class Machines(Protocol):
     """One or many. All calls come from one thread, the one that made it."""
 
+    time_to_save: float  # [s] that trainings have after Ctrl-C, before they are ended
+
     def about(self) -> str:
         """What they are, in half a line."""
         ...
@@ -52,6 +54,8 @@ class ThisMachine:
         at_once: how many, each on one core.
         program: what starts the command line, without `train`.
     """
+
+    time_to_save = 4.0
 
     def __init__(self, at_once: int, program: Sequence[str]) -> None:
         self._at_once, self._program = at_once, program

@@ -12,7 +12,6 @@ from rl_workbench.training.run.checkpoints import LAST
 from rl_workbench.training.run.interrupt import Interrupt
 
 LOOK_EVERY = 0.2  # [s] at the user's Ctrl-C
-TIME_TO_SAVE = 4.0  # [s] after it
 MOST_LOST = 8  # attempts in a row that were lost before a new checkpoint
 LONGEST_PAUSE = 30.0  # [s] between two attempts at a job
 
@@ -149,7 +148,7 @@ class Runner:
         """Gives those that run a moment to save what they have."""
         for job in self._running:
             self._machines.stop(job)
-        until = time.monotonic() + TIME_TO_SAVE
+        until = time.monotonic() + self._machines.time_to_save
         while self._running and time.monotonic() < until:
             for job, ending in self._machines.wait(LOOK_EVERY, self._progressed):
                 self._running.discard(job)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rl_workbench.tools.jobs import runner
 from rl_workbench.tools.jobs.cluster.attempt import _followed
+from rl_workbench.tools.jobs.cluster.nodes import RayNodes
 
 TRAINING = """
 import os, signal
@@ -66,4 +66,4 @@ def test_one_that_is_pruned_has_time_to_draw_its_curve() -> None:
     """Whoever can't wait, as after Ctrl-C, ends the worker by force."""
     training = Saving()
     assert list(_followed(training, None)) == []  # type: ignore[arg-type]
-    assert training.given[1] > 10 * runner.TIME_TO_SAVE
+    assert training.given[1] > 10 * RayNodes.time_to_save

@@ -50,6 +50,8 @@ class Trainers:
         curve: raises if the training fails.
     """
 
+    time_to_save = 0.0
+
     def __init__(self, at_once: int, curve: Curve) -> None:
         self._at_once, self._curve = at_once, curve
         self.running: dict[Job, int] = {}  # steps done

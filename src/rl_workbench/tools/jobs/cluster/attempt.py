@@ -15,9 +15,7 @@ from rl_workbench.training.cluster.scratch import scratch_folder
 
 LOOK_EVERY = 0.5  # [s] at the training's files
 GROWTH_EVERY = 5.0  # [s] at least between two parcels of tables alone
-TIME_TO_SAVE = (
-    60.0  # [s] at most after being stopped; who can't wait for that ends the worker by force
-)
+TIME_TO_SAVE = 60.0  # [s] at most, after being stopped; who can't wait ends the worker by force
 TOKEN = ".seen_by_nodes"
 
 

@@ -60,6 +60,8 @@ class RayNodes:
         WorkbenchError: if the folder can't be written to.
     """
 
+    time_to_save = 2.0  # to leave a cluster takes seconds as well
+
     def __init__(
         self,
         cluster: Cluster,
