@@ -27,7 +27,7 @@ from rl_workbench.tools.benchmark.suites import (
 )
 from rl_workbench.tools.commands.machines import add_job_flags, machines_for
 from rl_workbench.tools.commands.shared import number, write_figure
-from rl_workbench.tools.jobs.job import Job
+from rl_workbench.tools.jobs.job import Job, last_words
 from rl_workbench.tools.jobs.running import run_jobs
 from rl_workbench.tools.pictures.panels import seed_panels, variant_panels
 from rl_workbench.tools.runs.runs import Run, open_run
@@ -199,7 +199,8 @@ def _examine(planned: list[_Planned], episodes: int) -> tuple[list[Run], list[Ru
         try:
             runs.append(open_run(job.folder))
         except WorkbenchError as error:
-            results.append(RunResult(name, seed, job.folder.name, fault=str(error)))
+            fault = last_words(job.log) or str(error)  # a training that couldn't begin has said why
+            results.append(RunResult(name, seed, job.folder.name, fault=fault))
         else:
             results.append(examine(runs[-1], name, episodes, warn, also_last=True))
     return runs, results
