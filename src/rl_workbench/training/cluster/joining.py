@@ -119,6 +119,10 @@ def _init(what: str, **options: Any) -> Any:
     import ray
 
     before = {number: signal.getsignal(number) for number in SIGNALS}
+    caught: list[int] = []
+    for number, handler in before.items():  # interrupted in the middle, Ray's own threads crash at the end
+        if handler != signal.SIG_IGN:
+            signal.signal(number, lambda which, frame: caught.append(which))
     try:
         ray.init(
             log_to_driver=False, logging_level=logging.ERROR, configure_logging=False, **options
@@ -137,4 +141,10 @@ def _init(what: str, **options: Any) -> Any:
     finally:
         for number, handler in before.items():  # Ray's own would leave out what ours save
             signal.signal(number, handler)
+    try:
+        for number in caught:
+            signal.raise_signal(number)
+    except BaseException:
+        ray.shutdown()
+        raise
     return ray

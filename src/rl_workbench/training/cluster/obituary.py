@@ -6,12 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 # A constant text: line and folder come as arguments, so nothing of them is parsed. Of those who have files
-# of the folder open, only who writes there belongs to the cluster.
+# of the folder open, only who writes there belongs to the
+# cluster; so does this process, but it ends by itself.
 WAIT_FOR_THE_END = r"""
-read -r orderly && exit
-printf "%s\n" "$0" >&2
+read -r orderly || printf "%s\n" "$0" >&2
 [ -z "$1" ] && exit
-find /proc/[0-9]*/fd -perm -u+w -lname "$1/*" 2> /dev/null | cut -d / -f 3 | sort -u | xargs -r kill -9
+find /proc/[0-9]*/fd -perm -u+w -lname "$1/*" 2> /dev/null | cut -d / -f 3 | sort -u | grep -vx "$PPID" |
+    xargs -r kill -9
 """
 
 
@@ -20,8 +21,8 @@ def obituary(line: str, folder: Path | None = None) -> Iterator[None]:
     """As long as it is entered, another process waits to say the line on standard error.
 
     Args:
-        folder: of a cluster that is this process's own; what writes its logs there ends with it: Ray's
-            agents would outlive it by a minute.
+        folder: of a cluster that is this process's own; what writes its logs there ends with it, however
+            it ends: Ray's agents can outlive it by a minute.
     """
     # Ctrl-C in the terminal isn't meant for it.
     speaker = subprocess.Popen(

@@ -10,6 +10,7 @@ SCRIPT = """
 import os, signal, sys
 from pathlib import Path
 from rl_workbench.training.cluster.obituary import obituary
+log = Path(sys.argv[1], "own.log").open("w")
 with obituary("It is gone.", Path(sys.argv[1])):
     if sys.argv[2] == "killed":
         os.kill(os.getpid(), signal.SIGKILL)
@@ -17,7 +18,7 @@ with obituary("It is gone.", Path(sys.argv[1])):
 
 
 @pytest.mark.parametrize(("end", "line"), [("killed", "It is gone.\n"), ("orderly", "")])
-def test_who_writes_in_the_folder_of_a_killed_process_ends_with_it(
+def test_who_writes_in_the_folder_ends_with_it(
     tmp_path: Path, end: str, line: str
 ) -> None:
     """As Ray's agents do; who only reads there stays."""
@@ -31,10 +32,8 @@ def test_who_writes_in_the_folder_of_a_killed_process_ends_with_it(
         command = [sys.executable, "-c", SCRIPT, str(tmp_path), end]
         # Until who says it has ended, too: the stream is that one's as well.
         ended = subprocess.run(command, check=False, stderr=subprocess.PIPE, text=True)
-        assert ended.stderr == line
-        if end == "killed":
-            assert writer.wait() == -9
-        assert writer.poll() == (-9 if end == "killed" else None) and reader.poll() is None
+        assert (ended.stderr, ended.returncode) == (line, -9 if line else 0)
+        assert writer.wait() == -9 and reader.poll() is None
     finally:
         for each in (writer, reader):
             each.kill()
