@@ -120,7 +120,10 @@ def _init(what: str, **options: Any) -> Any:
 
     before = {number: signal.getsignal(number) for number in SIGNALS}
     caught: list[int] = []
-    for number, handler in before.items():  # interrupted in the middle, Ray's own threads crash at the end
+    for (
+        number,
+        handler,
+    ) in before.items():  # interrupted in the middle, Ray's own threads crash at the end
         if handler != signal.SIG_IGN:
             signal.signal(number, lambda which, frame: caught.append(which))
     try:
@@ -142,8 +145,8 @@ def _init(what: str, **options: Any) -> Any:
         for number, handler in before.items():  # Ray's own would leave out what ours save
             signal.signal(number, handler)
     try:
-        for number in caught:
-            signal.raise_signal(number)
+        for each in caught:
+            signal.raise_signal(each)
     except BaseException:
         ray.shutdown()
         raise

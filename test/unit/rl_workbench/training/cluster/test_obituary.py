@@ -18,9 +18,7 @@ with obituary("It is gone.", Path(sys.argv[1])):
 
 
 @pytest.mark.parametrize(("end", "line"), [("killed", "It is gone.\n"), ("orderly", "")])
-def test_who_writes_in_the_folder_ends_with_it(
-    tmp_path: Path, end: str, line: str
-) -> None:
+def test_who_writes_in_the_folder_ends_with_it(tmp_path: Path, end: str, line: str) -> None:
     """As Ray's agents do; who only reads there stays."""
     log = tmp_path / "session" / "agent.log"
     log.parent.mkdir()
