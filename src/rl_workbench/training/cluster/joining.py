@@ -17,6 +17,7 @@ from rl_workbench.training.cluster.head import ANOTHER_TOKEN, check_head, head_o
 from rl_workbench.training.cluster.nodes import Cluster
 from rl_workbench.training.cluster.obituary import obituary
 from rl_workbench.training.cluster.scratch import scratch_folder
+from rl_workbench.training.cluster.stuck import ended_if_stuck
 from rl_workbench.training.run.progress import warn
 
 STORE = 128 * 2**20  # [bytes] of a local cluster's object store, which jobs hardly use
@@ -75,10 +76,11 @@ def _started(stack: contextlib.ExitStack, last_words: str) -> Any:
     if len(os.fsencode(place)) + SESSION > SOCKETS:
         place = "/tmp"
     folder = stack.enter_context(scratch_folder("ray", place))
-    stack.enter_context(obituary(last_words, folder))
+    say_at_last = stack.enter_context(obituary(last_words, folder))
     _keep_for_oneself()
     return _init(
         "a local cluster",
+        say_at_last,
         address=LOCAL,
         num_cpus=local_processors(),
         object_store_memory=STORE,
@@ -101,15 +103,15 @@ def _keep_for_oneself() -> None:
 
 
 def _found(stack: contextlib.ExitStack, address: str, last_words: str) -> Any:
-    stack.enter_context(obituary(last_words))
+    say_at_last = stack.enter_context(obituary(last_words))
     if address == AUTO:
         address = head_of_this_machine()
     check_address(address)
     check_head(address)
-    return _init(f"the Ray cluster at {address}", address=address)
+    return _init(f"the Ray cluster at {address}", say_at_last, address=address)
 
 
-def _init(what: str, **options: Any) -> Any:
+def _init(what: str, say_at_last: Callable[[str], None], **options: Any) -> Any:
     """Ray, initialised.
 
     Raises:
@@ -127,9 +129,10 @@ def _init(what: str, **options: Any) -> Any:
         if handler != signal.SIG_IGN:
             signal.signal(number, lambda which, frame: caught.append(which))
     try:
-        ray.init(
-            log_to_driver=False, logging_level=logging.ERROR, configure_logging=False, **options
-        )
+        with ended_if_stuck(what, say_at_last):
+            ray.init(
+                log_to_driver=False, logging_level=logging.ERROR, configure_logging=False, **options
+            )
     except SystemExit as error:  # by a handler of Ray's, that is in force meanwhile
         ray.shutdown()
         signal.signal(signal.SIGTERM, before[signal.SIGTERM])

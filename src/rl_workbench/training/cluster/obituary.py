@@ -2,14 +2,15 @@
 
 import contextlib
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-# A constant text: line and folder come as arguments, so nothing of them is parsed. Of those who have files
-# of the folder open, only who writes there belongs to the
-# cluster; so does this process, but it ends by itself.
+ORDERLY = "orderly"
+# A constant text: line and folder come as arguments, so nothing of them is parsed. Of those who have files of
+# the folder open, only who writes there belongs to the cluster; so does this process, but it ends by itself.
 WAIT_FOR_THE_END = r"""
-read -r orderly || printf "%s\n" "$0" >&2
+read -r line || line=$0
+[ "$line" = orderly ] || printf "%s\n" "$line" >&2
 [ -z "$1" ] && exit
 find /proc/[0-9]*/fd -perm -u+w -lname "$1/*" 2> /dev/null | cut -d / -f 3 | sort -u | grep -vx "$PPID" |
     xargs -r kill -9
@@ -17,8 +18,10 @@ find /proc/[0-9]*/fd -perm -u+w -lname "$1/*" 2> /dev/null | cut -d / -f 3 | sor
 
 
 @contextlib.contextmanager
-def obituary(line: str, folder: Path | None = None) -> Iterator[None]:
+def obituary(line: str, folder: Path | None = None) -> Iterator[Callable[[str], None]]:
     """As long as it is entered, another process waits to say the line on standard error.
+
+    What it gives has another line said in its place, at once; to be called by who then ends this process.
 
     Args:
         folder: of a cluster that is this process's own; what writes its logs there ends with it, however
@@ -31,10 +34,17 @@ def obituary(line: str, folder: Path | None = None) -> Iterator[None]:
         start_new_session=True,
     )
     assert speaker.stdin is not None
-    try:
-        yield
-    finally:
+    told = speaker.stdin
+
+    def tell(last: str) -> None:
         with contextlib.suppress(BrokenPipeError):
-            speaker.stdin.write(b"orderly\n")
-            speaker.stdin.close()
+            told.write(f"{last}\n".encode())
+            told.flush()
+
+    try:
+        yield tell
+    finally:
+        tell(ORDERLY)
+        with contextlib.suppress(BrokenPipeError):
+            told.close()
         speaker.wait()
