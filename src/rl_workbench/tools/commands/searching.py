@@ -3,7 +3,6 @@
 import argparse
 import contextlib
 import json
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -52,7 +51,7 @@ def add_flags(parser: argparse.ArgumentParser, command: str) -> None:
         help="ends trials whose evaluations fall behind the others' (default median)")  # fmt: skip
     add_job_flags(parser)
     add("--out", type=Path, metavar="FOLDER",
-        help="of the study; one that exists is gone on with (runs/sweep__ENV__ALGO__TIME)")  # fmt: skip
+        help="of the study; one that exists is gone on with (runs/sweep__ENV__ALGO)")  # fmt: skip
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
@@ -71,7 +70,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     known.read(fixed, "--params")  # a mistake would be every trial's
     ranges = read_ranges(arguments.ranges, algorithm, env_id, known.names)
     ranges = {name: each for name, each in ranges.items() if name not in fixed}
-    place = f"runs/sweep__{as_file_name(env_id)}__{algorithm}__{int(time.time())}"
+    place = f"runs/sweep__{as_file_name(env_id)}__{algorithm}"
     sweep = Sweep(
         (arguments.out or Path(place)).resolve(), algorithm, fixed, ranges,
         arguments.trials, arguments.seeds, kind.section.format(env_id=env_id),
@@ -143,5 +142,5 @@ def _claim(sweep: Sweep, seed: int) -> None:
         raise WorkbenchError(f"can't read {path}: {error}") from error
     if found != json.loads(json.dumps(wanted)):
         raise WorkbenchError(
-            f"{sweep.folder} holds a search of other options, ranges or seeds; name another folder"
+            f"{sweep.folder} holds a search of other options, ranges or seeds; name another folder by --out"
         )

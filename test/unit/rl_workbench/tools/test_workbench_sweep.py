@@ -350,6 +350,17 @@ def test_the_command_trains_and_its_best_options_can_be_used(
     assert list(best) == ["ppo CartPole-v1" if algorithm == "ppo" else "CartPole-v1"]
 
 
+def test_the_same_command_goes_on_in_the_same_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    brief = ("--total-timesteps=20", "--params", "eval_episodes=1", "confirm_episodes=1")
+    for done in (0, 1):
+        assert cli.main(["sweep", "--trials=1", *brief]) == 0
+        assert f"{done} of 1 trials are done" in capsys.readouterr().out
+    assert [each.name for each in (tmp_path / "runs").iterdir()] == ["sweep__CartPole-v1__dqn"]
+
+
 def test_a_folder_of_another_search_is_refused(
     tmp_path: Path, command: Callable[..., int], capsys
 ) -> None:
