@@ -76,11 +76,11 @@ def _started(stack: contextlib.ExitStack, last_words: str) -> Any:
     if len(os.fsencode(place)) + SESSION > SOCKETS:
         place = "/tmp"
     folder = stack.enter_context(scratch_folder("ray", place))
-    say_at_last = stack.enter_context(obituary(last_words, folder))
+    told = stack.enter_context(obituary(last_words, folder))
     _keep_for_oneself()
     return _init(
         "a local cluster",
-        say_at_last,
+        told,
         address=LOCAL,
         num_cpus=local_processors(),
         object_store_memory=STORE,
@@ -103,15 +103,15 @@ def _keep_for_oneself() -> None:
 
 
 def _found(stack: contextlib.ExitStack, address: str, last_words: str) -> Any:
-    say_at_last = stack.enter_context(obituary(last_words))
+    told = stack.enter_context(obituary(last_words))
     if address == AUTO:
         address = head_of_this_machine()
     check_address(address)
     check_head(address)
-    return _init(f"the Ray cluster at {address}", say_at_last, address=address)
+    return _init(f"the Ray cluster at {address}", told, address=address)
 
 
-def _init(what: str, say_at_last: Callable[[str], None], **options: Any) -> Any:
+def _init(what: str, last_words: int, **options: Any) -> Any:
     """Ray, initialised.
 
     Raises:
@@ -129,7 +129,7 @@ def _init(what: str, say_at_last: Callable[[str], None], **options: Any) -> Any:
         if handler != signal.SIG_IGN:
             signal.signal(number, lambda which, frame: caught.append(which))
     try:
-        with ended_if_stuck(what, say_at_last):
+        with ended_if_stuck(what, last_words):
             ray.init(
                 log_to_driver=False, logging_level=logging.ERROR, configure_logging=False, **options
             )

@@ -2,7 +2,7 @@
 
 import contextlib
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 ORDERLY = "orderly"
@@ -18,10 +18,11 @@ find /proc/[0-9]*/fd -perm -u+w -lname "$1/*" 2> /dev/null | cut -d / -f 3 | sor
 
 
 @contextlib.contextmanager
-def obituary(line: str, folder: Path | None = None) -> Iterator[Callable[[str], None]]:
+def obituary(line: str, folder: Path | None = None) -> Iterator[int]:
     """As long as it is entered, another process waits to say the line on standard error.
 
-    What it gives has another line said in its place, at once; to be called by who then ends this process.
+    A line that is written to the file whose number it gives is said in its place, at once, by who then ends
+    this process.
 
     Args:
         folder: of a cluster that is this process's own; what writes its logs there ends with it, however
@@ -34,17 +35,10 @@ def obituary(line: str, folder: Path | None = None) -> Iterator[Callable[[str], 
         start_new_session=True,
     )
     assert speaker.stdin is not None
-    told = speaker.stdin
-
-    def tell(last: str) -> None:
-        with contextlib.suppress(BrokenPipeError):
-            told.write(f"{last}\n".encode())
-            told.flush()
-
     try:
-        yield tell
+        yield speaker.stdin.fileno()
     finally:
-        tell(ORDERLY)
         with contextlib.suppress(BrokenPipeError):
-            told.close()
+            speaker.stdin.write(f"{ORDERLY}\n".encode())
+            speaker.stdin.close()
         speaker.wait()
