@@ -91,6 +91,12 @@ class FakeRay:
             for id in self.answers
         ]
 
+    def get_runtime_context(self) -> "FakeRay":
+        return self
+
+    def get_node_id(self) -> str:
+        return next(iter(self.answers), "")
+
     def remote(self, num_returns: str = "", **_: Any) -> Callable[[Callable[..., Any]], Task]:
         return lambda function: Task(self, function, num_returns == "streaming")
 

@@ -63,7 +63,7 @@ def joined(address: str, going_on: str, say: Callable[[str], None] = warn) -> It
         else:
             ray = _found(stack, without_auto(address), last_words)
         stack.callback(ray.shutdown)
-        cluster = Cluster(ray, say)
+        cluster = Cluster(ray, say, ray.get_runtime_context().get_node_id())
         cluster.update(PATIENCE)
         if not cluster.nodes:
             raise WorkbenchError(f"no node of the cluster at {address} can be used")

@@ -25,10 +25,12 @@ class Cluster:
     Args:
         ray: the module, initialised.
         say: is told of nodes that can't be used, each once.
+        own: the id of this process's node, if that is to be looked after: nothing begins without it any more.
     """
 
-    def __init__(self, ray: Any, say: Callable[[str], None]) -> None:
+    def __init__(self, ray: Any, say: Callable[[str], None], own: str = "") -> None:
         self.ray = ray
+        self._own = own
         self.nodes: dict[str, Node] = {}  # by their ids, those that can be used
         self._say = say
         self._known = set[str]()  # ids of nodes that were asked, whatever they answered
@@ -47,8 +49,16 @@ class Cluster:
 
         Args:
             patience: for their answers [s]; those that come later are found by a later call.
+
+        Raises:
+            WorkbenchError: if this process's own node has ended.
         """
         alive = {each["NodeID"]: each for each in self.ray.nodes() if each["Alive"]}
+        if self._own and self._own not in alive:
+            raise WorkbenchError(
+                "the node of this machine has left the cluster; what was saved is not lost, and can be gone "
+                "on with"
+            )
         self.nodes = {id: node for id, node in self.nodes.items() if id in alive}
         for id, each in alive.items():
             if id not in self._known:

@@ -53,6 +53,15 @@ def test_one_that_answers_late_is_asked_once_and_one_that_is_gone_is_forgotten()
     assert list(cluster.nodes) == ["late"]
 
 
+def test_without_the_own_node_nothing_goes_on() -> None:
+    ray = FakeRay({"own": OURS, "other": OURS})
+    cluster = Cluster(ray, pytest.fail, "own")
+    cluster.update()
+    del ray.answers["own"]
+    with pytest.raises(WorkbenchError, match="the node of this machine has left the cluster"):
+        cluster.update()
+
+
 def test_what_a_node_is_asked_tells_of_this_one() -> None:
     assert _looking()(own_packages()) == OURS
     assert set(OURS) == {"our package", *LIBRARIES}
