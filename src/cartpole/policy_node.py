@@ -13,15 +13,13 @@ from gymnasium import spaces
 
 from cartpole.ros_options import ros_options
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.output import reader_may_go
+from rl_workbench.starting import Interrupt, reader_may_go
 from rl_workbench.tools.commands.shared import env_options, number
 from rl_workbench.tools.runs.exported import described, open_exported
 from rl_workbench.tools.runs.policies import WHICH, load_learned
 from rl_workbench.tools.runs.runs import open_run
-from rl_workbench.training.environments.answers import as_float32
-from rl_workbench.training.environments.checked import told
-from rl_workbench.training.environments.making import make_environment
-from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.checked import told
+from rl_workbench.training.environments import as_float32, make_environment
 from robot_envs.backends.choice import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError

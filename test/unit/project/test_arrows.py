@@ -64,7 +64,7 @@ WITHOUT_ROS = (
     "cartpole.pg_train",
     "cartpole.workbench",
     "rl_workbench.cli",
-    "rl_workbench.training.run.training",
+    "rl_workbench.training.training",
     "robot_envs.backends.in_process",
     "robot_envs.environment",
 )

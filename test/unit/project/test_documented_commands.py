@@ -29,7 +29,7 @@ from gazebo_msgs.srv import GetWorldPropertiesRequest
 from bullet_gazebo.ros.clients import gzclient
 from cartpole import dqn_train, pg_train, policy_node, workbench
 from package_writing import cli as new_robot
-from rl_workbench.training import cli as training_cli
+from rl_workbench.training import train as training_cli
 from rl_workbench.training.algorithms import ALGORITHMS
 
 pytestmark = pytest.mark.usefixtures("signals")

@@ -11,7 +11,7 @@ import workbench_runs
 from training_runs import SMALL, flags, summary
 
 from rl_workbench.cli import COMMANDS, main
-from rl_workbench.training.cli import PROGRAM
+from rl_workbench.training.train import PROGRAM
 
 pytestmark = pytest.mark.usefixtures("signals")
 

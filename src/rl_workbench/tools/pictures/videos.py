@@ -12,9 +12,8 @@ from typing import BinaryIO
 import numpy as np
 from PIL import Image
 
-from rl_workbench.errors import WorkbenchError
-from rl_workbench.extras import installing
-from rl_workbench.training.run.files import write_file
+from rl_workbench.errors import WorkbenchError, installing
+from rl_workbench.storage import write_file
 from video_writing.mp4 import EncoderFailed, Mp4Writer, find_encoder
 
 RATES = {

@@ -13,7 +13,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.viewing.player import Player
 from rl_workbench.tools.viewing.recorder import Recorder
 from rl_workbench.tools.viewing.views import CAMERA, LOOK_AT
-from rl_workbench.training.run.progress import tell, warn
+from rl_workbench.training.progress import tell, warn
 from web_page.address import PortInUse, find_address
 from web_page.curves import Curves
 from web_page.server import open_browser, serve, stop

@@ -6,7 +6,8 @@ import pytest
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.options.training_options import TrainingOptions, choose
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.options import TrainingOptions
 
 pytestmark = pytest.mark.extras("stable_baselines3")
 
@@ -16,7 +17,7 @@ def chosen(algorithm: str, *flags: str) -> TrainingOptions:
 
 
 def model(algorithm: str, *flags: str):
-    from rl_workbench.training.sb3.model import make_model
+    from rl_workbench.training.sb3.models import make_model
 
     made = make_model(chosen(algorithm, *flags))
     made.get_env().close()
@@ -68,7 +69,7 @@ def test_noise_of_actions_is_a_standard_deviation() -> None:
         (["--n-epochs=0"], "n_epochs is a whole number from 1 on, not 0"),
         (["--params", "gamma=["], "--params: gamma must be a YAML value, not '['"),
         (["--params", "use_sde=3"], "--params: use_sde must be true or false, not '3'"),
-        (["--num-envs=0"], "num_envs lies between 1 and 1024, not 0"),
+        (["--num-envs=0"], "num_envs must be between 1 and 1024, not 0"),
         (["--learning-rate=hello"], "ppo can't be made: "),
         (["--lr-schedule=linear", "--learning-rate=x"], "learning_rate is a number, not 'x'"),
         (["--net-arch=64,wide"], "net_arch is whole numbers, as in 64,64, not '64,wide'"),

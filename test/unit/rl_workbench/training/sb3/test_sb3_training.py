@@ -24,9 +24,9 @@ from training_runs import (
 )
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.algorithms import recorded_options
-from rl_workbench.training.environments.making import make_environment
-from rl_workbench.training.run.policy import load_policy
+from rl_workbench.training.algorithm import load_policy
+from rl_workbench.training.environments import make_environment
+from rl_workbench.training.options import recorded_options
 
 pytestmark = pytest.mark.extras("stable_baselines3")
 
@@ -137,8 +137,8 @@ def test_a_resumed_training_goes_on_with_figures_and_networks(whole, tmp_path: P
 
 
 def test_the_state_comes_back_whole(whole) -> None:
-    from rl_workbench.training.sb3.model import make_model
-    from rl_workbench.training.sb3.state import restore, state_of
+    from rl_workbench.training.sb3.adapter import restore, state_of
+    from rl_workbench.training.sb3.models import make_model
 
     saved = torch.load(whole("sac") / "last.pt", weights_only=True)
     model = make_model(small("sac"))
@@ -201,7 +201,7 @@ def test_a_rate_that_torch_refuses(tmp_path: Path) -> None:
 
 
 def test_a_loss_that_is_none() -> None:
-    from rl_workbench.training.sb3.callback import check_finite
+    from rl_workbench.training.sb3.adapter import check_finite
 
     for value in (float("nan"), float("inf")):
         with pytest.raises(WorkbenchError, match=r"losses/value_loss is .*learning_rate"):
