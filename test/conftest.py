@@ -73,7 +73,7 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 @pytest.fixture(params=ENGINES)
 def new_engine(request: pytest.FixtureRequest) -> Callable:
     """Makes a physics engine; a test that asks for it runs with each of them."""
-    from bullet_gazebo.physics.engines.registry import make_engine
+    from bullet_gazebo.physics.engines import make_engine
 
     return partial(make_engine, request.param)
 

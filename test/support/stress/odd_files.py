@@ -20,7 +20,7 @@ from mutations_mesh import mesh_files
 from mutations_models import CASES
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.meshes.reader import read_mesh
+from bullet_gazebo.physics.files.meshes import read_mesh
 from ros_calls.service import ServiceClient, ServiceFailed
 from stress.drawing import drawn
 

@@ -8,14 +8,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robots import cartpole_urdf
 
-from bullet_gazebo.control.angles import normalized, shortest_distance, shortest_distance_within
 from bullet_gazebo.control.controllers import BUILT_IN, joint_state, loops
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
+from bullet_gazebo.control.joint import (
+    JointHandle,
+    JointLimits,
+    SoftLimits,
+    normalized,
+    shortest_distance,
+    shortest_distance_within,
+)
 from bullet_gazebo.control.limits import effort_enforcer
 from bullet_gazebo.control.pid import Pid
+from bullet_gazebo.control.transmissions import read_description
 
 MS = 1_000_000  # [ns]
 STATE = "joint_state_controller/JointStateController"
