@@ -2,7 +2,7 @@
 
 import gymnasium
 import pytest
-from scenes.solo_arm import SOLO, Hold
+from support.scenes.solo_arm import SOLO, Hold
 
 from rl_workbench.training.environments.checked import CheckedEnvironment, EnvironmentFailure
 from robot_envs import RobotEnv

@@ -5,11 +5,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import goal_environments
 import pytest
-from learning_fakes import POLE, Dicing, OnlyOne, Pole, register_with
-from pool_here import PoolHere
-from training_runs import (
+from support.training import goal_environments
+from support.training.learning_fakes import POLE, Dicing, OnlyOne, Pole, register_with
+from support.training.pool_here import PoolHere
+from support.training.training_runs import (
     InterruptAfter,
     assert_no_doubles,
     assert_same,

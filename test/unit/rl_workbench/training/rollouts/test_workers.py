@@ -9,16 +9,24 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
-from pool_here import PoolHere
-from ray_nodes import RayCluster, in_session, title, wait_until
-from training_runs import assert_same, assert_same_run, checkpoint, flags, options_of, run
+from support.training.pool_here import PoolHere
+from support.training.ray_nodes import RayCluster, in_session, title, wait_until
+from support.training.training_runs import (
+    assert_same,
+    assert_same_run,
+    checkpoint,
+    flags,
+    options_of,
+    run,
+)
 
 from rl_workbench.training.algorithms import recorded_kind
 from rl_workbench.training.options.training_options import choose
 
 pytestmark = [pytest.mark.extras("ray", "stable_baselines3"), pytest.mark.slow]
-SUPPORT = Path(__file__).parents[4] / "support"
+TESTS = Path(__file__).resolve().parents[4]
 PATIENCE = 120.0  # [s], on a busy machine
+GATED = "support.training.gated:Gated-v0"
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +49,7 @@ class Driver:
     """
 
     def __init__(self, arguments: Sequence[str], log: Path) -> None:
-        path = os.pathsep.join([str(SUPPORT), *filter(None, [os.environ.get("PYTHONPATH")])])
+        path = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
         self.log = log
         with log.open("ab") as output:
             self.process = subprocess.Popen(
@@ -98,7 +106,7 @@ def is_gone(pid: int) -> bool:
 def test_episodes_come_to_the_same_bits_whoever_is_lost(
     cluster: RayCluster, start: Callable[..., Driver], tmp_path: Path
 ) -> None:
-    options = {"env_id": "gated:Gated-v0", "env_kwargs": f"gates={tmp_path}", "num_envs": 3, "episodes": 45,
+    options = {"env_id": GATED, "env_kwargs": f"gates={tmp_path}", "num_envs": 3, "episodes": 45,
                "batch_episodes": 2, "value_epochs": 2, "eval_frequency": 0, "eval_episodes": 2}  # fmt: skip
     elsewhere, gates = tmp_path / "elsewhere", [tmp_path / "4", tmp_path / "9"]
     for gate in gates:
@@ -138,7 +146,7 @@ def test_fragments_come_to_the_same_bits_after_ctrl_c(
 ) -> None:
     gate, folder = tmp_path / "40", tmp_path / "elsewhere"
     gate.touch()
-    options = {"env_id": "gated:Gated-v0", "env_kwargs": f"gates={tmp_path}", "num_envs": 2, "n_steps": 512,
+    options = {"env_id": GATED, "env_kwargs": f"gates={tmp_path}", "num_envs": 2, "n_steps": 512,
                "total_timesteps": 5120, "net_arch": "8", "batch_size": 512, "n_epochs": 2,
                "eval_frequency": 0, "eval_episodes": 2, "checkpoint_frequency": 1}  # fmt: skip
     given = ["--algo", "ppo", f"--run-dir={folder}", f"--ray={cluster.address}", *flags(options)]
