@@ -12,8 +12,8 @@ from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.meshes.mesh_files import Resources
 from bullet_gazebo.state.names import did_you_mean
-from file_reading.errors import FileError
-from file_reading.xml_parser import parse
+from files.content import FileError
+from files.xml_text import parse
 from package_writing.errors import CannotWrite
 
 PLUGIN = "libgazebo_ros_control.so"

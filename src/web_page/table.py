@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
-from file_reading.content import NotAFile, open_file
+from files.content import NotAFile, open_file
 
 NAME = "scalars.csv"  # in a run folder
 HEADER = b"step,tag,value,wall_time\n"

@@ -6,8 +6,8 @@ from contextlib import contextmanager
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
-from file_reading.errors import FileError, TooLarge
-from file_reading.xml_parser import parse
+from files.content import FileError, TooLarge
+from files.xml_text import parse
 
 SHOWN = 80  # characters of a faulty value that a message repeats
 

@@ -31,8 +31,8 @@ from bullet_gazebo.physics.files.world_file import parse_world
 from bullet_gazebo.physics.meshes.mesh_files import Resources
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
-from file_reading.errors import FileError
-from file_reading.yaml_text import load_parameters
+from files.content import FileError
+from files.yaml_text import load_parameters
 from ros_calls.expansion import CannotExpand, expand
 
 DATA = Path(__file__).resolve().parents[2] / "data"

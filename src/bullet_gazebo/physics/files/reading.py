@@ -9,9 +9,8 @@ from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, M
 from bullet_gazebo.physics.elements import files_named_by_a_model, parse_xml, place
 from bullet_gazebo.physics.meshes.reader import read_mesh
 from bullet_gazebo.physics.meshes.submesh import Submesh
-from file_reading.content import MAX_BYTES, read_file
-from file_reading.errors import FileError, TooLarge
-from file_reading.xml_parser import MAX_ELEMENTS
+from files.content import MAX_BYTES, FileError, TooLarge, read_file
+from files.xml_text import MAX_ELEMENTS
 
 # All of it together: the text itself and what it includes, each time that it includes it.
 MAX_FILES = 1000  # different ones

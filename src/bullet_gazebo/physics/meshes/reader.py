@@ -12,8 +12,7 @@ from bullet_gazebo.physics.meshes.collada import read_collada
 from bullet_gazebo.physics.meshes.obj import read_obj
 from bullet_gazebo.physics.meshes.stl import read_stl
 from bullet_gazebo.physics.meshes.submesh import Submesh, centred
-from file_reading.content import read_file
-from file_reading.errors import FileError
+from files.content import FileError, read_file
 
 READERS: dict[str, Callable[[bytes, str], list[Part]]] = {
     ".stl": read_stl,

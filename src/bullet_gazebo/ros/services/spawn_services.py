@@ -24,7 +24,7 @@ from bullet_gazebo.ros.plugins import PluginRegistry
 from bullet_gazebo.ros.services.resource_paths import resources
 from bullet_gazebo.ros.wire.conversions import from_pose_msg
 from bullet_gazebo.simulator import Simulator
-from file_reading.content import MAX_BYTES
+from files.content import MAX_BYTES
 
 ROOT_TAG = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
 PACKAGE = re.compile(r"package://([^/\"'<>\s]+)")

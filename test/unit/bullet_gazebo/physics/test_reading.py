@@ -15,8 +15,8 @@ from bullet_gazebo.physics.files.world_file import load_world, parse_world
 from bullet_gazebo.physics.mechanics.tree import MAX_LINKS
 from bullet_gazebo.physics.meshes.mesh_files import Resources
 from bullet_gazebo.physics.meshes.reader import read_mesh
-from file_reading import yaml_text
-from file_reading.xml_parser import MAX_DEPTH
+from files import yaml_text
+from files.xml_text import MAX_DEPTH
 
 WIDTH, LEVELS = 10, 7  # a bomb: ten includes of ten includes of ...
 MODEL = '<sdf version="1.6"><model name="{}">{}</model></sdf>'

@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from file_reading import content, xml_parser
-from file_reading.content import read_file
-from file_reading.errors import FileError, TooLarge
-from file_reading.xml_parser import parse
+from files import content, xml_text
+from files.content import FileError, TooLarge, read_file
+from files.xml_text import parse
 
 TEXT = '<a name="Gelände">\r\n<b/>\r\n</a>'
 BEFORE = ["", " ", "\n\n", "\t\r\n", "<!-- by hand -->\n", "\n<!-- one --><!-- two -->\n "]
@@ -110,7 +109,7 @@ def test_traps_are_refused(text, fault):
 
 
 def test_a_text_beyond_the_limit_is_not_looked_at(monkeypatch):
-    monkeypatch.setattr(xml_parser, "MAX_BYTES", 10)
+    monkeypatch.setattr(xml_text, "MAX_BYTES", 10)
     check_none = "it has more than 10 bytes (MAX_BYTES)"
     for text in ("<" * 11, b"<" * 11):
         with pytest.raises(TooLarge) as raised:

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from file_reading.content import NotAFile, open_file, open_text, read_file
-from file_reading.errors import FileError
+from files.content import FileError, NotAFile, open_file, open_text, read_file
 
 KINDS = ["pipe", "socket", "device", "folder"]
 

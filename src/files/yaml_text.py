@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from file_reading.errors import FileError, TooLarge
+from files.content import FileError, TooLarge
 
 MAX_BYTES = 2**20  # the parser takes seconds for so much; a robot's controllers have some kilobytes
 MAX_VALUES = 100_000  # in lists and mappings, each time that an anchor is referred to
