@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from pictures import pixel
-from robots import cartpole_urdf
+from support.pages.pictures import pixel
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.physics.engines.registry import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf

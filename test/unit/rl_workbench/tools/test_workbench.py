@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import workbench_runs
 from PIL import Image
+from support.training import workbench_runs
 
 import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli

@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 LONGEST = 300.0  # [s] for one file; a mesh of these tests takes milliseconds
 STEPS = 10
 SDF = """<sdf version="1.6"><model name="m"><static>{static}</static><link name="l"><collision name="c">

@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from robots import GRAVITY, CartPole, cartpole_urdf
 from scipy.integrate import solve_ivp
+from support.robots.cartpole import GRAVITY, CartPole, cartpole_urdf
 
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from dataclasses import asdict
 
 import pytest
-from stress import table
-from stress.scenario import Row, Scenario
+from support.stress import table
+from support.stress.scenario import Row, Scenario
 
 LITTLE = 0.0005  # of the full number of cases
 

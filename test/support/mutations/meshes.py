@@ -10,7 +10,7 @@ from collections.abc import Callable
 from xml.etree import ElementTree
 
 from hypothesis import strategies as st
-from mesh_files import ascii_stl, binary_stl, dae, library, obj, polylist
+from support.mutations.mesh_files import ascii_stl, binary_stl, dae, library, obj, polylist
 
 INDICES = (
     "0",

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import yaml
 from hypothesis import strategies as st
-from mutations_xml import MOST_CHANGES, mutated_xml
-from robots import cartpole_urdf
+from support.mutations.xml_trees import MOST_CHANGES, mutated_xml
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.errors import ControlError
@@ -35,7 +35,7 @@ from files.content import FileError
 from files.yaml_text import load_parameters
 from ros_calls.expansion import CannotExpand, expand
 
-DATA = Path(__file__).resolve().parent.parent / "data"
+DATA = Path(__file__).resolve().parents[2] / "data"
 LONGEST = 5000  # characters of a refusal
 
 BASES = DATA / "mutations"

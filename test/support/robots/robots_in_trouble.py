@@ -14,7 +14,7 @@ from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 
-ROBOTS = Path(__file__).resolve().parents[1] / "data" / "robots"
+ROBOTS = Path(__file__).resolve().parents[2] / "data" / "robots"
 
 
 def urdf_of(name):

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 import torch
-from learning_fakes import POLE
+from support.training.learning_fakes import POLE
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from rl_workbench.training.algorithms import algorithm, recorded_kind

@@ -18,7 +18,7 @@ from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state.query import LinkQuery, StateAnswer, StateQuery, StateReader
 
-FILES = Path(__file__).resolve().parents[1] / "data" / "robots"
+FILES = Path(__file__).resolve().parents[2] / "data" / "robots"
 ARM = FILES / "two_link_arm.urdf"
 ARM_PARAMETERS = FILES / "two_link_arm.yaml"
 CONTROLLERS = ("shoulder_effort_controller", "elbow_effort_controller")

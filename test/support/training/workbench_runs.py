@@ -3,8 +3,8 @@
 import json
 from pathlib import Path
 
-import training_runs
-from training_runs import train
+from support.training import training_runs
+from support.training.training_runs import train
 
 from rl_workbench.tools.benchmark.suites import make_variant, training_flags
 from rl_workbench.tools.jobs.job import Job

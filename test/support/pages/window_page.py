@@ -7,7 +7,6 @@ import unittest
 
 import numpy as np
 import rospy
-from browser import BOUND, Browser, find_browser, wait_for
 from gazebo_msgs.srv import (
     DeleteModel,
     GetPhysicsProperties,
@@ -18,6 +17,7 @@ from gazebo_msgs.srv import (
 )
 from PIL import Image
 from std_srvs.srv import Empty
+from support.pages.browser import BOUND, Browser, find_browser, wait_for
 
 NOTICES = 160  # [pixels] from above that notices may take, and give back
 INERTIAL = """<inertial><mass value="1"/>

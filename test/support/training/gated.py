@@ -1,6 +1,6 @@
 """A pole whose episodes stop at gates until a test opens them, so that something happens in their midst.
 
-gated:Gated-v0, for processes that have this folder on PYTHONPATH
+support.training.gated:Gated-v0, for processes that have test/ on PYTHONPATH
 """
 
 import os
@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import gymnasium
-from learning_fakes import Pole
+from support.training.learning_fakes import Pole
 
 PATIENCE = 600.0  # [s] that a gate may be closed for
 

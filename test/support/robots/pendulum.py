@@ -10,7 +10,7 @@ import numpy as np
 from robot_envs import Commands, InitialState, Robot, RobotEnv, Task, WorldState
 from robot_envs.variation import LinkScale, Variation
 
-FILES = Path(__file__).resolve().parents[1] / "data" / "robots"
+FILES = Path(__file__).resolve().parents[2] / "data" / "robots"
 STRONGEST = 0.5  # [N m]
 MOTOR = "hinge_effort_controller"
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A picture of a web page, by a headless Chromium (apt-get install chromium): those of README and docs.
 
-./ws python3 test/support/screenshot.py http://127.0.0.1:8080/ page.png --click World --size 1200x700
+./ws python3 test/support/pages/screenshot.py http://127.0.0.1:8080/ page.png --click World --size 1200x700
 """
 
 import argparse
@@ -9,8 +9,8 @@ import io
 import time
 from pathlib import Path
 
-from browser import Browser, wait_for
 from PIL import Image
+from support.pages.browser import Browser, wait_for
 
 NOTICE = ".mantine-Notification-closeButton"  # as that WebGL is drawn in software here
 COLOURS = 256
