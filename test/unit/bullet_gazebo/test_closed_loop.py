@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from robots import CartPole, cartpole_urdf
 from scipy.integrate import solve_ivp
+from support.robots.cartpole import CartPole, cartpole_urdf
 
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager

@@ -5,9 +5,9 @@ import math
 import re
 
 import pytest
-from robots import cartpole_urdf
-from robots_in_trouble import Rig, beyond_stops, urdf_of
-from trajectory_rig import Listener
+from support.robots.cartpole import cartpole_urdf
+from support.robots.robots_in_trouble import Rig, beyond_stops, urdf_of
+from support.robots.trajectory_rig import Listener
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.manager import STRICT

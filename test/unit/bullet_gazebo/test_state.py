@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from arm_and_box import BOX, MASS, ArmAndBox, commands
+from support.robots.arm_and_box import BOX, MASS, ArmAndBox, commands
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, conjugate, from_rpy, rotate, subtract

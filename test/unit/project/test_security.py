@@ -23,8 +23,6 @@ DANGEROUS = {
 }  # fmt: skip
 # The launcher runs the script that its user names, as `python3 script.py` does.
 RUNS_A_SCRIPT = {("src/lockstep_runner/script/running.py", name) for name in ("compile", "exec")}
-# What a worker is sent by its own driver, through Ray, all of whose calls are pickles.
-RUNS_A_SCRIPT |= {("src/rl_workbench/training/rollouts/worker.py", "pickle.loads")}
 MODEL = '<sdf version="1.6"><model name="m">{}</model></sdf>'
 INCLUDE = "<include><uri>{}</uri></include>"
 MESH = """<link name="l"><collision name="c"><geometry><mesh><uri>{}</uri></mesh></geometry></collision>

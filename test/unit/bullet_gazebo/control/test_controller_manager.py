@@ -3,7 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from robots import cartpole_urdf
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.errors import ControlError

@@ -6,7 +6,7 @@ See docs/contract/ros_control.md 3.5.
 import math
 
 import pytest
-from trajectory_rig import GAINS, KINDS, MS, Rig, S, move
+from support.robots.trajectory_rig import GAINS, KINDS, MS, Rig, S, move
 
 from bullet_gazebo.control.controllers import BUILT_IN
 from bullet_gazebo.control.errors import ControlError

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from trajectory_rig import Rig, S, move
+from support.robots.trajectory_rig import Rig, S, move
 
 from bullet_gazebo.control.trajectory_goals import (
     GOAL_TOLERANCE_VIOLATED,

@@ -6,9 +6,9 @@ import subprocess
 import sys
 from functools import partial
 
-import engine_runs as runs
 import numpy as np
 import pytest
+from support.robots import engine_runs as runs
 
 from bullet_gazebo.physics.engines import BULLET, EngineError, make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf

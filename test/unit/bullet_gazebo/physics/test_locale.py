@@ -5,12 +5,12 @@ import subprocess
 import sys
 
 import pytest
-from comma_locale import NAME, write_comma_locale
+from support.comma_locale import NAME, write_comma_locale
 
 PROGRAM = """
 import locale, sys
-from mesh_files import obj
-from robots import cartpole_urdf
+from support.mutations.mesh_files import obj
+from support.robots.cartpole import cartpole_urdf
 locale.setlocale(locale.LC_NUMERIC, sys.argv[1])
 print(locale.localeconv()["decimal_point"], file=sys.stderr)
 from bullet_gazebo.physics.engines import make_engine

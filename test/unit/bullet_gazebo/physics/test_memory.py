@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from memory import stays
-from robots import cartpole_urdf
+from support.memory import stays
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.engines import bullet_engine as bullet

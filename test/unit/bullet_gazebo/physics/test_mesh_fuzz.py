@@ -2,8 +2,8 @@
 
 import pytest
 from hypothesis import HealthCheck, given, settings
-from mesh_worker import MeshWorker
-from mutations_mesh import mesh_files
+from support.mutations.mesh_worker import MeshWorker
+from support.mutations.meshes import mesh_files
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.meshes import read_mesh

@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 import pytest
-from mesh_files import CORNERS, ascii_stl, binary_stl, dae, library, obj, polylist
-from mesh_worker import MeshWorker
+from support.mutations.mesh_files import CORNERS, ascii_stl, binary_stl, dae, library, obj, polylist
+from support.mutations.mesh_worker import MeshWorker
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files import mesh_formats as arrays

@@ -6,7 +6,16 @@ import sys
 from pathlib import Path
 
 import pytest
-from mesh_files import CORNERS, FACES, ascii_stl, binary_stl, dae, library, obj, polylist
+from support.mutations.mesh_files import (
+    CORNERS,
+    FACES,
+    ascii_stl,
+    binary_stl,
+    dae,
+    library,
+    obj,
+    polylist,
+)
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.engines.bullet_engine import BulletEngine

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from robots import cartpole_urdf
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Shape
 from bullet_gazebo.physics.engines import make_engine

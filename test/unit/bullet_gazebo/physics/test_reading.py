@@ -3,7 +3,7 @@
 import os
 
 import pytest
-from mesh_files import obj
+from support.mutations.mesh_files import obj
 
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
 from bullet_gazebo.physics.files import reading as limits

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mesh_files import CORNERS, FACES, dae, obj
+from support.mutations.mesh_files import CORNERS, FACES, dae, obj
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.mesh_formats import Submesh

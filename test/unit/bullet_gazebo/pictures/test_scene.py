@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from pictures import pixel
-from robots import cartpole_urdf
+from support.pages.pictures import pixel
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.engines import make_engine

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from box_and_wheel import UP, WHEEL
-from robots import CartPole
+from support.robots.bodies import UP, WHEEL
+from support.robots.cartpole import CartPole
 
 from bullet_gazebo.physics.dynamics import effective_inertias
 from bullet_gazebo.physics.files.urdf import parse_urdf
