@@ -16,7 +16,7 @@ class Output:
     hear it; records for nobody needn't be made.
 
     `topic` is relative to the controller's namespace, or to the manager's if `shared`. `kind` names a
-    record of control/samples.py, or is a ROS message type whose messages are then published as they are.
+    record of the module of its controller, or is a ROS message type whose messages are then published as they are.
     """
 
     __slots__ = ("kind", "listeners", "shared", "sink", "topic")

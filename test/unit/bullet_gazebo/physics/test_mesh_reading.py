@@ -182,7 +182,9 @@ def test_nodes_that_show_each_other_ten_times_over_do_not_fill_the_memory(tmp_pa
 def test_a_file_has_bounds(tmp_path, monkeypatch, name):
     path = written(tmp_path, name, WELL[name])
     monkeypatch.setattr(arrays, "MOST_TRIANGLES", 11)
-    with pytest.raises(DescriptionError, match=f"{name}': it(s nodes show| has) more than 11 triangles"):
+    with pytest.raises(
+        DescriptionError, match=f"{name}': it(s nodes show| has) more than 11 triangles"
+    ):
         read_mesh(path)
     monkeypatch.setattr(reader, "MOST_BYTES", 100)
     with pytest.raises(DescriptionError, match=f"{name}': it has more than 100 bytes"):
