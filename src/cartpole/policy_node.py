@@ -12,13 +12,12 @@ import gymnasium
 from gymnasium import spaces
 
 from cartpole.ros_options import ros_options
-from rl_workbench.errors import WorkbenchError
+from rl_workbench.errors import WorkbenchError, error_line
 from rl_workbench.starting import Interrupt, reader_may_go
 from rl_workbench.tools.commands.shared import env_options, number
 from rl_workbench.tools.runs.exported import described, open_exported
 from rl_workbench.tools.runs.policies import WHICH, load_learned
 from rl_workbench.tools.runs.runs import open_run
-from rl_workbench.training.checked import told
 from rl_workbench.training.environments import as_float32, make_environment
 from robot_envs.backends.choice import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
 from robot_envs.environment import RobotEnv
@@ -91,7 +90,9 @@ def _told_in_one_line() -> Iterator[None]:
     except RobotEnvError:
         raise
     except Exception as error:
-        raise RobotEnvError(f"the robot is stopped, the task failed: {told(error)}") from error
+        raise RobotEnvError(
+            f"the robot is stopped, the task failed: {error_line(error)}"
+        ) from error
 
 
 def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:

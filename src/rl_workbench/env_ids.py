@@ -10,8 +10,7 @@ from typing import Any
 import gymnasium
 from gymnasium.envs.registration import EnvSpec
 
-from rl_workbench.errors import WorkbenchError, finding_modules
-from rl_workbench.training.checked import EnvironmentFailure, told
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, finding_modules
 
 
 def without_module(env_id: str) -> str:
@@ -49,7 +48,7 @@ def import_module_of(env_id: str) -> None:
         if missing and f"{module}.".startswith(f"{missing}."):  # not one that it imports itself
             text = f"can't make {env_id}: there is no module '{missing}'{_nearest(missing)}"
             raise WorkbenchError(f"{text}; {finding_modules()}") from error
-        raise EnvironmentFailure(f"can't make {env_id}: {told(error)}") from error
+        raise EnvironmentFailure(f"can't make {env_id}: {error_line(error)}") from error
 
 
 def _nearest(missing: str) -> str:

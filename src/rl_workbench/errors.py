@@ -1,29 +1,61 @@
-"""Errors whose text is meant for the user: shown as one line, never as a traceback."""
+"""Errors whose text is meant for the user, and the commands that such a text recommends.
+
+An error is shown as one line, never as a traceback. A command in it can be pasted as it is. It depends on
+what started this process: `ws`, which sets CARTPOLE_WS, a plain Python, or a catkin workspace.
+"""
 
 import importlib.util
 import os
 import shlex
 import shutil
 import sys
+import sysconfig
+import traceback
 from pathlib import Path
+
+# Code below these folders isn't the user's.
+_LIBRARIES = (
+    *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
+    str(Path(__file__).parents[1]),  # all of this project, ...
+    str(Path(__file__).resolve().parents[1]),  # ... also where a catkin workspace links to it
+    "<frozen",
+)
 
 
 class WorkbenchError(RuntimeError):
-    """Something the user can mend; the text says what is wrong and what to do."""
+    """Something that the user can mend. The text says what is wrong and what to do."""
+
+
+class EnvironmentFailure(WorkbenchError):
+    """An environment's own code has failed. The text names the place, the cause has the traceback."""
+
+
+def error_line(error: BaseException) -> str:
+    """Returns an error as one line, with the place in the user's own code if it went through that."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
+    place = (own or frames)[-1]
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}{': ' if text else ''}{text} ({place.filename}:{place.lineno})"
 
 
 def need(module: str, package: str, what: str) -> None:
-    """Makes sure that an extra package is installed.
+    """Makes sure that an optional package is installed.
+
+    Args:
+        module: What would be imported.
+        package: Its name for the user.
+        what: What needs it.
 
     Raises:
-        WorkbenchError: if it isn't.
+        WorkbenchError: If it isn't installed.
     """
     if not importlib.util.find_spec(module):
         raise WorkbenchError(f"{what} needs {package}, an extra: {installing(package)} installs it")
 
 
 def installing(package: str) -> str:
-    """The command that installs an extra package."""
+    """Returns the command that installs an optional package."""
     workspace = os.environ.get("CARTPOLE_WS")
     command = (
         [workspace, "extras"] if workspace else [sys.executable, "-m", "pip", "install", package]
@@ -32,7 +64,7 @@ def installing(package: str) -> str:
 
 
 def finding_modules() -> str:
-    """How a module of the reader's own is found."""
+    """Returns how Python finds a module of the user's own."""
     workspace = os.environ.get("CARTPOLE_WS")
     if workspace:
         return f"{shlex.quote(workspace)} --with FOLDER ... finds those in FOLDER"
@@ -40,7 +72,7 @@ def finding_modules() -> str:
 
 
 def watching(folder: Path) -> str:
-    """The command that shows a run in TensorBoard."""
+    """Returns the command that shows a run in TensorBoard."""
     workspace = os.environ.get("CARTPOLE_WS")
     beside = Path(sys.executable).with_name("tensorboard")
     if workspace:
@@ -53,19 +85,16 @@ def watching(folder: Path) -> str:
 
 
 def replaying(folder: Path) -> str:
-    """The command that shows a run's episodes and curves on a page."""
+    """Returns the command that shows a run's episodes and curves on a page."""
     workspace = os.environ.get("CARTPOLE_WS")
     beside = Path(sys.executable).with_name("rl-workbench")
     if workspace:
-        command = [workspace, *_with_folders(), "rosrun", "cartpole", "workbench.py"]
+        folders = filter(None, os.environ.get("CARTPOLE_WITH", "").split(":"))
+        # Each where it really is: ws may name a link.
+        found = [word for each in folders for word in ("--with", os.path.realpath(each))]
+        command = [workspace, *found, "rosrun", "cartpole", "workbench.py"]
     elif shutil.which(beside.name) == str(beside):
         command = [beside.name]
     else:
         command = [sys.executable, "-m", "rl_workbench"]
     return shlex.join([*command, "view", str(folder)])
-
-
-def _with_folders() -> list[str]:
-    """The flags by which `ws` finds the reader's folders, each where it really is: ws may name a link."""
-    folders = filter(None, os.environ.get("CARTPOLE_WITH", "").split(":"))
-    return [word for folder in folders for word in ("--with", os.path.realpath(folder))]

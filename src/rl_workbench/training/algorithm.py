@@ -1,27 +1,24 @@
-"""What the frame of a training asks of an algorithm, and what it offers to it.
+"""What the frame of a training (training.py) asks of an algorithm, and what it offers to it.
 
-The frame (`training.py`) opens and resumes, evaluates, saves, logs and tells. An algorithm says
-what it is made of, what one step of its loop does, and what a checkpoint holds.
+The frame opens and resumes, evaluates, saves and reports. An algorithm says what it is made of, what its
+loop does, and what a checkpoint holds.
 """
 
-import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol
 
 import gymnasium
 import numpy as np
 from torch import nn
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.checked import CheckedEnvironment
-from rl_workbench.training.environments import close_all, make_environment, make_several
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.scalar_log import ScalarLog
 
-Say = Callable[[str], None]
+Say = Callable[[str], None]  # reports a line to the user
 
 
 class Frame(Protocol):
@@ -29,20 +26,20 @@ class Frame(Protocol):
 
     @property
     def log(self) -> ScalarLog:
-        """For figures of the algorithm's own."""
+        """For the algorithm's own figures."""
         ...
 
     @property
     def folder(self) -> Path:
-        """The run's, for files of the algorithm's own."""
+        """The run folder, for the algorithm's own files."""
         ...
 
     def is_over(self) -> bool:
-        """Whether to stop: it is complete, or the user interrupts."""
+        """Returns whether to stop: the training is complete, or the user interrupts."""
         ...
 
     def is_interrupted(self) -> bool:
-        """Whether the user interrupts."""
+        """Returns whether the user interrupts."""
         ...
 
     def episode_done(
@@ -54,29 +51,27 @@ class Frame(Protocol):
         success: bool | None = None,
         step: int | None = None,
     ) -> None:
-        """Takes an episode down.
+        """Records an episode.
 
         Args:
-            total_reward: the undiscounted return.
-            length: [steps].
-            scalars: of the algorithm's own, logged at the step of the episode's end.
-            note: for the line of every 20th episode; else the speed stands there.
-            success: whether it reached its goal; None if the environment doesn't say.
-            step: of its end; None: now.
+            total_reward: The undiscounted return.
+            length: Its steps.
+            scalars: The algorithm's own figures, logged at the step of the episode's end.
+            note: Shown in the line of every 20th episode, instead of the speed.
+            success: Whether it reached its goal; None if the environment doesn't say.
+            step: The step of its end; None means now.
         """
         ...
 
     def step_done(self) -> None:
-        """Evaluates and saves what is due. The training can go on from here as if from a checkpoint."""
+        """Evaluates and saves what is due. The training must be able to continue from here."""
         ...
 
 
 class Algorithm(ABC):
-    """One algorithm at work in one environment."""
+    """One algorithm at work in its environments."""
 
-    env: gymnasium.Env[
-        Any, Any
-    ]  # the one that is learned in, and evaluated where there is no other
+    env: gymnasium.Env[Any, Any]  # learned in, and evaluated in where there is no other
 
     @property
     @abstractmethod
@@ -85,138 +80,93 @@ class Algorithm(ABC):
 
     @property
     def stride(self) -> int:
-        """Steps since the last `step_done` but one."""
+        """Steps between the last two calls of `step_done`."""
         return 1
 
     @abstractmethod
     def start_environment(self, state: Any, say: Say) -> None:
-        """Seeds the environment; then brings it to where `environment_state` found it.
+        """Seeds the environment, then brings it to where `environment_state` found it.
 
         Args:
-            state: what that gave; None at the start of a new training.
-            say: is told if it can't be brought there.
+            state: What that returned; None in a new training.
+            say: Is called if the environment can't be brought there.
         """
 
     @abstractmethod
     def learn(self, frame: Frame) -> None:
-        """Learns until it is over; calls `frame.step_done()` wherever it can be saved.
+        """Learns until it is over. It calls `frame.step_done()` wherever it can be saved.
 
         Raises:
-            WorkbenchError: if the environment or the arithmetic fails.
+            WorkbenchError: If the environment or the arithmetic fails.
         """
 
     @abstractmethod
     def act_greedily(self, observation: np.ndarray) -> Any:
-        """The best action for an observation (D,)."""
+        """Returns the best action for an observation (D,)."""
 
     def check_weights(self) -> None:
-        """Refuses to go on with weights that are no numbers, where learning doesn't check them.
+        """Refuses NaN in the weights, where learning doesn't check for it.
 
         Raises:
-            WorkbenchError: if one isn't.
+            WorkbenchError: If a weight isn't finite.
         """
         return
 
     @abstractmethod
     def state_dict(self) -> dict[str, Any]:
-        """All that it learned, as plain values and tensors, by keys of its own."""
+        """Returns all that it learned, as plain values and tensors."""
 
     @abstractmethod
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Takes over what `state_dict` gave, from a checkpoint that may have more.
+        """Loads what `state_dict` returned, from a checkpoint that may hold more.
 
         Raises:
-            WorkbenchError: if the state is another's.
+            WorkbenchError: If the state doesn't fit.
         """
 
     @abstractmethod
     def environment_state(self) -> Any:
-        """Where the environment is, as far as it can be brought back: plain values and tensors."""
+        """Returns where the environment is, as plain values and tensors."""
 
     def leave_environment(self) -> Any:
-        """What `restore_environment` needs after an evaluation that moves this environment's robot."""
+        """Returns what `restore_environment` needs after an evaluation in this environment."""
         return self.environment_state()
 
     def restore_environment(self, state: Any, say: Say) -> None:
-        """Brings the environment back after an evaluation that moved its robot.
+        """Brings the environment back after an evaluation in it.
 
         Args:
-            state: what `leave_environment` gave before.
-            say: is told if it can't be brought back.
+            state: What `leave_environment` returned.
+            say: Is called if the environment can't be brought back.
         """
         raise NotImplementedError
 
     def settle(self) -> bool:
-        """After a failure: gives up what was under way.
+        """Discards what was under way when something failed.
 
         Returns:
-            Whether the training stands where it can be saved and gone on with.
+            Whether the training can be saved now and continued.
         """
         return False
 
     def export(self, folder: Path) -> None:
-        """Writes the networks in further forms, if it has any.
+        """Writes the networks in further formats, if it has any.
 
         Raises:
-            OSError: if the disk refuses.
+            OSError: If a file can't be written.
         """
         return
 
     def close(self) -> None:
-        """Closes the environment."""
+        """Closes the environments."""
         self.env.close()
 
 
-def environment_for(options: TrainingOptions, given: Mapping[str, Any]) -> CheckedEnvironment:
-    """An environment as a training's algorithm observes it.
-
-    Args:
-        options: of the training.
-        given: the environment's own options.
-
-    Raises:
-        WorkbenchError: as `make_environment`.
-    """
-    return make_environment(options.run.env_id, given, keep_dict=options.kind.keeps_dict)
-
-
-def training_environments(options: TrainingOptions) -> list[gymnasium.Env[Any, Any]]:
-    """The environments that a training learns in, `num_envs` of them, each with a robot of its own.
-
-    Raises:
-        WorkbenchError: as `make_several`.
-    """
-    run = options.run
-    return make_several(
-        lambda given: environment_for(options, given),
-        run.training_environment, run.env_id, run.num_envs,
-    )  # fmt: skip
-
-
-Made = TypeVar("Made", bound=Algorithm)
-
-
-def in_its_environments(
-    options: TrainingOptions, make: Callable[[list[gymnasium.Env[Any, Any]]], Made]
-) -> Made:
-    """An algorithm in new environments, which are closed if they don't suit.
-
-    Raises:
-        WorkbenchError: if the environments can't be made, or don't suit.
-    """
-    envs = training_environments(options)
-    with contextlib.ExitStack() as making:
-        making.callback(close_all, envs)
-        made = make(envs)
-        making.pop_all()
-    return made
-
-
 def make_algorithm(options: TrainingOptions) -> Algorithm:
-    """A new training's algorithm, with its environment.
+    """Makes a new training's algorithm with its environments.
 
     Raises:
-        WorkbenchError: if the environment can't be made, or doesn't suit.
+        WorkbenchError: If an environment can't be made, or doesn't suit.
     """
     made: Algorithm = import_module(options.kind.implementation).make(options)
     return made
@@ -234,16 +184,16 @@ class Policy(NamedTuple):
 def load_policy(
     options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any], origin: str
 ) -> Policy:
-    """The policy of a checkpoint that was read already.
+    """Makes the policy of a checkpoint.
 
     Args:
-        options: of the training that it is of.
-        content: of the checkpoint.
-        env: of the kind that it learned in.
-        origin: its file, for the error.
+        options: Of its training.
+        content: Of the checkpoint.
+        env: An environment like the one that it learned in.
+        origin: The checkpoint's file, for errors.
 
     Raises:
-        WorkbenchError: if the checkpoint doesn't fit options or environment.
+        WorkbenchError: If the checkpoint doesn't fit the options or the environment.
     """
     try:
         made: Policy = import_module(options.kind.implementation).load_policy(options, content, env)

@@ -1,33 +1,18 @@
 """What an environment gives, checked before it spoils what is learned from it."""
 
-import sysconfig
-import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from rl_workbench.errors import WorkbenchError
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
 
 LARGEST = float(np.finfo(np.float32).max)  # networks and replay know no larger number
 COMPUTE_REWARD = "compute_reward"  # method of an environment with a goal
 BEGIN_STEP = "begin_step"  # and of one whose step takes time elsewhere, as in a simulator
-# Where code isn't the user's.
-_LIBRARIES = (
-    *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
-    str(Path(__file__).parents[3]),  # all of this project, ...
-    str(Path(__file__).resolve().parents[3]),  # ... also where a catkin workspace links to it
-    str(Path(gymnasium.__file__).parent),
-    "<frozen",
-)
-
-
-class EnvironmentFailure(WorkbenchError):
-    """An environment's own code has failed; the text names the place, the cause has the traceback."""
 
 
 class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -130,7 +115,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         except gymnasium.error.Error:  # who draws says what for
             raise
         except (Exception, SystemExit) as error:
-            text = f"{self._id} failed in render(): {told(error)}"
+            text = f"{self._id} failed in render(): {error_line(error)}"
             raise EnvironmentFailure(text) from error
 
     def close(self) -> None:
@@ -150,7 +135,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         except gymnasium.error.Error as error:  # its text is made for the user
             raise WorkbenchError(str(error) or type(error).__name__) from error
         except (Exception, SystemExit) as error:
-            text = f"{self._id} failed in {method}(): {told(error)}"
+            text = f"{self._id} failed in {method}(): {error_line(error)}"
             raise EnvironmentFailure(text) from error
 
     def _check(self, observation: Any) -> None:
@@ -200,12 +185,3 @@ def _beginning(env: gymnasium.Env[Any, Any]) -> Callable[[Any], object]:
         layer = layer.env
     begin: Callable[[Any], object] = getattr(layer, BEGIN_STEP, lambda action: None)
     return begin
-
-
-def told(error: BaseException) -> str:
-    """An error in one line, with the place in the user's own code, if it went through that."""
-    frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
-    place = (own or frames)[-1]
-    text = " ".join(str(error).split())
-    return f"{type(error).__name__}{': ' if text else ''}{text} ({place.filename}:{place.lineno})"

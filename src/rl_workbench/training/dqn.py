@@ -8,9 +8,14 @@ import numpy as np
 from rl_workbench.agents.dqn_agent import DQNAgent, Learned
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import number, sequence
-from rl_workbench.training.algorithm import Algorithm, Frame, Policy, Say, in_its_environments
+from rl_workbench.training.algorithm import Algorithm, Frame, Policy, Say
 from rl_workbench.training.checkpoints import fitting
-from rl_workbench.training.environments import as_vector, discrete_actions, succeeded
+from rl_workbench.training.environments import (
+    as_vector,
+    discrete_actions,
+    in_its_environments,
+    succeeded,
+)
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.repeatable import RepeatableEnvironment
 

@@ -9,8 +9,8 @@ import gymnasium
 import numpy as np
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.algorithm import Algorithm, Say, environment_for
-from rl_workbench.training.environments import as_float32, shares_robot, succeeded
+from rl_workbench.training.algorithm import Algorithm, Say
+from rl_workbench.training.environments import as_float32, environment_for, shares_robot, succeeded
 from rl_workbench.training.generators import random_states, restore_random_states
 from rl_workbench.training.options import TrainingOptions
 

@@ -13,9 +13,9 @@ from rl_workbench.agents.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
 from rl_workbench.storage import save_tensors
-from rl_workbench.training.algorithm import Algorithm, Frame, Policy, Say, in_its_environments
+from rl_workbench.training.algorithm import Algorithm, Frame, Policy, Say
 from rl_workbench.training.checkpoints import fitting
-from rl_workbench.training.environments import discrete_actions, is_continuous
+from rl_workbench.training.environments import discrete_actions, in_its_environments, is_continuous
 from rl_workbench.training.episodes import Agent, EpisodeSource, LocalEpisodes
 from rl_workbench.training.options import TrainingOptions
 

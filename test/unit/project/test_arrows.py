@@ -15,7 +15,7 @@ ROOT = SRC.parent
 MODULES = sorted(SRC.rglob("*.py"))
 FOLDERS = sorted({path.parent for path in MODULES} | {SRC})
 OURS = {"bullet_gazebo", "cartpole", "rl_workbench", "robot_envs", "ros_calls", "ros_utils",
-        "files", "lockstep_runner", "package_writing", "video_writing", "web_page"}  # fmt: skip
+        "files", "lockstep_runner", "package_writing", "viewer"}  # fmt: skip
 ROS = ("rospy", "rosgraph", "rosnode", "roslib", "rosparam", "roslaunch", "rosservice")
 ROS_ROOMS = (
     "bullet_gazebo/ros",
@@ -27,16 +27,15 @@ ROS_ROOMS = (
 
 # A library, and which of ours it may import.
 ALLOWED = {
-    "bullet_gazebo": {"ros_calls", "files", "video_writing", "web_page"},
+    "bullet_gazebo": {"ros_calls", "files", "viewer"},
     "ros_calls": {"files"},
     "files": set(),
     "ros_utils": {"ros_calls", "files"},
-    "robot_envs": {"bullet_gazebo", "files", "ros_calls", "ros_utils", "web_page"},
+    "robot_envs": {"bullet_gazebo", "files", "ros_calls", "ros_utils", "viewer"},
     "lockstep_runner": {"ros_calls"},
     "package_writing": {"bullet_gazebo", "files", "robot_envs", "ros_calls"},
-    "rl_workbench": {"files", "video_writing", "web_page"},
-    "video_writing": set(),
-    "web_page": {"files"},
+    "rl_workbench": {"files", "viewer"},
+    "viewer": {"files"},
     "cartpole": {"rl_workbench", "robot_envs"},
 }
 # A folder, and what nothing in it may import beside that.
@@ -51,11 +50,9 @@ FORBIDDEN = [
     ("cartpole", ("pybullet", "torch")),
     ("rl_workbench/agents", ("gymnasium", "rl_workbench.tools", "rl_workbench.training")),
     ("rl_workbench/training", ("rl_workbench.tools",)),
-    ("rl_workbench/training/options", tuple(f"rl_workbench.training.{each}" for each in
-                                            ("run", "dqn", "pg", "sb3"))),
     *((f"rl_workbench/training/{room}", tuple(f"rl_workbench.training.{each}" for each in
-                                              ("dqn", "pg", "sb3") if each != room))
-      for room in ("run", "dqn", "pg", "sb3")),
+                                              ("dqn", "pg", "sb3") if not room.startswith(each)))
+      for room in ("training.py", "dqn.py", "pg.py", "sb3")),
 ]  # fmt: skip
 WITHOUT_ROS = (
     "bullet_gazebo.physics.world",

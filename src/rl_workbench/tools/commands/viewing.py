@@ -15,7 +15,7 @@ from rl_workbench.tools.pictures.filming import draw_without_display
 from rl_workbench.tools.runs.runs import open_run
 from rl_workbench.tools.viewing.page import Place, Wanted, show_run
 from rl_workbench.tools.viewing.recorder import POLICIES
-from web_page.flags import add_flags as add_page_flags
+from viewer.address import add_flags as add_page_flags
 
 KINDNESS = 10  # of a page beside a training: whatever it does, the training goes first
 

@@ -39,7 +39,7 @@ from rl_workbench.tools.runs.policies import (
 from rl_workbench.tools.runs.runs import Run, open_run
 from rl_workbench.tools.viewing.page import Place, Wanted
 from rl_workbench.training.progress import tell
-from web_page.address import LOOPBACK
+from viewer.address import LOOPBACK
 
 WINDOWS = (*DISPLAYS, "SDL_VIDEODRIVER")  # where any of them is given, a window may be opened
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from training_runs import ALL, EXACT
+from support.training.training_runs import ALL, EXACT
 
 from rl_workbench.agents.settings import DocumentSettings, DQNSettings, ReinforceSettings
 from rl_workbench.errors import WorkbenchError
@@ -210,6 +210,6 @@ def test_help_explains_every_option(name: str, capsys) -> None:
         choose(algorithm(name), ["--help"], prog="node.py")
     assert stop.value.code == 0
     told = capsys.readouterr().out
-    assert "a private ROS parameter" in told and algorithm(name).config in told
+    assert algorithm(name).config in told
     own = {"dqn": "--preset", "ppo": "--clip-range", "sac": "--ent-coef"}.get(name, "--save-every")
     assert all(flag in told for flag in ("--params", "--resume", "--stop-at-return", own))

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from training_runs import OTHERS, SMALL, flags, record, summary
+from support.training.training_runs import OTHERS, SMALL, flags, record, summary
 
 from rl_workbench.training import train as cli
 from rl_workbench.training.algorithms import ALGORITHMS
@@ -142,7 +142,7 @@ def test_wrong_words(capsys, arguments: list[str], words: str) -> None:
         (["--params", "gamma=5"], "gamma must be between 0 and 1, not 5.0"),
         (["--params", "gama=1"], "unknown option 'gama'; did you mean gamma?"),
         (["--config=none.yaml"], "can't read none.yaml: No such file"),
-        (["--env-id="], "env_id names an environment"),
+        (["--env-id="], "env_id must name an environment"),
     ],
 )
 def test_wrong_values(capsys, arguments: list[str], words: str) -> None:

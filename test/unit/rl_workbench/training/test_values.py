@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from training_runs import EXACT
+from support.training.training_runs import EXACT
 
 import robot_envs.robots  # noqa: F401 - registers what some sections are for
 from rl_workbench.agents.settings import DQNSettings, ReinforceSettings
@@ -101,7 +101,7 @@ def test_wrong_files_are_one_line(tmp_path: Path, kind, text: str, message: str)
     with pytest.raises(WorkbenchError, match=message) as raised:
         read(tmp_path, text, kind)
     assert "\n" not in str(raised.value)
-    if "isn't" not in message and "lies" not in message:
+    if "isn't" not in message and "between" not in message:
         assert "options.yaml" in str(raised.value) or "positive" in message or "one of" in message
 
 
@@ -142,7 +142,7 @@ def test_every_section_is_valid_and_counts(algorithm: str, name: str) -> None:
     assert wanted and {key: found[key] for key in wanted} == wanted
     assert options.run.seed == 0, "a seed is nothing to tune"
     if kind.config == "sb3.yaml":
-        from rl_workbench.training.sb3.models import make_model
+        from rl_workbench.training.sb3.models import make_learning_model
 
         assert options.run.total_timesteps >= 5_000
         is_continuous = "SwingUp" in name or "Continuous" in name
@@ -150,7 +150,7 @@ def test_every_section_is_valid_and_counts(algorithm: str, name: str) -> None:
         if env_id.startswith("cartpole/"):
             like_it[env_id] = "Pendulum-v1" if is_continuous else "CartPole-v1"
         run = dataclasses.replace(options.run, env_id=like_it.get(env_id, env_id), env_kwargs={})
-        make_model(options._replace(run=run)).get_env().close()
+        make_learning_model(options._replace(run=run)).get_env().close()
 
 
 def test_the_robots_section_is_the_defaults() -> None:
