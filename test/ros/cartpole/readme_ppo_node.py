@@ -3,15 +3,11 @@
 
 import importlib.util
 import re
-import sys
 import unittest
 from pathlib import Path
 
 import rospkg
 import rostest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.ros.pg_train_runs import Place
 
 BLOCK = re.compile(r"## As a Gymnasium environment\n+```python\n(.*?)```", re.DOTALL)

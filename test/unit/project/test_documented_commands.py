@@ -1,7 +1,7 @@
-"""Every command of the documentation is one that its program takes: flags, files, arguments, requests.
+"""Every command in the documentation is one that its program takes: flags, files, arguments, requests.
 
-Those of the tutorials and of README's workbench are run by test_tutorial.py and test_tutorial_robot.py, those
-of docs/catkin.md by test_catkin_workspace.py. A command that nothing here knows how to look at is a fault.
+test_tutorial.py, test_tutorial_robot.py and test_catkin_workspace.py run those of their pages. A command that no
+test here knows how to check is a fault.
 """
 
 from __future__ import annotations
@@ -176,9 +176,7 @@ def test_the_workbench_takes_it(command: Command, only_parsing: None, monkeypatc
     name, *arguments = command.words[3:]
     if name == "--help":
         return
-    if name == "train":  # has a parser of its own; README's are run by test_tutorial.py
-        if command.page == "README.md":
-            return
+    if name == "train":  # has a parser of its own
 
         def begin(*_: object) -> NoReturn:
             raise Parsed
