@@ -7,12 +7,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from bullet_gazebo.physics.meshes.mesh_files import Resources
-from bullet_gazebo.state.names import did_you_mean
+from bullet_gazebo.physics.files.reading import Resources
+from bullet_gazebo.state import did_you_mean
 from files.content import FileError, read_file
+from files.expansion import CannotExpand, expand
 from files.yaml_text import load_documents
 from robot_envs.errors import RobotEnvError
-from ros_calls.expansion import CannotExpand, expand
 
 Source = str | Path
 """A file, as a path or as "package://PACKAGE/PLACE"; or, for what begins with "<", the text itself."""

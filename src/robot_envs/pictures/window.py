@@ -3,7 +3,7 @@
 import time
 from collections.abc import Mapping
 
-from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
+from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.scratch import scratch_folder
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
