@@ -1,7 +1,7 @@
 """Every command in the documentation is one that its program takes: flags, files, arguments, requests.
 
-test_tutorial.py, test_tutorial_robot.py and test_catkin_workspace.py run those of their pages. A command that no
-test here knows how to check is a fault.
+test_tutorial.py, test_tutorial_robot.py and test_catkin_workspace.py run those of their pages. A command
+that no test here knows how to check is a fault.
 """
 
 from __future__ import annotations
