@@ -10,7 +10,6 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 from control_msgs.msg import JointTolerance
-from control_msgs.srv import QueryTrajectoryState
 from controller_client import STRICT, Manager
 from gazebo_msgs.srv import GetJointProperties
 from std_srvs.srv import Empty
@@ -93,17 +92,6 @@ class TrajectoryTest(unittest.TestCase):
                     self.assertAlmostEqual(position(joint), place, delta=0.01)
                 pause()
 
-    def test_claims_are_alphabetical_and_states_keep_the_order_of_the_parameter(self):
-        arm = self.arm()
-        (listed,) = self.manager.listed()
-        self.assertEqual(listed.type, "effort_controllers/JointTrajectoryController")
-        (claim,) = listed.claimed_resources
-        self.assertEqual(claim.hardware_interface, "hardware_interface::EffortJointInterface")
-        self.assertEqual(claim.resources, EFFORT)
-        unpause()
-        self.assertTrue(arm.wait_state(lambda state: True))
-        self.assertEqual(arm.states[0].joint_names, EFFORT[::-1])
-
     # goals that fail
 
     def test_path_tolerance(self):
@@ -169,25 +157,6 @@ class TrajectoryTest(unittest.TestCase):
         self.assertTrue(arm.wait_state(lambda state: state.desired.positions == (0.1, -0.2)))
 
     # state, query
-
-    def test_query_state(self):
-        arm = self.arm(start=False)
-        name = "/slides/effort_arm/query_state"
-        with self.assertRaisesRegex(rospy.ServiceException, "not running"):
-            call(name, QueryTrajectoryState, rospy.Time(0))
-        self.assertTrue(self.manager.switch(["effort_arm"], [], STRICT))
-        unpause()
-        self.assertTrue(arm.wait_state(lambda state: True))
-        start = arm.states[-1].header.stamp + rospy.Duration(1)
-        arm.command.publish(trajectory(EFFORT, (1.0, [1.0, 0.0]), stamp=start.to_sec()))
-        middle, end = start + rospy.Duration(0, 500_000_000), start + rospy.Duration(9)
-        self.assertTrue(
-            wait_until(lambda: call(name, QueryTrajectoryState, end).position == (0.0, 1.0))
-        )
-        found = call(name, QueryTrajectoryState, middle)
-        self.assertEqual(found.name, EFFORT[::-1])
-        self.assertAlmostEqual(found.position[1], 0.5, places=6)
-        self.assertAlmostEqual(found.velocity[1], 1.875, places=6)
 
     # pause, reset, unload
 
