@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from package_writing.errors import CannotWrite
-from robot_envs.description.files import PACKAGE, locate
 from robot_envs.errors import RobotEnvError
+from robot_envs.files import PACKAGE, locate
 from ros_calls.expansion import CannotExpand, expand, included_files
 
 FOUND = re.compile(r"\$\(find\s+([\w.-]+)\s*\)([^\"'<>]*)")  # $(find PACKAGE)/PLACE

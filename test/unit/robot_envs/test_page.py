@@ -9,7 +9,7 @@ from viser_recording import Recording
 
 import cartpole  # noqa: F401 - registers its environments
 from bullet_gazebo.physics.pose import Pose
-from robot_envs.pictures.picture import Camera, RobotPicture
+from robot_envs.pictures.drawn import Camera, RobotPicture
 
 
 def shapes(nodes, kind):

@@ -10,7 +10,7 @@ from rover import ROVER_ROBOT
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from robot_envs.errors import RobotEnvError
-from robot_envs.pictures.picture import RobotPicture
+from robot_envs.pictures.drawn import RobotPicture
 from robot_envs.robots.hopper import ROBOT as HOPPER
 
 

@@ -9,7 +9,7 @@ import threading
 
 import pytest
 
-from robot_envs.description import files
+from robot_envs import files
 from robot_envs.errors import RobotEnvError
 from ros_calls import expansion, xacro_process
 from ros_calls.expansion import CannotExpand, expand, included_files
