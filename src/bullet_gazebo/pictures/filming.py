@@ -17,7 +17,7 @@ from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, subtract
 from bullet_gazebo.pictures.camera import Camera, overview
 from bullet_gazebo.pictures.recording import CAST, HEADER, RecordingOptions
 from bullet_gazebo.pictures.scene import Scene
-from video_writing.mp4 import EncoderFailed, Mp4Writer, find_encoder
+from viewer.video import EncoderFailed, Mp4Writer
 
 NUMBERS = 7  # of a pose
 ROOM = 1.25  # of the camera's distance: things move
@@ -120,7 +120,7 @@ def film(inbox: Inbox, options: RecordingOptions) -> int:
     Raises:
         EncoderFailed: if ffmpeg gives up.
     """
-    cast, writer, count = Cast(options), Mp4Writer(options.path, options.rate, find_encoder()), 0
+    cast, writer, count = Cast(options), Mp4Writer(options.path, options.rate), 0
     try:
         while (message := inbox.take()) is not None:
             kind, data = message

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bullet_gazebo.physics.description import Color, DescriptionError
-from bullet_gazebo.physics.elements import parse_xml
-from bullet_gazebo.physics.meshes.collada import axes_of
-from bullet_gazebo.physics.meshes.reader import FAULTS, check_mesh, read_mesh
+from bullet_gazebo.physics.files.elements import parse_xml
+from bullet_gazebo.physics.files.mesh_formats import axes_of
+from bullet_gazebo.physics.files.meshes import FAULTS, check_mesh, read_mesh
 
 if TYPE_CHECKING:  # imported with the first mesh: who looks at none doesn't pay for it
     import trimesh

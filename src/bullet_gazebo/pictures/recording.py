@@ -22,7 +22,6 @@ from typing import Any
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.pictures.solids import visible_shapes
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
-from video_writing.mp4 import EncoderFailed, find_encoder
 
 FILMING = "bullet_gazebo.pictures.filming"
 HEADER = struct.Struct("<cI")  # kind of a message, and its length [bytes]
@@ -71,12 +70,6 @@ class RecordingOptions:
             raise RecordingError(
                 f"a recording is {LEAST_SIZE} to {LARGEST_SIZE} pixels wide and high"
             )
-        try:
-            find_encoder()
-        except EncoderFailed as error:
-            raise RecordingError(
-                f"{error}: './ws extras' installs one, and so does 'apt-get install ffmpeg'"
-            ) from error
 
 
 class Recorder:

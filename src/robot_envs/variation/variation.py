@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from bullet_gazebo.physics.description import Inertia
-from bullet_gazebo.physics.mechanics.inertia import tensor_in
+from bullet_gazebo.physics.dynamics import tensor_in
 from bullet_gazebo.physics.pose import IDENTITY, ZERO, Quaternion, Vector, conjugate
 
 

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from pendulum import FILES, MOTOR, PENDULUM, STRONGEST, hanging, make_pendulum
+from support.robots.pendulum import FILES, MOTOR, PENDULUM, STRONGEST, hanging, make_pendulum
 
 from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.errors import RobotEnvError
@@ -129,7 +129,8 @@ def test_the_same_seed_gives_the_same_bits():
 
 def test_nothing_of_the_cart_pole_nor_of_ros_is_loaded():
     script = (
-        "import sys, pendulum; env = pendulum.make_pendulum(varied=True); env.reset(seed=0);"
+        "import sys; from support.robots.pendulum import make_pendulum;"
+        "env = make_pendulum(varied=True); env.reset(seed=0);"
         "print([m for m in sys.modules if m.split('.')[0] in ('cartpole', 'rospy', 'ros_utils')])"
     )
     shown = subprocess.run(
@@ -163,11 +164,3 @@ def test_nothing_of_the_cart_pole_nor_of_ros_is_loaded():
 def test_a_description_that_cannot_work_is_an_error_that_says_what_to_mend(changes, text):
     with pytest.raises(RobotEnvError, match=text):
         make_pendulum(robot=dataclasses.replace(PENDULUM, **changes))
-
-
-def test_there_is_no_window_that_nobody_has_described():
-    env = make_pendulum()
-    assert env.metadata == {"render_modes": ["rgb_array"], "render_fps": 100}
-    env.close()
-    with pytest.raises(ValueError, match="render_mode is \"rgb_array\", not 'human'"):
-        make_pendulum(render_mode="human")

@@ -17,10 +17,9 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.ros.clients import gazebo_interface
 from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
-from file_reading.content import MAX_BYTES, read_file
-from file_reading.errors import FileError
-from file_reading.xml_parser import parse as parse_xml
-from file_reading.xml_text import decode
+from files.content import MAX_BYTES, FileError, read_file
+from files.xml_text import decode
+from files.xml_text import parse as parse_xml
 from ros_calls.service import ServiceClient, ServiceFailed
 from ros_calls.waiting import wait_until
 

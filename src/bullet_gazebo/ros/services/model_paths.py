@@ -5,10 +5,8 @@ from pathlib import Path
 
 import rospkg
 
-from file_reading.content import read_file
-from file_reading.errors import FileError
-from file_reading.xml_parser import parse
-from file_reading.xml_text import decode
+from files.content import FileError, read_file
+from files.xml_text import decode, parse
 
 VARIABLE = "GAZEBO_MODEL_PATH"
 EXPORT = "gazebo_model_path"

@@ -15,16 +15,16 @@ from gazebo_msgs.srv import (
 )
 
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
-from bullet_gazebo.physics.elements import shown
-from bullet_gazebo.physics.files.model_file import UnknownFormat, read_entity
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.files.reading import Reading
+from bullet_gazebo.physics.files.world_file import UnknownFormat, read_entity
 from bullet_gazebo.physics.pose import Pose, is_finite
 from bullet_gazebo.physics.world import NameTaken
 from bullet_gazebo.ros.plugins import PluginRegistry
 from bullet_gazebo.ros.services.resource_paths import resources
 from bullet_gazebo.ros.wire.conversions import from_pose_msg
 from bullet_gazebo.simulator import Simulator
-from file_reading.content import MAX_BYTES
+from files.content import MAX_BYTES
 
 ROOT_TAG = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
 PACKAGE = re.compile(r"package://([^/\"'<>\s]+)")

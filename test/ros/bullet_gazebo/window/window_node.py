@@ -20,10 +20,10 @@ from bullet_gazebo.pictures.solids import visible_shapes
 from bullet_gazebo.ros.clients.window.opened import CAMERA, LOOK_AT
 from bullet_gazebo.ros.wire.conversions import from_pose_msg
 
-sys.path.append(str(Path(__file__).resolve().parents[3] / "support"))
+sys.path.append(str(Path(__file__).resolve().parents[3]))
 
-from browser import wait_for
-from window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
+from support.pages.browser import wait_for
+from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
 
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from viser_recording import Recording
+from support.pages.viser_recording import Recording
 
 from bullet_gazebo.physics.description import Shape
 from bullet_gazebo.physics.pose import Pose, normalized

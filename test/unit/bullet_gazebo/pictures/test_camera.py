@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from pictures import pixel
+from support.pages.pictures import pixel
 
 from bullet_gazebo.pictures.camera import Camera, overview
 from bullet_gazebo.pictures.ground import SKY, background

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-import mesh_files
 import numpy as np
 import pytest
 from PIL import Image
+from support.mutations import mesh_files
 
 from bullet_gazebo.physics.description import DescriptionError, Shape
 from bullet_gazebo.physics.pose import Pose

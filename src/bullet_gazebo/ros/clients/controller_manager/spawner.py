@@ -18,9 +18,8 @@ from std_msgs.msg import Bool
 
 from bullet_gazebo.ros.clients.controller_manager.client import STRICT, ManagerClient
 from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
-from file_reading.content import read_file
-from file_reading.errors import FileError
-from file_reading.yaml_text import load_parameters
+from files.content import FileError, read_file
+from files.yaml_text import load_parameters
 from ros_calls.service import ServiceFailed
 from ros_calls.waiting import wait_until
 

@@ -6,8 +6,8 @@ import threading
 import rospy
 
 from bullet_gazebo.ros.clients.window.window import Window
-from web_page.address import Address
-from web_page.server import open_browser, serve, stop
+from viewer.address import Address
+from viewer.server import open_browser, serve, stop
 
 TITLE = "gzclient"
 CAMERA, LOOK_AT = (1.4, -1.9, 1.1), (0.0, 0.0, 0.35)  # [m]

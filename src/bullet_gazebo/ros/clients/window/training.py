@@ -7,7 +7,7 @@ from pathlib import Path
 import rospy
 import viser
 
-from web_page.curves import Curves
+from viewer.curves import Curves
 
 CURVES = "~curves"  # parameter: a run folder, or the table of one
 TRAINED = "/gazebo_gui/curves"  # the same; whoever trains sets it, for windows of any name
@@ -48,4 +48,4 @@ class Training:
             if self._curves is None:
                 self._curves = Curves(self._server.gui, self._tabs.add_tab("Training"))
             self._curves.follow(Path(named))
-        return self._curves is not None and self._curves.look()
+        return self._curves is not None and self._curves.update()

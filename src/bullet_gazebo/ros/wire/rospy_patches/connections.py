@@ -31,7 +31,7 @@ Address = tuple[str, int]
 LENGTH = struct.Struct("<I")  # in front of all that ROS sends
 LARGEST_HEADER = 2**18  # [bytes]; the text of a message's definition is the longest part
 # Of a request, or of what comes on a topic [bytes]. A text that is too long to be read (MAX_BYTES of
-# file_reading) fits in, so that its sender gets an answer, not a connection that ends.
+# files) fits in, so that its sender gets an answer, not a connection that ends.
 LARGEST_MESSAGE = 2**27
 LARGEST_CALL = 2**24  # [bytes]; of an XML-RPC call
 SILENCE = 30.0  # [s] that a client may say nothing in the midst of a header
