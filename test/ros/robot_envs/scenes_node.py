@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Over ROS in lock-step, one after the other in one process: two arms with a ball, a rover with a crate."""
 
-import sys
 import tempfile
 import unittest
 from dataclasses import replace
@@ -9,9 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import rostest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.scenes.rover import ROVER, Push
 from support.scenes.two_arms import LEFT, RIGHT, Volley
 

@@ -3,15 +3,11 @@
 
 import sys
 import unittest
-from pathlib import Path
 
 import numpy as np
 import rospy
 import rostest
 from gazebo_msgs.srv import GetLinkProperties, GetPhysicsProperties
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from gymnasium.utils.env_checker import data_equivalence as same
 from support.robots.rig import MASS, RIG, SLEDGE, make_both, make_rig
 
