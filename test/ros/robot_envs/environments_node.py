@@ -20,7 +20,7 @@ from support.training.environment_conformance import IDS, RICH, EnvironmentConfo
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.robot import CONTROLLER
-from robot_envs.backends.ros.realtime import joint_states
+from robot_envs.backends.ros import realtime
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.testing import differences, rollout
 from ros_utils import ros_gazebo
@@ -160,7 +160,7 @@ class Realtime(unittest.TestCase):
         backend = env.unwrapped.backend
         backend.act({CONTROLLER: 0.0})
         begin = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
-        with mock.patch.object(joint_states, "STATE_TIMEOUT", 0.1):  # joint states come every 20 ms
+        with mock.patch.object(realtime, "STATE_TIMEOUT", 0.1):  # joint states come every 20 ms
             backend.act({CONTROLLER: 0.0})
         end = ros_gazebo.gazebo_get_model_state("cartpole")[0].stamp.to_sec()
         self.assertGreaterEqual(end - begin, 0.45)

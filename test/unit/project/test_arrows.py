@@ -27,6 +27,7 @@ ROS_ROOMS = (
     "ros_calls",
     "ros_utils",
     "robot_envs/backends",
+    "robot_envs/deployment",
 )
 
 # A library, and which of ours it may import.

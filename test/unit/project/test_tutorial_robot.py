@@ -119,7 +119,7 @@ class Reader:
                 stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
             )  # fmt: skip
             code = (
-                "from robot_envs.backends.ros.bringup.robots import ready;"
+                "from robot_envs.backends.ros.bringup import ready;"
                 "from robot_envs.scene import Scene; from my_arm.robot import ROBOT;"
                 "from ros_calls.waiting import wait_until;"
                 "import rosgraph; assert wait_until(rosgraph.is_master_online, 180, 'master');"
