@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from cartpole.registration import NAMESPACE
-from cartpole.ros_options import ros_options
-from cartpole.workbench import PROGRAM
+from cartpole import NAMESPACE
+from cartpole.workbench import PROGRAM, ros_options
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import Options, check_options, option
 from rl_workbench.starting import Interrupt, reader_may_go
@@ -18,7 +17,7 @@ from rl_workbench.training.command_line import USAGE, choose_training, flag
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.progress import tell
 from rl_workbench.training.train import shown, train
-from robot_envs.backends.choice import has_ros, need_ros
+from robot_envs.backends import has_ros, need_ros
 from robot_envs.errors import RobotEnvError
 
 NODE = "pg_train"

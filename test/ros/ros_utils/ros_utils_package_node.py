@@ -10,7 +10,6 @@ from pathlib import Path
 import rospy
 import rostest
 
-from ros_calls import master
 from ros_utils import (
     ros_controllers,
     ros_gazebo,
@@ -20,7 +19,7 @@ from ros_utils import (
     ros_spawn,
     ros_urdf,
 )
-from ros_utils.simulation import Simulation, reserved_port
+from ros_utils.simulation import Simulation
 
 PACKAGE = """<package format="2"><name>my_robot</name><version>0.0.1</version>
 <description>A robot.</description><maintainer email="a@example.com">a</maintainer>
@@ -91,11 +90,6 @@ class Package(unittest.TestCase):
     def test_the_packages_world(self):
         self.assertIn("x", ros_gazebo.gazebo_get_model_names())
         self.assertEqual(ros_gazebo.gazebo_get_gravity().z, -1.5)
-
-    def test_a_world_by_its_path(self):
-        path = self.path("worlds/light.world")
-        with Simulation(custom_world_path=path, verbose=True, recording=True) as other:
-            self.assertIn("x", other.model_names())
 
     def test_urdf(self):
         expanded = ros_urdf.urdf_parse_from_pkg("my_robot", "robot.xacro", args_xacro=["mass:=7"])
@@ -184,17 +178,6 @@ class Package(unittest.TestCase):
         self.assertTrue(launch)
         self.assertEqual(self.parameter("/number_of_launch"), "5")
         self.assertTrue(launch.close())
-
-    def test_a_master_of_its_own(self):
-        uri = f"http://127.0.0.1:{reserved_port()}"
-        with master.using(uri):
-            self.assertFalse(ros_node.ros_node_from_pkg("gazebo_ros", "gzclient"))
-            self.assertTrue(
-                ros_node.ros_node_from_pkg("gazebo_ros", "gzclient", launch_master=True)
-            )
-            self.assertTrue(ros_node.ros_kill_master())
-            self.assertFalse(ros_node.ros_node_from_pkg("gazebo_ros", "gzclient"))
-            self.assertTrue(ros_node.ros_kill_master(), "there is none any more")
 
 
 if __name__ == "__main__":

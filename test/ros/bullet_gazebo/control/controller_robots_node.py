@@ -2,20 +2,10 @@
 """Controller managers in a world that moves: namespaces, several robots, resets, latched efforts."""
 
 import unittest
-from itertools import pairwise
 
 import rospy
 import rostest
-from controller_client import (
-    BEST_EFFORT,
-    BOUND,
-    STRICT,
-    Manager,
-    call,
-    delete,
-    spawn,
-    wait_until,
-)
+from controller_client import BEST_EFFORT, STRICT, Manager, spawn
 from controller_manager_msgs.utils import (
     ControllerLister,
     ControllerManagerLister,
@@ -23,10 +13,11 @@ from controller_manager_msgs.utils import (
     get_rosparam_controller_names,
     is_controller_manager,
 )
-from gazebo_msgs.srv import GetJointProperties, SetModelConfiguration
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
+from support.ros.calls import BOUND, call, delete_model, wait_until
+from support.ros.subscribed import Listener
 
 CONTROLLERS = {
     "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 200.0},
@@ -39,27 +30,13 @@ CONTROLLERS = {
 RUNNING = {"states": "running", "cart": "running"}
 
 
-class Joints:
-    """Keeps the messages of a joint_states topic."""
-
-    def __init__(self, topic):
-        self.messages = []
-        self._subscriber = rospy.Subscriber(topic, JointState, self.messages.append)
-
-    def wait_for(self, condition):
-        return wait_until(lambda: condition(list(self.messages)))
-
-    def close(self):
-        self._subscriber.unregister()
-
-
 class RobotsTest(unittest.TestCase):
     def setUp(self):
         call("/gazebo/unpause_physics", Empty)
 
     def tearDown(self):
         for name in ("cartpole", "first", "second"):
-            delete(name)
+            delete_model(name)
 
     def start(self, namespace=""):
         for name, params in CONTROLLERS.items():
@@ -71,7 +48,7 @@ class RobotsTest(unittest.TestCase):
         return manager
 
     def joints(self, topic="/joint_states"):
-        joints = Joints(topic)
+        joints = Listener(topic, JointState)
         self.addCleanup(joints.close)
         self.assertTrue(joints.wait_for(len), f"nothing on {topic}")
         return joints
@@ -107,24 +84,11 @@ class RobotsTest(unittest.TestCase):
         self.assertLess(max(abs(m.effort[1]) for m in still.messages), 0.01)
         self.assertTrue(first.switch([], ["cart"], STRICT))
         self.assertEqual(second.states(), RUNNING)
-        delete("first")
+        delete_model("first")
         self.assertEqual(get_controller_managers(), ["/second/controller_manager"])
         self.assertEqual(second.states(), RUNNING)
 
     # efforts and resets
-
-    def test_the_last_effort_stays_after_stop(self):
-        self.assertTrue(spawn().success)
-        manager, joints = self.start(), self.joints()
-        self.command("/cart/command", 0.4)
-        self.assertTrue(joints.wait_for(lambda m: m[-1].effort[1] > 0.1))
-        self.assertTrue(manager.switch([], ["cart"], STRICT))
-        start = len(joints.messages) + 2  # one may have been on its way
-        self.assertTrue(joints.wait_for(lambda m: len(m) >= start + 20))
-        after = joints.messages[start : start + 20]
-        self.assertEqual(len({m.effort[1] for m in after}), 1, "the effort isn't held")
-        self.assertGreater(after[0].effort[1], 0.05)
-        self.assertTrue(all(b.velocity[1] > a.velocity[1] for a, b in pairwise(after)))
 
     def test_controllers_survive_resets(self):
         self.assertTrue(spawn().success)
@@ -140,15 +104,6 @@ class RobotsTest(unittest.TestCase):
         self.assertEqual(manager.states(), RUNNING | {"cart": "stopped"})
         self.assertTrue(manager.switch(["cart"], [], BEST_EFFORT))
 
-    def test_controllers_survive_set_model_configuration(self):
-        self.assertTrue(spawn().success)
-        manager = self.start()
-        request = ("cartpole", "robot_description", ["stand_cart"], [0.2])
-        call("/gazebo/set_model_configuration", SetModelConfiguration, *request)
-        place = call("/gazebo/get_joint_properties", GetJointProperties, "stand_cart").position[0]
-        self.assertAlmostEqual(place, 0.2, places=2)
-        self.assertEqual(manager.states(), RUNNING)
-
     # controller_manager_msgs.utils
 
     def test_listers_find_what_comes_and_forget_what_goes(self):
@@ -160,7 +115,7 @@ class RobotsTest(unittest.TestCase):
             for _ in range(2):
                 self.assertEqual(managers(), ["/controller_manager"])
                 self.assertEqual([each.name for each in controllers()], list(CONTROLLERS))
-            delete()
+            delete_model()
             self.assertEqual((managers(), controllers()), ([], []))
 
     def test_a_manager_has_all_six_services(self):

@@ -4,7 +4,6 @@
 See docs/contract/gazebo.md 2.3 to 2.5.
 """
 
-import os
 import subprocess
 import tempfile
 import threading
@@ -26,10 +25,10 @@ from gazebo_msgs.srv import (
     SpawnModelRequest,
 )
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
+from support.ros.calls import BOUND, call
 
 from ros_utils import ros_gazebo
 
-BOUND = 60.0  # [s of wall time]
 UNKNOWN = (
     "GazeboRosApiPlugin SpawnModel Failure: input model_xml not SDF or URDF, or cannot be converted "
     "to Gazebo compatible format."
@@ -56,11 +55,6 @@ URDF = (
     'iyz="0"/></inertial><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
     '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>'
 )
-
-
-def call(name, kind, *args, **kwargs):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)(*args, **kwargs)
 
 
 def spawn(name, xml, service="sdf", **kwargs):
@@ -193,11 +187,6 @@ class Spawning(unittest.TestCase):
         self.spawned("wordy", xml, initial_pose=at(0.0, -30.0, 1.0))
         self.assertLess(time.monotonic() - start, 2 * BOUND)
 
-    def test_static_models_can_be_deleted(self):
-        spawn("block", BOX.format(more="<static>true</static>"), initial_pose=at(9.0))
-        self.assertEqual(delete("block").status_message, "DeleteModel: successfully deleted model")
-        self.assertNotIn("block", models())
-
     def test_a_light_is_spawned_under_the_models_name(self):
         xml = (
             '<sdf version="1.6"><light name="l" type="point"><pose>0 0 1 0 0 0</pose></light></sdf>'
@@ -252,51 +241,9 @@ class Refusals(unittest.TestCase):
         with self.assertRaises(rospy.ServiceException):
             spawn("new", "<?" * 5_000_000, service="urdf")
 
-    def test_a_name_may_be_huge(self):
-        name = "n" * 100_000
-        self.assertTrue(spawn(name, BOX.format(more=""), initial_pose=at(20.0)).success)
-        self.assertTrue(delete(name).success)
-
-    def test_a_pipe_is_no_mesh(self):
-        """Opening it would wait for a writer, and all later spawns with it."""
-        with tempfile.TemporaryDirectory() as folder:
-            os.mkfifo(f"{folder}/pipe.stl")
-            mesh = f"<mesh><uri>{folder}/pipe.stl</uri></mesh>"
-            xml = BOX.replace("<box><size>0.2 0.2 0.2</size></box>", mesh).format(more="")
-            self.refused("it is not a file", "new", xml)
-
-    def test_a_missing_mesh_is_named(self):
-        mesh = "<mesh><uri>model://gone/x.dae</uri></mesh>"
-        xml = BOX.replace("<box><size>0.2 0.2 0.2</size></box>", mesh).format(more="")
-        self.refused(
-            "link 'body', collision 'shell': 'model://gone/x.dae' is not found", "new", xml
-        )
-
 
 class OddFiles(unittest.TestCase):
     """Files and texts that take long, or come from elsewhere."""
-
-    def test_an_include_bomb_is_refused_with_its_limit(self):
-        """Ten includes of ten includes, seven levels: ten million models."""
-        with tempfile.TemporaryDirectory() as folder:
-            for level in range(7):
-                include = f"<include><uri>file://{folder}/{level + 1}.sdf</uri><name>m{{}}</name></include>"
-                includes = "".join(include.format(i) for i in range(10))
-                with open(f"{folder}/{level}.sdf", "w") as file:
-                    file.write(f'<sdf version="1.6"><model name="m">{includes}</model></sdf>')
-            with open(f"{folder}/7.sdf", "w") as file:
-                file.write('<sdf version="1.6"><model name="leaf"/></sdf>')
-            uri = f"file://{folder}/0.sdf"
-            answer = spawn("bomb", f'<sdf version="1.6"><include><uri>{uri}</uri></include></sdf>')
-        self.assertFalse(answer.success)
-        self.assertIn(f"<include> of 'file://{folder}/7.sdf'", answer.status_message)
-        self.assertIn("more than 5000 models (MAX_MODELS)", answer.status_message)
-
-    def test_a_giant_text_is_refused_with_its_limit(self):
-        for service in ("sdf", "urdf"):
-            answer = spawn("giant", "<robot>" + " " * 70_000_000, service=service)
-            self.assertFalse(answer.success)
-            self.assertIn("bytes of XML (MAX_BYTES)", answer.status_message)
 
     def test_spawns_of_others_go_on_while_a_file_is_read(self):
         """Seven hundred links are melted one after the other, for seconds; then a fault is found."""
@@ -324,17 +271,6 @@ class OddFiles(unittest.TestCase):
         self.assertIn("a planar joint is only simulated", answers[0].status_message)
         # One may come before the slow one is looked at; if they waited, no second one would.
         self.assertGreater(served, 2)
-
-    def test_texts_may_say_what_files_say_of_themselves(self):
-        """The text of a parameter or request is decoded already, whatever its declaration says."""
-        declaration = '<?xml version="1.0" encoding="{}"?>\r\n'
-        for number, encoding in enumerate(("utf-8", "ISO-8859-1", "utf-16")):
-            for before in ("", "\ufeff", "\r\n <!-- mine -->\n"):
-                for service, text in (("urdf", URDF), ("sdf", URDF), ("sdf", BOX.format(more=""))):
-                    xml = before + declaration.format(encoding) + text
-                    answer = spawn("Gerät", xml, service, initial_pose=at(50.0 + number))
-                    self.assertTrue(answer.success, answer.status_message)
-                    self.assertTrue(delete("Gerät").success)
 
     def test_spawn_model_reads_files_of_every_encoding(self):
         declaration = '\n<!-- mine -->\n<?xml version="1.0" encoding="{0}"?>\r\n<!-- Gelände -->'

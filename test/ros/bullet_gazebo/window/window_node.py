@@ -2,7 +2,6 @@
 """The window in a real browser: the page shows what happens, and what is clicked there happens."""
 
 import io
-import sys
 import tempfile
 from pathlib import Path
 
@@ -12,6 +11,8 @@ import rostest
 from gazebo_msgs.msg import ModelState
 from gazebo_msgs.srv import GetLinkState, GetModelState, SetModelConfiguration, SetModelState
 from PIL import Image
+from support.pages.browser import wait_for
+from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.pictures.camera import Camera
@@ -19,11 +20,6 @@ from bullet_gazebo.pictures.scene import Scene
 from bullet_gazebo.pictures.solids import visible_shapes
 from bullet_gazebo.ros.clients.window.opened import CAMERA, LOOK_AT
 from bullet_gazebo.ros.wire.conversions import from_pose_msg
-
-sys.path.append(str(Path(__file__).resolve().parents[3]))
-
-from support.pages.browser import wait_for
-from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
 
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>
@@ -89,16 +85,6 @@ class WindowTest(WindowCase):
         self.page.click("Do these steps")
         wait_for(lambda: round(self.world().sim_time, 6) == 0.101, "hundred steps")
         self.page.wait_for_text("0.101 s")
-
-    def test_reset_world_puts_models_back_and_lets_time_go_on(self):
-        self.spawn("ball", BALL, z=0.6)
-        self.page.click("World")
-        self.page.click("Do these steps")
-        wait_for(lambda: round(self.world().sim_time, 6) == 0.1, "hundred steps")
-        self.assertLess(self.height("ball"), 0.56)
-        self.page.click("Reset world")
-        wait_for(lambda: self.height("ball") == 0.6, "ball where it was")
-        self.assertEqual(round(self.world().sim_time, 6), 0.1)
 
     def test_speed_is_chosen_and_shown(self):
         self.set_speed(1.0)
@@ -222,15 +208,6 @@ class WindowTest(WindowCase):
         wait_for(
             lambda: np.abs(boxes(self.screenshot()) - wanted).max() <= FEW, f"picture with {wanted}"
         )
-
-    def test_what_somebody_else_does_is_shown(self):
-        self.page.click("World")
-        self.unpause()
-        self.page.wait_for_text("real-time factor")
-        self.page.wait_for_text("Pause")
-        self.pause()
-        self.page.wait_for_text("paused")
-        self.page.wait_for_text("Go on")
 
 
 def page_camera():
