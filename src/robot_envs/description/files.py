@@ -10,9 +10,9 @@ from typing import Any
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.state import did_you_mean
 from files.content import FileError, read_file
+from files.expansion import CannotExpand, expand
 from files.yaml_text import load_documents
 from robot_envs.errors import RobotEnvError
-from ros_calls.expansion import CannotExpand, expand
 
 Source = str | Path
 """A file, as a path or as "package://PACKAGE/PLACE"; or, for what begins with "<", the text itself."""

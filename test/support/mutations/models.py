@@ -30,8 +30,8 @@ from bullet_gazebo.physics.files.world_file import parse_world, read_entity
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
 from files.content import FileError
+from files.expansion import CannotExpand, expand
 from files.yaml_text import load_parameters
-from ros_calls.expansion import CannotExpand, expand
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 LONGEST = 5000  # characters of a refusal

@@ -6,13 +6,14 @@ import signal
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 
 import pytest
 
-from robot_envs.description import files
+from files import expansion
+from files.expansion import LIMITS, CannotExpand, expand, included_files
+from robot_envs.description import files as descriptions
 from robot_envs.errors import RobotEnvError
-from ros_calls import expansion, xacro_process
-from ros_calls.expansion import CannotExpand, expand, included_files
 from ros_utils import ros_gazebo, ros_urdf
 
 XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">{}</robot>'
@@ -20,7 +21,7 @@ ENDLESS = "${9**9**9}"
 GREEDY = "${'a' * 10**10}"
 MACRO = '<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>'
 TWICE = '<xacro:include filename="bad.xacro"/>' * 2
-PROGRAM = "from ros_calls.xacro_process import main; raise SystemExit(main())"
+PROGRAM = "raise SystemExit(expansion.main())"
 
 
 @pytest.fixture
@@ -36,12 +37,12 @@ def bad(tmp_path):
 @pytest.fixture
 def short(monkeypatch):
     """One second instead of the usual limit."""
-    monkeypatch.setitem(expansion.expand.__kwdefaults__, "processor_time", 1)
+    monkeypatch.setattr(expand, "__defaults__", (None, replace(LIMITS, processor_time=1)))
 
 
 def refused(path, **limits):
     with pytest.raises(CannotExpand) as caught:
-        expand(path, **limits)
+        expand(path, limits=replace(LIMITS, **limits)) if limits else expand(path)
     assert str(caught.value).count("\n") == 0
     assert str(caught.value).startswith(path)
     assert len(str(caught.value)) < 1000 + 4 * len(path)
@@ -88,7 +89,7 @@ def test_a_pipe_that_nobody_writes(tmp_path):
 def test_narrower_limits_of_the_caller_stay(bad):
     script = f"""
 import resource
-from ros_calls.expansion import CannotExpand, expand, included_files
+from files.expansion import CannotExpand, expand, included_files
 resource.setrlimit(resource.RLIMIT_AS, (400 << 20, 400 << 20))
 try:
     expand({bad("${'a' * 5 * 10**8}")!r})
@@ -109,7 +110,7 @@ def test_ros_utils_and_the_environments_are_bounded(bad, short, capsys):
     assert not ros_gazebo.gazebo_spawn_urdf_path(path)
     assert re.fullmatch(r"(\[ERROR\] .*: needs more than .*\n){2}", capsys.readouterr().err)
     with pytest.raises(RobotEnvError, match="can't read .*: needs more than"):
-        files.read_urdf(path, {})
+        descriptions.read_urdf(path, {})
 
 
 def test_the_files_that_one_includes(bad, tmp_path):
@@ -161,8 +162,9 @@ def test_python_that_cannot_be_started(bad, monkeypatch):
 
 
 def program(*arguments, **constants):
-    lines = "; ".join(f"ros_calls.xacro_process.{name} = {n}" for name, n in constants.items())
-    script = f"import ros_calls.xacro_process; {lines}\n{PROGRAM}"
+    limits = replace(LIMITS, **constants)
+    start = "from files.limited import Limits; from files import expansion"
+    script = f"{start}; expansion.LIMITS = {limits}; {PROGRAM}"
     return [sys.executable, "-c", script, *arguments]
 
 
@@ -196,7 +198,7 @@ def test_the_program_writes_what_the_function_returns(bad, tmp_path):
     ],
 )
 def test_the_program_ends_with_one_line(bad, text, reason):
-    done = run(bad(text), PROCESSOR_TIME=1)
+    done = run(bad(text), processor_time=1)
     assert done.returncode == 2
     assert done.stdout == ""
     assert re.fullmatch(f"xacro: .*{reason}.*\n", done.stderr)
@@ -223,7 +225,7 @@ def test_a_signal_ends_the_program_with_its_worker(tmp_path):
         with open(tmp_path / "pipe.xacro", "w"):  # opens when the worker reads
             process.terminate()
             assert process.stderr.read() == "xacro: ended by SIGTERM\n"  # both ends are closed
-        assert process.wait(60) == xacro_process.BROKEN
+        assert process.wait(60) == expansion.BROKEN
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1", "windows-1252"])
