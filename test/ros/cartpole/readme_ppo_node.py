@@ -2,15 +2,11 @@
 """examples/ppo_over_ros.py runs as it stands, for fewer steps."""
 
 import importlib.util
-import sys
 import unittest
 from pathlib import Path
 
 import rospkg
 import rostest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.ros.pg_train_runs import Place
 
 
