@@ -14,10 +14,10 @@ from gymnasium import spaces
 from cartpole.ros_options import ros_options
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.output import reader_may_go
-from rl_workbench.tools.commands.shared import env_options, number
-from rl_workbench.tools.runs.exported import described, open_exported
-from rl_workbench.tools.runs.policies import WHICH, load_learned
-from rl_workbench.tools.runs.runs import open_run
+from rl_workbench.tools.flags import WHICH, env_options, number
+from rl_workbench.tools.policies import load_learned
+from rl_workbench.tools.runs import open_run
+from rl_workbench.tools.torchscript import described, open_exported
 from rl_workbench.training.environments.answers import as_float32
 from rl_workbench.training.environments.checked import told
 from rl_workbench.training.environments.making import make_environment

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.extras import replaying, watching
-from rl_workbench.plotting.curves import learning_curve
-from rl_workbench.plotting.figure import as_png
+from rl_workbench.plotting import as_png, learning_curve
 from rl_workbench.training.environments.checked import EnvironmentFailure
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.checkpoints import candidates
