@@ -151,7 +151,12 @@ main() {
     COMMAND=$*
     local steps=(debian venv companions build)
     case $1 in
-        test | check) steps=(debian venv test_tools companions build) ;;
+        test)
+            steps=(debian venv test_tools extras companions build)
+            # shellcheck disable=SC2206  # step names hold no blanks
+            [[ " $* " != *" --fast "* ]] || steps=(${steps[@]/extras/})
+            ;;
+        check) steps=(debian venv test_tools companions build) ;;
         extras) steps=(debian venv extras companions build) ;;
         rviz) steps=(debian rviz venv companions build) ;;
     esac

@@ -19,8 +19,8 @@ import reporting
 from support.robots import engine_runs as runs
 
 from bullet_gazebo.physics.engine import Engine
-from bullet_gazebo.physics.engines.mujoco.engine import MujocoEngine
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
+from bullet_gazebo.physics.engines.mujoco_engine import MujocoEngine
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.simulator import Simulator
 

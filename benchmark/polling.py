@@ -24,9 +24,8 @@ from realtime import processor_time, simulator_process
 from cartpole.environment import CartPoleEnv
 from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
-from robot_envs.backends.ros.bringup.objects import Objects
 from robot_envs.backends.ros.lockstep import LockstepWorld
-from robot_envs.backends.ros.turn import Turn
+from robot_envs.backends.ros.shared_world import SharedWorld
 from robot_envs.scene import Scene
 from ros_calls.polling import SWITCH
 from ros_utils.simulation import Simulation
@@ -72,7 +71,7 @@ def pair(polling: bool, stack: ExitStack) -> Pair:
     simulation = stack.enter_context(Simulation(lockstep=True))
     with simulation.active():
         add_cartpole()
-        env = CartPoleEnv(BalanceTask(), LockstepWorld(Scene([ROBOT]), TICKS, Turn(Objects())))
+        env = CartPoleEnv(BalanceTask(), LockstepWorld(Scene([ROBOT]), TICKS, SharedWorld()))
         env.reset(seed=0)  # it connects
         return Pair(simulation, env, simulator_process(simulation))
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import gymnasium
 from gymnasium import spaces
 
-from cartpole.ros_options import ros_options
+from cartpole.workbench import ros_options
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.output import reader_may_go
 from rl_workbench.tools.flags import WHICH, env_options, number
@@ -22,7 +22,7 @@ from rl_workbench.training.environments.answers import as_float32
 from rl_workbench.training.environments.checked import told
 from rl_workbench.training.environments.making import make_environment
 from rl_workbench.training.run.interrupt import Interrupt
-from robot_envs.backends.choice import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
+from robot_envs.backends import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
@@ -62,7 +62,7 @@ def main(argv: list[str] | None = None) -> int:
         arguments = parse(flags, parameters)
         need_ros("it")
         with interrupt.reading():
-            from robot_envs.backends.deployment.policy_node import PolicyNode, run_node
+            from robot_envs.deployment.policy_node import PolicyNode, run_node
 
             robot, task, act, period = load(
                 arguments.run, arguments.checkpoint, env_options(arguments)

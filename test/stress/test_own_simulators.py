@@ -11,7 +11,7 @@ import pytest
 from support.stress.scenario import Scenario
 
 import cartpole  # noqa: F401 - registers the environments
-from robot_envs.backends.side_by_side import side_by_side
+from robot_envs.backends.backend import side_by_side
 
 MANY = 16
 STEPS = 400  # of each case, by each

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bullet_gazebo.physics.description import Color, DescriptionError
-from bullet_gazebo.physics.elements import parse_xml
-from bullet_gazebo.physics.meshes.collada import axes_of
-from bullet_gazebo.physics.meshes.reader import FAULTS, check_mesh, read_mesh
+from bullet_gazebo.physics.files.elements import parse_xml
+from bullet_gazebo.physics.files.mesh_program import axes_of
+from bullet_gazebo.physics.files.meshes import check_mesh, read_mesh
 
 if TYPE_CHECKING:  # imported with the first mesh: who looks at none doesn't pay for it
     import trimesh
@@ -28,8 +28,11 @@ LARGEST_IMAGE = 1024  # [pixels] a side, for pictures
 STOPGAP = 2  # [pixels] a side of trimesh's image where there is none
 WHITE = (255, 255, 255, 255)
 PLAIN = (".stl",)  # endings of files that have no materials
-# Pillow's and pycollada's own faults beside those that were met: the shape without looks is shown.
-FAULTY = (*FAULTS, OSError, ImportError, SyntaxError)
+# What trimesh, pycollada and Pillow raise over broken materials: the shape without looks is shown.
+FAULTY = (
+    *(ArithmeticError, AssertionError, AttributeError, LookupError, RuntimeError),
+    *(TypeError, ValueError, OSError, ImportError, SyntaxError),
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image
 
 from bullet_gazebo.physics.description import Shape
-from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
+from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import IDENTITY, Pose, Vector, is_finite
 from bullet_gazebo.pictures.solids import Piece, Solid, box_around, moved, pieces_of
 from bullet_gazebo.scratch import scratch_folder

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from bullet_gazebo.physics.description import DescriptionError, Shape
-from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
+from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.pictures.ground import Background, background

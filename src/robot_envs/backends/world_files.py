@@ -4,18 +4,18 @@ import logging
 from dataclasses import replace
 
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
-from bullet_gazebo.physics.files.model_file import read_entity
 from bullet_gazebo.physics.files.reading import Reading
 from bullet_gazebo.physics.files.world_file import (
     WorldDescription,
     empty_world,
     load_world,
     parse_world,
+    read_entity,
 )
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.simulator import Simulator
-from robot_envs.description.files import Source, is_text, locate, need_file, read_text, resources
 from robot_envs.errors import RobotEnvError
+from robot_envs.files import Source, is_text, locate, need_file, read_text, resources
 from robot_envs.robot import EMPTY
 from robot_envs.task import Object
 

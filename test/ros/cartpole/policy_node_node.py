@@ -3,19 +3,14 @@
 
 import os
 import signal
-import sys
 import threading
 import unittest
-from pathlib import Path
 
 import rospy
 import rostest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.ros.pg_train_runs import Place, Process
 from support.ros.subscribed import wait_until_heard
 from support.training import training_runs

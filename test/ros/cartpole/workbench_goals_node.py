@@ -7,14 +7,10 @@ an episode, the training over ROS ends with its simulator, and is gone on with i
 
 import importlib.util
 import json
-import sys
 import unittest
 from pathlib import Path
 
 import rostest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.ros.pg_train_runs import Place
 
 ARM = "robot_envs/TwoLinkReachGoal-v0"

@@ -2,15 +2,10 @@
 """Links, models and contacts over ROS: bit for bit what the same world tells in this process."""
 
 import importlib.util
-import sys
 import unittest
-from pathlib import Path
 
 import rostest
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.robots.arm_and_box import (
     ARM,
     ARM_PARAMETERS,

@@ -71,8 +71,8 @@ class MeshWorker:
 def answers(engine: str, path: str) -> list[str]:
     """What becomes of a mesh that moves, and of one that stands."""
     from bullet_gazebo.physics.description import DescriptionError
-    from bullet_gazebo.physics.engines.registry import make_engine
-    from bullet_gazebo.physics.files.sdf.models import parse_sdf
+    from bullet_gazebo.physics.engines import make_engine
+    from bullet_gazebo.physics.files.sdf import parse_sdf
     from bullet_gazebo.physics.pose import Pose
     from bullet_gazebo.physics.world import World, ground_plane
 

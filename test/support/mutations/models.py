@@ -18,22 +18,20 @@ from hypothesis import strategies as st
 from support.mutations.xml_trees import MOST_CHANGES, mutated_xml
 from support.robots.cartpole import cartpole_urdf
 
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import GAINS, RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
+from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
-from bullet_gazebo.physics.files.model_file import read_entity
-from bullet_gazebo.physics.files.reading import Reading
-from bullet_gazebo.physics.files.sdf.models import parse_sdf
+from bullet_gazebo.physics.files.reading import Reading, Resources
+from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.files.world_file import parse_world
-from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.physics.files.world_file import parse_world, read_entity
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
 from files.content import FileError
+from files.expansion import CannotExpand, expand
 from files.yaml_text import load_parameters
-from ros_calls.expansion import CannotExpand, expand
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 LONGEST = 5000  # characters of a refusal

@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 ROSTEST = "/usr/bin/rostest"
+TESTS = str(Path(__file__).resolve().parents[2])
 DEFAULT_TIME_LIMIT = 60.0  # of a <test>, as in rostest [s]
 MARGIN = 60.0  # for the master and the nodes to start and stop [s]
 GRACE = 30.0  # for rostest to end its nodes after an interrupt [s]
@@ -68,6 +69,8 @@ def run(path: Path, folder: Path) -> None:
         "ROS_TEST_RESULTS_DIR": str(results),
         "ROS_LOG_DIR": str(folder / "log"),
         "ROS_HOME": str(folder / "home"),
+        # For support.
+        "PYTHONPATH": os.pathsep.join([TESTS, *filter(None, [os.environ.get("PYTHONPATH")])]),
     }
     limit = time_limit(path)
     with log.open("wb") as output:

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import yaml
 
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
+from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.physics.engine import Twist
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.state.query import LinkQuery, StateAnswer, StateQuery, StateReader
+from bullet_gazebo.state import LinkQuery, StateAnswer, StateQuery, StateReader
 
 FILES = Path(__file__).resolve().parents[2] / "data" / "robots"
 ARM = FILES / "two_link_arm.urdf"

@@ -1,13 +1,13 @@
 """A JointTrajectoryController on obedient joints, for tests that go tick by tick."""
 
 from bullet_gazebo.control.controllers import BUILT_IN
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.trajectory.goal import GoalRequest
-from bullet_gazebo.control.trajectory.message import (
+from bullet_gazebo.control.trajectory_goals import (
+    GoalRequest,
     Trajectory,
     TrajectoryPoint,
 )
+from bullet_gazebo.control.transmissions import read_description
 
 MS, S = 1_000_000, 1_000_000_000  # [ns]
 DT = 0.001  # [s]

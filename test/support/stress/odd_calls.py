@@ -32,7 +32,7 @@ from support.stress.drawing import drawn
 
 from bullet_gazebo.ros.clients.world_client import METHOD
 from cartpole.robot import ROBOT
-from robot_envs.backends.ros.bringup.robots import bring_up
+from robot_envs.backends.ros.bringup import bring_up
 from robot_envs.scene import Scene
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceGone
 from ros_calls.xmlrpc import BadAnswer, Refused, call

@@ -21,7 +21,7 @@ from support.mutations.models import CASES
 from support.stress.drawing import drawn
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.meshes.reader import read_mesh
+from bullet_gazebo.physics.files.meshes import read_mesh
 from ros_calls.service import ServiceClient, ServiceFailed
 
 BOUND = 120.0  # [s] for an answer

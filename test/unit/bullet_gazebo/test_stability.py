@@ -12,8 +12,7 @@ from support.robots.trajectory_rig import Listener
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.manager import STRICT
 from bullet_gazebo.control.pid import Gains
-from bullet_gazebo.control.trajectory.goal import GoalRequest
-from bullet_gazebo.control.trajectory.message import Trajectory, TrajectoryPoint
+from bullet_gazebo.control.trajectory_goals import GoalRequest, Trajectory, TrajectoryPoint
 
 INERTIA = 0.1  # [kg m²] of the wheel
 PLUGIN = '<gazebo><plugin filename="libgazebo_ros_control.so" name="c">{}</plugin></gazebo>'

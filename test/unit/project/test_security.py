@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.files.model_file import read_entity
-from bullet_gazebo.physics.files.reading import Reading
-from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.physics.files.reading import Reading, Resources
+from bullet_gazebo.physics.files.world_file import read_entity
 from bullet_gazebo.scratch import scratch_folder
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -7,7 +7,7 @@ import numpy as np
 import viser
 
 from bullet_gazebo.physics.description import Light
-from bullet_gazebo.physics.elements import shown
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.page.batches import NUMBERS, Batches
 from bullet_gazebo.pictures.page.seen import SeenModel

@@ -10,10 +10,10 @@ import rosgraph
 import rospy
 from std_msgs.msg import Bool
 
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import GAINS, RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
+from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.ros.control.controller_services import ControllerServices
 from bullet_gazebo.ros.control.pid_ports import PidPorts

@@ -7,8 +7,7 @@ import rospy
 from control_msgs.msg import PidState
 from dynamic_reconfigure.encoding import Config
 
-from bullet_gazebo.control.pid import Gains, Pid
-from bullet_gazebo.control.samples import PidSample
+from bullet_gazebo.control.pid import Gains, Pid, PidSample
 from bullet_gazebo.ros.wire.conversions import to_time
 from bullet_gazebo.ros.wire.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.wire.thinning import ThinnedTopic, Thinner

@@ -8,13 +8,13 @@ from actionlib import ServerGoalHandle
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryResult
 
 from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryController
-from bullet_gazebo.control.trajectory.goal import (
+from bullet_gazebo.control.trajectory_goals import (
     ABORTED,
     SUCCEEDED,
     Outcome,
+    TrajectoryRefused,
     TrajectorySample,
 )
-from bullet_gazebo.control.trajectory.message import TrajectoryRefused
 from bullet_gazebo.ros.control.steady_action_server import SteadyActionServer
 from bullet_gazebo.ros.control.trajectory_conversions import to_feedback, to_request
 from bullet_gazebo.simulator import Simulator

@@ -13,10 +13,14 @@ from control_msgs.srv import QueryTrajectoryStateResponse
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from bullet_gazebo.control.trajectory.goal import GoalRequest, TrajectorySample
-from bullet_gazebo.control.trajectory.message import Trajectory, TrajectoryPoint
-from bullet_gazebo.control.trajectory.segment import State
-from bullet_gazebo.control.trajectory.tolerances import Tolerance
+from bullet_gazebo.control.trajectory import State
+from bullet_gazebo.control.trajectory_goals import (
+    GoalRequest,
+    Tolerance,
+    Trajectory,
+    TrajectoryPoint,
+    TrajectorySample,
+)
 from bullet_gazebo.ros.wire.conversions import to_time
 
 

@@ -9,7 +9,7 @@ from control_msgs.srv import (
 from trajectory_msgs.msg import JointTrajectory
 
 from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryController
-from bullet_gazebo.control.trajectory.message import TrajectoryRefused
+from bullet_gazebo.control.trajectory_goals import TrajectoryRefused
 from bullet_gazebo.ros.control.trajectory_action import TrajectoryAction
 from bullet_gazebo.ros.control.trajectory_conversions import to_query_response, to_trajectory
 from bullet_gazebo.simulator import Simulator

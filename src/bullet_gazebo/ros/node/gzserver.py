@@ -13,7 +13,7 @@ import rospy
 
 from bullet_gazebo.heap import use_one_arena
 from bullet_gazebo.physics.engine import Engine
-from bullet_gazebo.physics.engines.registry import BULLET, ENGINES, EngineError, make_engine
+from bullet_gazebo.physics.engines import BULLET, ENGINES, EngineError, make_engine
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures.recording import Recorder, RecordingError, RecordingOptions
 from bullet_gazebo.ros.control.control_plugin import FILENAME as CONTROL_PLUGIN

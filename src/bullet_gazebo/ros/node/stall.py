@@ -10,7 +10,7 @@ from types import FrameType
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.ros.plugins import PluginContext
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.timing.fair_lock import FairLock
+from bullet_gazebo.timing import FairLock
 
 PATIENCE = 10.0  # [s of wall time]
 LONGEST_LOOK = (

@@ -17,10 +17,10 @@ from gazebo_msgs.srv import (
     JointRequestResponse,
 )
 
+from bullet_gazebo.applied_forces import AppliedEffort, AppliedWrench, Interval, in_world
 from bullet_gazebo.ros.wire.checks import bad_number
 from bullet_gazebo.ros.wire.conversions import to_vector
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.timing.applied_forces import AppliedEffort, AppliedWrench, Interval, in_world
 
 
 class ForceServices:

@@ -12,7 +12,7 @@ from gazebo_msgs.srv import (
 )
 from geometry_msgs.msg import Vector3
 
-from bullet_gazebo.physics.settings import SolverSettings
+from bullet_gazebo.physics.world import SolverSettings
 from bullet_gazebo.ros.wire.checks import bad_number
 from bullet_gazebo.ros.wire.conversions import to_vector
 from bullet_gazebo.simulator import Simulator

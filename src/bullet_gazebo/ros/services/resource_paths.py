@@ -7,7 +7,7 @@ from pathlib import Path
 
 import rospkg
 
-from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.ros.services.model_paths import model_paths
 
 RESOURCES = "GAZEBO_RESOURCE_PATH"

@@ -15,9 +15,9 @@ from gazebo_msgs.srv import (
 )
 
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
-from bullet_gazebo.physics.elements import shown
-from bullet_gazebo.physics.files.model_file import UnknownFormat, read_entity
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.files.reading import Reading
+from bullet_gazebo.physics.files.world_file import UnknownFormat, read_entity
 from bullet_gazebo.physics.pose import Pose, is_finite
 from bullet_gazebo.physics.world import NameTaken
 from bullet_gazebo.ros.plugins import PluginRegistry

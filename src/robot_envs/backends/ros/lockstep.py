@@ -8,12 +8,10 @@ import genpy
 from bullet_gazebo_msgs.srv import StepWorldRequest, StepWorldResponse
 
 from bullet_gazebo.physics.pose import Pose
-from robot_envs.backends.ros.bringup.robots import full_name, ready
-from robot_envs.backends.ros.bringup.world import STEP_SERVICE
-from robot_envs.backends.ros.running_simulator import RunningSimulator
-from robot_envs.backends.ros.service import ServiceClient
-from robot_envs.backends.ros.turn import Turn
-from robot_envs.backends.ros.variation import RosVariation
+from robot_envs.backends.ros.bringup import full_name, ready
+from robot_envs.backends.ros.gazebo import STEP_SERVICE, RunningSimulator, SimulatorService
+from robot_envs.backends.ros.properties import RosVariation
+from robot_envs.backends.ros.shared_world import SharedWorld
 from robot_envs.backends.ros.wire.messages import JointReader, ask_for, place, pose_of, told
 from robot_envs.backends.ros.wire.step_answer import StepKind
 from robot_envs.backends.ros.wire.step_request import StepRequest
@@ -40,16 +38,18 @@ class LockstepWorld:
     Args:
         scene: the robots and objects; they are there, and the controllers run.
         ticks: physics steps of one action.
-        turn: whose episode is under way, among those that move these robots.
+        world: shared with the other environments of this process.
         timeout: wall time [s] that an answer may take, beside 10 ms for each tick.
     """
 
     deterministic = shared = True
 
-    def __init__(self, scene: Scene, ticks: int, turn: Turn, timeout: float = TIMEOUT) -> None:
-        self.scene, self._turn = scene, turn
+    def __init__(
+        self, scene: Scene, ticks: int, world: SharedWorld, timeout: float = TIMEOUT
+    ) -> None:
+        self.scene, self._world = scene, world
         self._simulator = RunningSimulator()
-        self._step = ServiceClient(
+        self._step = SimulatorService(
             STEP_SERVICE, StepKind(), persistent=True, timeout=timeout, polls=True
         )
         moved = [f"{robot.model}::{name}" for robot, name in scene.moved.values()]
@@ -67,7 +67,7 @@ class LockstepWorld:
         self._pending: Commands | None = None  # of a step that was begun
         self._answer: StepWorldResponse | None = None  # to it, if it was taken before `act`
         self._variation = RosVariation(scene, timeout)
-        turn.join(self)
+        world.join(self)
 
     def look(self, query: StateQuery) -> None:
         """See `RobotBackend.look`.
@@ -78,7 +78,7 @@ class LockstepWorld:
         """
         link_keys(query)
         with self._simulator:
-            its_turn = self._turn.take_if_free(self)
+            its_turn = self._world.claim_if_free(self)
         ask_for(self._look, query)
         if query != StateQuery() and its_turn:  # otherwise its reset tells what isn't there
             self._call(self._look)  # no ticks: it only looks
@@ -99,7 +99,7 @@ class LockstepWorld:
         self._begin.velocities = [velocity for _, velocity in joints]
         place(self._begin, self.scene.placed_models(initial))
         with self._simulator:
-            self._turn.take(self)
+            self._world.claim(self)
         self._begun = answer = self._call(self._begin)
         state = self._state(answer)
         self._held = self.scene.starting_commands(state.joints)
@@ -117,7 +117,7 @@ class LockstepWorld:
             raise ValueError(
                 "a step was begun and not taken: act() with the same commands comes next"
             )
-        self._turn.check(self)
+        self._world.check_holder(self)
         numbers: list[float] = []
         for command in commands.values():
             if isinstance(command, float):
@@ -187,11 +187,11 @@ class LockstepWorld:
         """See `RobotBackend.vary`."""
         self._drop()
         with self._simulator:
-            self._turn.take(self)  # what others have varied isn't this one's to start from
+            self._world.claim(self)  # what others have varied isn't this one's to start from
         self._variation(variation)
 
-    def give_back(self) -> None:
-        """See `Player.give_back`."""
+    def restore(self) -> None:
+        """See `SharedBackend.restore`."""
         self._drop()  # before the next one's reset: the simulator takes requests as they come
         self._variation.undo()
 
@@ -212,7 +212,7 @@ class LockstepWorld:
         self._step.close()
         self._variation.undo()
         with contextlib.suppress(SimulatorError):  # one that is gone has no objects any more
-            self._turn.release(self)
+            self._world.leave(self)
 
     def disconnect(self) -> None:
         """Closes connections alone, where the simulator has ended, or will, with all that is in it."""

@@ -2,11 +2,9 @@
 """Requests that no client should make, through the real services: the world stays whole and answers."""
 
 import math
-import sys
 import time
 import unittest
 from collections import Counter
-from pathlib import Path
 
 import rospy
 import rostest
@@ -15,9 +13,6 @@ from gazebo_msgs import srv
 from geometry_msgs.msg import Point, Pose
 from hypothesis import HealthCheck, given, settings
 from std_srvs.srv import Empty
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
-
 from support.ros.odd_requests import BOX, JOINTS, LINKS, MODELS, requests
 
 BOUND = 60.0  # [s of wall time]

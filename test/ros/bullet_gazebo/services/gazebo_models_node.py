@@ -6,8 +6,9 @@ import math
 import rospy
 import rostest
 from gazebo_msgs.msg import LinkState, ModelState
-from gazebo_world import BOX, INF, NAN, GazeboTest, call, now, run, wait_until
+from gazebo_world import BOX, INF, NAN, GazeboTest, call, now, run
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
+from support.ros.calls import wait_until
 
 
 class ModelsTest(GazeboTest):

@@ -3,11 +3,9 @@
 
 import contextlib
 import subprocess
-import sys
 import time
 import unittest
 from importlib.metadata import version
-from pathlib import Path
 
 import msgspec
 import rosnode
@@ -15,12 +13,9 @@ import rospy
 import rostest
 import zstandard
 from gazebo_msgs.srv import SpawnModel, SpawnModelRequest
-from websockets.sync.client import connect
-
-sys.path.append(str(Path(__file__).resolve().parents[3]))
-
 from support.pages.browser import BOUND, wait_for
 from support.pages.window_page import INERTIAL, Output, proxy
+from websockets.sync.client import connect
 
 HEADER = 16  # [bytes] in front of what viser sends: its lengths
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}

@@ -13,8 +13,8 @@ from support.mutations.mesh_files import obj
 from support.robots.cartpole import cartpole_urdf
 locale.setlocale(locale.LC_NUMERIC, sys.argv[1])
 print(locale.localeconv()["decimal_point"], file=sys.stderr)
-from bullet_gazebo.physics.engines.registry import make_engine
-from bullet_gazebo.physics.files.sdf.models import parse_sdf
+from bullet_gazebo.physics.engines import make_engine
+from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane

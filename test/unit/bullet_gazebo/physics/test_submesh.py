@@ -5,9 +5,8 @@ import pytest
 from support.mutations.mesh_files import CORNERS, FACES, dae, obj
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.files.sdf.models import parse_sdf
-from bullet_gazebo.physics.meshes.reader import read_mesh
-from bullet_gazebo.physics.meshes.submesh import Submesh
+from bullet_gazebo.physics.files.meshes import Submesh, read_mesh
+from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.robots.cartpole import cartpole_urdf
 
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
@@ -91,7 +91,7 @@ def test_a_simulator_that_is_killed_leaves_a_video(tmp_path):
     """The pipe ends, whatever the way."""
     script = f"""
 import os, signal
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures.recording import Recorder, RecordingOptions
 from bullet_gazebo.simulator import Simulator

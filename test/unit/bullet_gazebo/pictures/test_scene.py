@@ -8,9 +8,9 @@ import pytest
 from support.pages.pictures import pixel
 from support.robots.cartpole import cartpole_urdf
 
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.dynamics import link_poses
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.mechanics.kinematics import link_poses
 from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures.camera import Camera
@@ -187,9 +187,8 @@ ANCHORED = """<sdf version="1.6"><model name="it"><pose>0.3 0 1 0 0 0.4</pose>
 
 
 def test_links_are_where_the_engine_has_them():
-    from bullet_gazebo.physics.files.model_file import read_entity
-    from bullet_gazebo.physics.files.reading import Reading
-    from bullet_gazebo.physics.meshes.mesh_files import Resources
+    from bullet_gazebo.physics.files.reading import Reading, Resources
+    from bullet_gazebo.physics.files.world_file import read_entity
 
     world, joints = World(make_engine()), {"turn": 0.7, "slide": -0.3}
     model = world.spawn("it", read_entity(ANCHORED, "it", Resources(), Reading()), Pose())

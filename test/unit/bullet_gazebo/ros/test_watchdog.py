@@ -12,7 +12,7 @@ import rospy
 
 from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.node.watchdog import Watchdog
-from bullet_gazebo.timing.fair_lock import FairLock
+from bullet_gazebo.timing import FairLock
 
 BOUND = 60.0  # [s]
 

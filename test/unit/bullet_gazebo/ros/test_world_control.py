@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.ros.clients.world_client import CHUNK
 from bullet_gazebo.ros.node.world_control import WorldControl

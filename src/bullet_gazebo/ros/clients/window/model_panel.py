@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from bullet_gazebo.physics.elements import shown
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.pictures.page.picture import DrawnModel
 from bullet_gazebo.pictures.page.seen import SeenJoint
 from bullet_gazebo.ros.clients.window.commands import Commands

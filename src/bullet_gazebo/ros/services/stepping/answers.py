@@ -18,7 +18,7 @@ from bullet_gazebo.ros.wire.conversions import (
     to_twist_msg,
 )
 from bullet_gazebo.simulator import NANOSECONDS
-from bullet_gazebo.state.query import StateAnswer
+from bullet_gazebo.state import StateAnswer
 
 # As StepWorld.srv has them: success, length of no text, sim_time; the joints' header: seq, stamp, no frame.
 HEAD = struct.Struct("<BId3II")

@@ -15,8 +15,7 @@ from bullet_gazebo.ros.services.stepping.usual_requests import UsualRequest
 from bullet_gazebo.ros.wire.checks import LARGEST, bad_number
 from bullet_gazebo.ros.wire.conversions import from_pose_msg, from_twist_msg
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.state.names import find_model
-from bullet_gazebo.state.query import NOTHING, LinkQuery, StateQuery
+from bullet_gazebo.state import NOTHING, LinkQuery, StateQuery, find_model
 
 MAX_TICKS = 1_000_000  # a request beyond this is a mistake, and would take minutes
 Placing = tuple[dict[str, float], dict[str, float]]

@@ -13,8 +13,7 @@ from bullet_gazebo.ros.services.stepping.usual_requests import UsualRequests
 from bullet_gazebo.ros.wire.rospy_patches.polling import PolledService
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.state.names import UnknownName
-from bullet_gazebo.state.query import NOTHING, StateQuery, StateReader
+from bullet_gazebo.state import NOTHING, StateQuery, StateReader, UnknownName
 
 SLICE = 500  # ticks between which other services get their turn
 

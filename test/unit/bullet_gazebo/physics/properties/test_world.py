@@ -4,7 +4,7 @@ import pytest
 from support.robots.bodies import BOX, UP, run
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.settings import SolverSettings
+from bullet_gazebo.physics.world import SolverSettings
 
 
 def test_gravity_and_time_step_act(world, box):
