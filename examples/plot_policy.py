@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Draws what a cart-pole's policy prefers over the pole's angle and velocity, with an episode on top.
 
     ./ws python3 examples/plot_policy.py runs/CartPole-v1__dqn__0__1700000000 policy.png
