@@ -14,19 +14,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from files.content import open_text
 from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.option import is_plain, key_values
+from rl_workbench.starting import Interrupt
+from rl_workbench.storage import as_json, as_text, write_file
 from rl_workbench.tools.flags import add_job_flags, number, write_figure
 from rl_workbench.tools.job import Job, last_words
 from rl_workbench.tools.jobs import job_pool
 from rl_workbench.tools.runs import Run, open_run
+from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm
-from rl_workbench.training.options.config_file import default_file, read_section
-from rl_workbench.training.options.options import key_values
-from rl_workbench.training.options.record import is_plain
-from rl_workbench.training.options.training_options import choose, known_options
-from rl_workbench.training.run import folder as run_folder
-from rl_workbench.training.run.files import as_json, as_text, write_file
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell, warn
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.options import default_file, known_options, read_section
+from rl_workbench.training.progress import tell, warn
 
 if TYPE_CHECKING:
     from rl_workbench.tools.results import RunResult
@@ -267,10 +266,10 @@ def _text(value: Any) -> str:
 
 def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, where: str) -> None:
     """Writes all files; the same results whatever happened on the way and wherever the folder lies."""
+    from rl_workbench.env_ids import threshold
     from rl_workbench.plotting import evaluation_curves, seed_curves
     from rl_workbench.tools import results as figures
     from rl_workbench.tools.plot import seed_panels, variant_panels
-    from rl_workbench.training.environments.names import threshold
 
     runs, results = _examine(planned, episodes)
     results = [replace(each, fault=each.fault.replace(f"{folder}/", "")) for each in results]

@@ -3,9 +3,9 @@
 import argparse
 from pathlib import Path
 
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import WHICH, number, write_figure
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell, warn
+from rl_workbench.training.progress import tell, warn
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -27,10 +27,10 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         WorkbenchError: if there is no run, or a file can't be written.
     """
     from rl_workbench.plotting import seed_curves
+    from rl_workbench.storage import as_json, check_writable, write_file
     from rl_workbench.tools import results
     from rl_workbench.tools.plot import seed_panels
     from rl_workbench.tools.runs import find_runs
-    from rl_workbench.training.run.files import as_json, check_writable, write_file
 
     for path in filter(None, (arguments.out, arguments.json)):
         check_writable(path)

@@ -4,9 +4,9 @@ import argparse
 import os
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import add_policy_flags, env_options, number
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
+from rl_workbench.training.progress import tell
 
 # Where none of these is set, no window can be opened.
 WINDOWS = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")

@@ -6,12 +6,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, number
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
+from rl_workbench.training.progress import tell
 
 if TYPE_CHECKING:
-    from rl_workbench.training.run.evaluator import Evaluation
+    from rl_workbench.training.evaluator import Evaluation
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -28,6 +28,8 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     Raises:
         WorkbenchError: if something is wrong with the run or the file.
     """
+    from rl_workbench.env_ids import threshold
+    from rl_workbench.storage import as_json, check_writable, write_file
     from rl_workbench.tools.policies import (
         RANDOM,
         LearnedPolicy,
@@ -37,8 +39,6 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         random_policy,
     )  # fmt: skip
     from rl_workbench.tools.runs import open_run
-    from rl_workbench.training.environments.names import threshold
-    from rl_workbench.training.run.files import as_json, check_writable, write_file
 
     run = open_run(arguments.run)
     to_stdout = str(arguments.json) == "-"

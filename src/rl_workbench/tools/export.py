@@ -3,9 +3,9 @@
 import argparse
 from pathlib import Path
 
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import add_policy_flags, env_options
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
+from rl_workbench.training.progress import tell
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -21,10 +21,10 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     Raises:
         WorkbenchError: if something is wrong with the run or the file, or their actions differ.
     """
+    from rl_workbench.storage import check_writable, write_file
     from rl_workbench.tools.policies import load_learned
     from rl_workbench.tools.runs import open_run
     from rl_workbench.tools.torchscript import export, open_exported
-    from rl_workbench.training.run.files import check_writable, write_file
 
     run = open_run(arguments.run)
     check_writable(arguments.out)

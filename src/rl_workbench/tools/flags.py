@@ -52,8 +52,8 @@ def env_options(arguments: argparse.Namespace) -> dict[str, Any]:
     Raises:
         WorkbenchError: if one isn't KEY=VALUE.
     """
-    from rl_workbench.training.options.options import Options
-    from rl_workbench.training.options.run_options import RunOptions
+    from rl_workbench.option import Options
+    from rl_workbench.training.options import RunOptions
 
     text = ",".join(arguments.env_kwargs)
     return dict(
@@ -81,7 +81,7 @@ def write_figure(path: Path, figure: "Figure") -> None:
         WorkbenchError: if the file can't be written, or its name ends in something else.
     """
     from rl_workbench.plotting import as_png
-    from rl_workbench.training.run.files import write_file
+    from rl_workbench.storage import write_file
 
     if path.suffix.lower() != ".png":
         raise WorkbenchError(f"pictures are PNG: name one that ends in .png, not {path}")

@@ -20,12 +20,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.storage import CONFIG_RECORD, as_json, write_file
 from rl_workbench.tools.runs import SUMMARY, cost_file, cost_of, read_leniently
-from rl_workbench.training.options.record import CONFIG_RECORD
-from rl_workbench.training.run import folder as run_folder
-from rl_workbench.training.run.checkpoints import LAST
-from rl_workbench.training.run.files import as_json, write_file
-from rl_workbench.training.run.scalar_log import NAME as SCALARS
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.checkpoints import LAST
+from rl_workbench.training.scalar_log import NAME as SCALARS
 
 POLL = 0.2  # [s]
 TIME_TO_SAVE = 60.0  # [s] for a training that is stopped because nobody needs its rest

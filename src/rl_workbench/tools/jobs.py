@@ -21,7 +21,8 @@ from tqdm import tqdm
 
 from files.content import open_text
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.starting import search_path
+from rl_workbench.starting import Interrupt, search_path
+from rl_workbench.storage import as_json, write_file
 from rl_workbench.tools.job import (
     MAX_ATTEMPTS,
     TIME_TO_SAVE,
@@ -35,10 +36,8 @@ from rl_workbench.tools.job import (
     steps_of,
 )
 from rl_workbench.tools.runs import cost_of, read_leniently
-from rl_workbench.training.run.files import as_json, write_file
-from rl_workbench.training.run.folder import is_held
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell, writable
+from rl_workbench.training.folder import is_held
+from rl_workbench.training.progress import tell, writable
 
 NAME = "jobs.json"
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import write_figure
 from rl_workbench.tools.runs import (
     Curve,
@@ -17,8 +18,7 @@ from rl_workbench.tools.runs import (
     summary_of,
     training_curve,
 )
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell, warn
+from rl_workbench.training.progress import tell, warn
 
 if TYPE_CHECKING:
     from rl_workbench.plotting import Panel, SeedCurve
@@ -143,8 +143,8 @@ def _panels(
     runs: Sequence[Run], name_of: Callable[[Run], str], curve_of: CurveOf, apart: bool = False
 ) -> "list[Panel]":
     """Makes a panel for each environment, in order of appearance; with `apart`, also for each name."""
+    from rl_workbench.env_ids import threshold
     from rl_workbench.plotting import Panel
-    from rl_workbench.training.environments.names import threshold
 
     found: dict[tuple[str, str], dict[str, list[SeedCurve]]] = {}
     for run in runs:

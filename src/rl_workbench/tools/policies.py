@@ -12,15 +12,15 @@ from torch import nn
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
+from rl_workbench.storage import CONFIG_RECORD
 from rl_workbench.tools.runs import Run
-from rl_workbench.training.algorithms import algorithm, recorded_options
-from rl_workbench.training.environments.answers import as_float32, succeeded
-from rl_workbench.training.environments.making import make_environment
-from rl_workbench.training.options.record import CONFIG_RECORD
-from rl_workbench.training.run import checkpoints
-from rl_workbench.training.run.evaluator import Evaluation, run_greedily
-from rl_workbench.training.run.policy import load_policy
-from rl_workbench.training.run.progress import warn
+from rl_workbench.training import checkpoints
+from rl_workbench.training.algorithm import load_policy
+from rl_workbench.training.algorithms import algorithm
+from rl_workbench.training.environments import as_float32, make_environment, succeeded
+from rl_workbench.training.evaluator import Evaluation, run_greedily
+from rl_workbench.training.options import recorded_options
+from rl_workbench.training.progress import warn
 
 TEST_SEED = 5_000_000  # keeps these episodes apart from those of trainings and their evaluations
 RANDOM = "random"

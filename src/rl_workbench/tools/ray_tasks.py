@@ -17,8 +17,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from rl_workbench.errors import WorkbenchError
-from rl_workbench.extras import need
+from rl_workbench.errors import WorkbenchError, need
+from rl_workbench.storage import as_text, write_file
 from rl_workbench.tools.job import (
     POLL,
     Ending,
@@ -28,8 +28,7 @@ from rl_workbench.tools.job import (
     is_hopeless,
     run_attempt,
 )
-from rl_workbench.training.run.files import as_text, write_file
-from rl_workbench.training.run.folder import LIBRARIES, versions
+from rl_workbench.training.folder import LIBRARIES, versions
 
 TOKEN = ".seen_by_nodes"
 LOCAL = "local"

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, number
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
+from rl_workbench.training.progress import tell
 
 if TYPE_CHECKING:
     import numpy as np
@@ -76,9 +76,9 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     Raises:
         WorkbenchError: if something is wrong with the run or the file, or nothing can be drawn.
     """
+    from rl_workbench.storage import check_writable
     from rl_workbench.tools.recording import draw_without_display, draws_itself
     from rl_workbench.tools.runs import open_run
-    from rl_workbench.training.run.files import check_writable
 
     out, run = arguments.out, open_run(arguments.run)
     suffix = out.suffix.lower()
@@ -154,8 +154,8 @@ def _write_scene(
     arguments: argparse.Namespace, policies: dict[str, Any], rate: float
 ) -> list[Film]:
     """Writes one HTML file with the episodes in 3-D, beside each other."""
+    from rl_workbench.storage import write_file
     from rl_workbench.tools.recording import SceneView
-    from rl_workbench.training.run.files import write_file
     from viewer.server import hidden_page
 
     if arguments.size:
@@ -237,7 +237,7 @@ def write_video(path: Path, frames: "Sequence[np.ndarray]", rate: float) -> None
     Raises:
         WorkbenchError: if the file can't be written.
     """
-    from rl_workbench.training.run.files import write_file
+    from rl_workbench.storage import write_file
 
     write = {".gif": _write_gif, ".mp4": _write_mp4, ".html": _write_html}[path.suffix.lower()]
     write_file(path, lambda stream: write(stream, frames, rate))

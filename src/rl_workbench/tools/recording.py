@@ -19,6 +19,7 @@ import numpy as np
 from gymnasium.envs.registration import load_env_creator
 from PIL import Image
 
+from rl_workbench.env_ids import spec_of
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.policies import (
     RANDOM,
@@ -29,9 +30,8 @@ from rl_workbench.tools.policies import (
     load_learned,
 )
 from rl_workbench.tools.runs import Run, open_run
-from rl_workbench.training.environments.names import spec_of
-from rl_workbench.training.run import checkpoints
-from rl_workbench.training.run.folder import is_held
+from rl_workbench.training import checkpoints
+from rl_workbench.training.folder import is_held
 
 if TYPE_CHECKING:
     import viser

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from rl_workbench.env_ids import threshold
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.plotting import WINDOW
 from rl_workbench.statistics import Statistics, describe
 from rl_workbench.tools.policies import load_learned, play
 from rl_workbench.tools.runs import Run, cost_of, evaluation_curve, summary_of, training_curve
-from rl_workbench.training.environments.names import threshold
-from rl_workbench.training.run.evaluator import Evaluation
-from rl_workbench.training.run.history import LAST
-from rl_workbench.training.run.scalar_log import CONFIRMED, EVALUATION
+from rl_workbench.training.evaluator import Evaluation
+from rl_workbench.training.history import LAST
+from rl_workbench.training.scalar_log import CONFIRMED, EVALUATION
 
 
 @dataclass(frozen=True)

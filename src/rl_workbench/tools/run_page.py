@@ -12,7 +12,9 @@ from typing import Any
 
 import viser
 
+from rl_workbench.env_ids import import_module_of
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.recording import (
     CAMERA,
     LOOK_AT,
@@ -21,9 +23,7 @@ from rl_workbench.tools.recording import (
     draw_without_display,
 )
 from rl_workbench.tools.runs import open_run
-from rl_workbench.training.environments.names import import_module_of
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell, warn
+from rl_workbench.training.progress import tell, warn
 from viewer.address import PortInUse, find_address
 from viewer.curves import Curves
 from viewer.server import open_browser, serve, stop

@@ -20,22 +20,26 @@ from typing import Any, NamedTuple
 
 from files.content import open_text
 from rl_workbench.env_ids import as_file_name
-from rl_workbench.errors import WorkbenchError
-from rl_workbench.extras import need
+from rl_workbench.errors import WorkbenchError, need
+from rl_workbench.option import key_values, unknown
+from rl_workbench.starting import Interrupt
+from rl_workbench.storage import as_json, as_text, check_writable, write_file
 from rl_workbench.tools.flags import add_job_flags, number
 from rl_workbench.tools.job import Job
 from rl_workbench.tools.jobs import JobPool, job_pool
 from rl_workbench.tools.runs import open_run
+from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.options.config_file import default_file, read_section, section_names
-from rl_workbench.training.options.options import key_values, unknown
-from rl_workbench.training.options.run_options import RunOptions
-from rl_workbench.training.options.training_options import choose, known_options
-from rl_workbench.training.run import folder as run_folder
-from rl_workbench.training.run.files import as_json, as_text, check_writable, write_file
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
-from rl_workbench.training.run.scalar_log import EVALUATION
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.options import (
+    RunOptions,
+    default_file,
+    known_options,
+    read_section,
+    section_names,
+)
+from rl_workbench.training.progress import tell
+from rl_workbench.training.scalar_log import EVALUATION
 from viewer.table import GrowingTable
 
 RECORD, JOURNAL, STUDY = "sweep.json", "study.journal", "sweep"

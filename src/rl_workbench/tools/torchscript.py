@@ -24,8 +24,8 @@ from rl_workbench.agents.greedy import Choice
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.policies import TEST_SEED, LearnedPolicy
 from rl_workbench.tools.runs import Run
-from rl_workbench.training.environments.answers import as_float32
-from rl_workbench.training.run.folder import LIBRARIES, versions
+from rl_workbench.training.environments import as_float32
+from rl_workbench.training.folder import LIBRARIES, versions
 
 FORMAT = "rl_workbench policy 1"  # changes when older files can't be read any more
 METADATA = "metadata.json"  # its name within the file

@@ -29,8 +29,8 @@ from rl_workbench.tools.benchmark import (
 from rl_workbench.tools.job import Job, command
 from rl_workbench.tools.results import RESULTS_SUMMARY, RunResult, examine, grouped, summary_table
 from rl_workbench.tools.runs import cost_file, open_run
-from rl_workbench.training.cli import PROGRAM
-from rl_workbench.training.run import folder as run_folder
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.train import PROGRAM
 
 pytestmark = pytest.mark.usefixtures("signals")
 

@@ -19,14 +19,13 @@ from support.training.workbench_runs import job
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.starting import search_path
+from rl_workbench.starting import Interrupt, search_path
 from rl_workbench.tools import job as job_module
 from rl_workbench.tools.job import Ending, Job, Program, StopWithin, run_here, steps_of
 from rl_workbench.tools.jobs import JobPool, read_jobs
 from rl_workbench.tools.runs import cost_file, cost_of
-from rl_workbench.training.cli import PROGRAM
-from rl_workbench.training.run import folder as run_folder
-from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.train import PROGRAM
 
 pytestmark = pytest.mark.usefixtures("signals")
 

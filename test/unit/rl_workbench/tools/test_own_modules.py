@@ -15,7 +15,7 @@ from rl_workbench import cli
 from rl_workbench.tools.policies import episode_steps, load_learned
 from rl_workbench.tools.recording import drawn_environment
 from rl_workbench.tools.runs import open_run
-from rl_workbench.training.cli import PROGRAM
+from rl_workbench.training.train import PROGRAM
 
 pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.slow]
 

@@ -14,6 +14,7 @@ import yaml
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.job import Ending, Job, StopWithin
 from rl_workbench.tools.jobs import JobPool
 from rl_workbench.tools.sweep import (
@@ -25,8 +26,7 @@ from rl_workbench.tools.sweep import (
     write_results,
 )
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.options.training_options import known_options
-from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.options import known_options
 
 pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.extras("optuna", "stable_baselines3")]
 RANGES = {"x": OptionRange(-10.0, 10.0, False, ()), "kind": OptionRange(0, 0, False, ("a", "b"))}

@@ -20,7 +20,7 @@ from rl_workbench.tools.policies import TEST_SEED, episode_steps, load_learned
 from rl_workbench.tools.recording import EpisodeRecorder, Frame, RecordedEpisode
 from rl_workbench.tools.run_page import LINGER, Playback
 from rl_workbench.tools.runs import open_run
-from rl_workbench.training.run.folder import held
+from rl_workbench.training.folder import held
 from robot_envs.errors import SimulatorError
 
 pytestmark = pytest.mark.usefixtures("signals")
