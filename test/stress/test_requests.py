@@ -1,4 +1,4 @@
-"""Odd values to every service, topic and XML-RPC method: the node lives, answers, and is whole."""
+"""Odd values to every service, topic and XML-RPC method: the node stays alive, answers, and is intact."""
 
 import json
 import random

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The conformance suite of the environments over ROS: in lock-step, or in real time."""
+"""The conformance suite of the environments over ROS, in lock-step or in real time."""
 
 import importlib.util
 import os

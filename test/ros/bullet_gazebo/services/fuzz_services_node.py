@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Requests that no client should make, through the real services: the world stays whole and answers."""
+"""Requests with odd values to the real services: the world stays intact and answers."""
 
 import math
 import time
