@@ -22,7 +22,7 @@ full = pytest.mark.stress(full=True)
     ],
 )
 def test_odd_requests(scenario: Scenario, engine: str, mode: str) -> None:
-    size, sent = max(30, scenario.share(BATCHES * BATCH) // scenario.share(BATCHES)), Counter()
+    size, sent = max(150, scenario.share(BATCHES * BATCH) // scenario.share(BATCHES)), Counter()
     with world(engine, mode) as here:
 
         def case(number: int, dice: random.Random) -> None:
