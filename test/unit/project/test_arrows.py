@@ -55,11 +55,9 @@ FORBIDDEN = [
     ("cartpole", ("pybullet", "torch")),
     ("rl_workbench/agents", ("gymnasium", "rl_workbench.tools", "rl_workbench.training")),
     ("rl_workbench/training", ("rl_workbench.tools",)),
-    ("rl_workbench/training/options", tuple(f"rl_workbench.training.{each}" for each in
-                                            ("run", "dqn", "pg", "sb3"))),
     *((f"rl_workbench/training/{room}", tuple(f"rl_workbench.training.{each}" for each in
-                                              ("dqn", "pg", "sb3") if each != room))
-      for room in ("run", "dqn", "pg", "sb3")),
+                                              ("dqn", "pg", "sb3") if not room.startswith(each)))
+      for room in ("training.py", "dqn.py", "pg.py", "sb3")),
 ]  # fmt: skip
 WITHOUT_ROS = (
     "bullet_gazebo.physics.world",
@@ -68,7 +66,7 @@ WITHOUT_ROS = (
     "cartpole.pg_train",
     "cartpole.workbench",
     "rl_workbench.cli",
-    "rl_workbench.training.run.training",
+    "rl_workbench.training.training",
     "robot_envs.backends.in_process",
     "robot_envs.environment",
 )
