@@ -33,8 +33,8 @@ from robot_envs.variation import Variation
 from robot_envs.variation.applying import Applier, JointFigures, PidFigures
 from robot_envs.variation.parts import RobotPart, gains_of
 from ros_calls import master
+from ros_calls.master import NoAnswer, Refused
 from ros_calls.service import TIMEOUT
-from ros_calls.xmlrpc import NoAnswer, Refused
 
 GET_LINK, SET_LINK = "/gazebo/get_link_properties", "/gazebo/set_link_properties"
 GET_PHYSICS, SET_PHYSICS = "/gazebo/get_physics_properties", "/gazebo/set_physics_properties"

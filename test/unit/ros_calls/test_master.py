@@ -11,7 +11,6 @@ import time
 import pytest
 
 from ros_calls import master as ros_master
-from ros_calls import xmlrpc
 
 LIMIT = 0.3  # [s]
 
@@ -39,28 +38,28 @@ def listening(serve):
 
 
 def test_an_answer_is_its_value(master):
-    assert xmlrpc.call(master.uri, "getPid") == 1
+    assert ros_master.call_node(master.uri, "getPid") == 1
     master.services["/a"] = "rosrpc://here:1"
     assert ros_master.call("lookupService", "/a") == "rosrpc://here:1"
 
 
 def test_no_is_an_answer(master):
-    with pytest.raises(xmlrpc.Refused, match="unknown"):
+    with pytest.raises(ros_master.Refused, match="unknown"):
         ros_master.call("lookupService", "/a")
 
 
 @pytest.mark.parametrize("method", ["unknown", "nonsense"])
 def test_what_is_not_ross_way(master, method):
-    with pytest.raises(xmlrpc.BadAnswer):
-        xmlrpc.call(master.uri, method, "a")
+    with pytest.raises(ros_master.BadAnswer):
+        ros_master.call_node(master.uri, method, "a")
 
 
 def test_nobody_listens():
     with socket.socket() as reserved:  # bound, and nobody listens
         reserved.bind(("127.0.0.1", 0))
         uri = f"http://127.0.0.1:{reserved.getsockname()[1]}"
-        with pytest.raises(xmlrpc.NobodyListens, match="Connection refused"):
-            xmlrpc.call(uri, "getPid")
+        with pytest.raises(ros_master.NobodyListens, match="Connection refused"):
+            ros_master.call_node(uri, "getPid")
         with ros_master.using(uri):
             assert not ros_master.is_up()
             assert not ros_master.is_up_or_startable()
@@ -70,8 +69,8 @@ def test_a_server_that_says_nothing():
     over = threading.Event()
     with listening(lambda client: over.wait()) as uri, ros_master.using(uri):
         begin = time.monotonic()
-        with pytest.raises(xmlrpc.NoAnswer, match=r"no answer within 0.3 s"):
-            xmlrpc.call(uri, "getPid", timeout=LIMIT)
+        with pytest.raises(ros_master.NoAnswer, match=r"no answer within 0.3 s"):
+            ros_master.call_node(uri, "getPid", timeout=LIMIT)
         assert time.monotonic() - begin >= LIMIT
         with pytest.raises(
             ros_master.MasterDown, match="the port is in use, and not by a ROS master"
@@ -86,8 +85,8 @@ def test_a_server_of_another_kind(answer):
         client.recv(4096)
         client.sendall(answer)
 
-    with listening(serve) as uri, pytest.raises(xmlrpc.NoAnswer):
-        xmlrpc.call(uri, "getPid", timeout=LIMIT)
+    with listening(serve) as uri, pytest.raises(ros_master.NoAnswer):
+        ros_master.call_node(uri, "getPid", timeout=LIMIT)
 
 
 @pytest.mark.parametrize("uri", ["", "localhost", "http://", "http://host:port", "http://host"])
@@ -113,7 +112,7 @@ def test_another_master_is_for_the_block_and_the_thread_only(monkeypatch):
 @pytest.mark.parametrize(
     ("modules", "absent"),
     [
-        ("ros_calls.master, ros_calls.xmlrpc", "rospy"),
+        ("ros_calls.master", "rospy"),
         ("ros_calls.service, ros_calls.waiting", "std_srvs"),
     ],
 )
@@ -124,3 +123,39 @@ def test_what_an_import_brings_along(modules, absent):
     assert (
         subprocess.run([sys.executable, "-c", code], env=environment, check=False).returncode == 0
     )
+
+
+def test_a_node_that_answers_lives(master, other_master) -> None:
+    assert ros_master.living_address("/gazebo") is None
+    master.nodes["/gazebo"] = other_master.uri
+    assert ros_master.living_address("/gazebo") == other_master.uri
+    other_master.told.update(getName="/gazebo", getMasterUri=master.uri)
+    assert ros_master.living_address("/gazebo") == other_master.uri
+
+
+def test_one_that_was_killed_does_not(master) -> None:
+    with socket.socket() as reserved:  # bound only: connections are refused
+        reserved.bind(("127.0.0.1", 0))
+        master.nodes["/gazebo"] = f"http://127.0.0.1:{reserved.getsockname()[1]}"
+        assert ros_master.living_address("/gazebo") is None
+
+
+def test_nor_does_one_that_says_nothing(master) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as deaf:
+        master.nodes["/gazebo"] = f"http://127.0.0.1:{deaf.getsockname()[1]}"
+        assert ros_master.living_address("/gazebo", timeout=0.2) is None
+
+
+@pytest.mark.parametrize(
+    "told", [{"getName": "/talker"}, {"getName": "/gazebo", "getMasterUri": "http://127.0.0.1:1"}]
+)
+def test_its_port_may_belong_to_another_node_now(master, other_master, told) -> None:
+    master.nodes["/gazebo"] = other_master.uri
+    other_master.told.update(told)
+    assert ros_master.living_address("/gazebo") is None
+
+
+def test_a_master_that_is_away_is_not_a_node_that_is(monkeypatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    with pytest.raises(ros_master.NoAnswer):
+        ros_master.living_address("/gazebo")
