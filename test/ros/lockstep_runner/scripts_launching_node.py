@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Scripts under lockstep.py that start their own simulator, or meet one that isn't as it should be."""
+"""Scripts under lockstep.py that start their own simulator, or meet an unsuitable one."""
 
 import os
 import re
