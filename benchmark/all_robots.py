@@ -26,7 +26,7 @@ import gymnasium
 import reporting
 
 import robot_envs.robots  # noqa: F401 - registers the environments
-from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
+from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from robot_envs.making import named
 from robot_envs.robot import Robot
 

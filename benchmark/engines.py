@@ -14,13 +14,13 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "test" / "support"))
-import engine_runs as runs
+sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))
 import reporting
+from support.robots import engine_runs as runs
 
 from bullet_gazebo.physics.engine import Engine
-from bullet_gazebo.physics.engines.mujoco.engine import MujocoEngine
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
+from bullet_gazebo.physics.engines.mujoco_engine import MujocoEngine
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.simulator import Simulator
 

@@ -22,7 +22,7 @@ from realtime import factor, simulator_process
 from ticks import CART as CART_PARAMS
 from ticks import STATES, add_robot
 
-from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
+from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.simulator import Simulator

@@ -23,7 +23,7 @@ import reporting
 import rosgraph
 
 import cartpole  # noqa: F401 - registers its environments
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane

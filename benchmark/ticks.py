@@ -15,10 +15,10 @@ from typing import Any
 import reporting
 
 from bullet_gazebo.control.controllers.base import Controller
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
+from bullet_gazebo.control.transmissions import read_description
+from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World

@@ -12,11 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import progress_plugin
 import pytest
-import stress_plugin
-from rostest_plugin import pytest_collect_file
-from stress_plugin import (
+from support.plugins import progress_plugin, stress_plugin
+from support.plugins.rostest_plugin import pytest_collect_file
+from support.plugins.stress_plugin import (
     pytest_addoption,
     pytest_report_header,
     pytest_terminal_summary,
@@ -52,7 +51,7 @@ ENGINES = ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
 @pytest.fixture
 def other_master() -> Iterator[Any]:
     """What answers as a ROS master does, and as a node, without ROS's servers: a `FakeMaster`."""
-    from ros_fakes import FakeMaster
+    from support.ros.ros_fakes import FakeMaster
 
     fake = FakeMaster()
     yield fake
@@ -62,7 +61,7 @@ def other_master() -> Iterator[Any]:
 @pytest.fixture
 def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """Another one, which is this process's."""
-    from ros_fakes import FakeMaster
+    from support.ros.ros_fakes import FakeMaster
 
     fake = FakeMaster()
     monkeypatch.setenv("ROS_MASTER_URI", fake.uri)
@@ -73,7 +72,7 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 @pytest.fixture(params=ENGINES)
 def new_engine(request: pytest.FixtureRequest) -> Callable:
     """Makes a physics engine; a test that asks for it runs with each of them."""
-    from bullet_gazebo.physics.engines.registry import make_engine
+    from bullet_gazebo.physics.engines import make_engine
 
     return partial(make_engine, request.param)
 

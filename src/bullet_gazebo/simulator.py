@@ -4,16 +4,14 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
+from bullet_gazebo.applied_forces import AppliedForces
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.projection import place_link
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.robot import ControlledRobot
-from bullet_gazebo.timing.applied_forces import AppliedForces
-from bullet_gazebo.timing.fair_lock import FairLock
-from bullet_gazebo.timing.holds import Holds
-from bullet_gazebo.timing.pacing import Pacer
+from bullet_gazebo.timing import FairLock, Holds, Pacer
 
 NANOSECONDS = 1_000_000_000
 IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()

@@ -17,7 +17,7 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import GAINS, RobotHardware
 from bullet_gazebo.control.manager import RUNNING, ControllerManager
 from bullet_gazebo.control.pid import Loop
-from bullet_gazebo.physics.mechanics.mass_matrix import mobility, most_inertias, poses_at_zero
+from bullet_gazebo.physics.dynamics import mobility, most_inertias, poses_at_zero
 from bullet_gazebo.physics.model import Model
 
 Tell = Callable[[int, str], None]

@@ -146,13 +146,9 @@ def _joined(
         raise WorkbenchError("--headless: not with --gui")
     run = options.run
     for key in ("realtime", "rviz"):
-        if getattr(robot, key) and (run.num_envs > 1 or options.session.ray is not None):
-            others = (
-                "not with --ray"
-                if options.session.ray is not None
-                else f"num_envs is 1, not {run.num_envs}"
-            )
-            raise WorkbenchError(f"--{key} is of the robot of one simulator: {others}")
+        if getattr(robot, key) and run.num_envs > 1:
+            text = f"--{key} is of the robot of one simulator: num_envs is 1, not {run.num_envs}"
+            raise WorkbenchError(text)
     recorded = [key for key in given if key not in WINDOWS]
     if options.resume:
         if recorded:
@@ -182,10 +178,10 @@ def needs_session(options: TrainingOptions) -> bool:
 def shows_itself(options: TrainingOptions) -> bool:
     """Whether the robot that is trained is seen in its simulator's window, not on a page beside the training.
 
-    Of several environments each has a simulator of its own, and so have those of workers; in the session's
-    the policy is evaluated.
+    Of several environments each has a simulator of its own; in the session's the policy is
+    evaluated.
     """
-    return needs_session(options) and options.run.num_envs == 1 and options.session.ray is None
+    return needs_session(options) and options.run.num_envs == 1
 
 
 def _backend(options: TrainingOptions) -> str:

@@ -3,7 +3,7 @@
 import math
 
 from bullet_gazebo.physics.description import ModelDescription
-from bullet_gazebo.physics.mechanics.mass_matrix import (
+from bullet_gazebo.physics.dynamics import (
     effective_inertias,
     most_inertias,
     poses_at_zero,

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from bullet_gazebo.physics.description import ModelDescription, Shape
-from bullet_gazebo.physics.mechanics.mass_matrix import poses_at_zero
+from bullet_gazebo.physics.dynamics import poses_at_zero
 from bullet_gazebo.physics.pose import Pose, conjugate, rotate
 
 

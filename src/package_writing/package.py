@@ -11,7 +11,7 @@ from pathlib import Path
 
 import yaml
 
-from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.physics.files.reading import Resources
 from package_writing import contents
 from package_writing.errors import CannotWrite
 from package_writing.ground import height_told, standing_height

@@ -5,15 +5,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-from bullet_gazebo.control.description import RobotDescription, read_description
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.joint import JointHandle
+from bullet_gazebo.control.transmissions import RobotDescription, read_description
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
+from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.meshes.mesh_files import Resources
-from bullet_gazebo.state.names import did_you_mean
-from file_reading.errors import FileError
-from file_reading.xml_parser import parse
+from bullet_gazebo.state import did_you_mean
+from files.content import FileError
+from files.xml_text import parse
 from package_writing.errors import CannotWrite
 
 PLUGIN = "libgazebo_ros_control.so"

@@ -7,7 +7,7 @@ from typing import Any
 
 import gymnasium
 
-from bullet_gazebo.state.names import did_you_mean
+from bullet_gazebo.state import did_you_mean
 from robot_envs.checks.task_checks import short
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from bullet_gazebo.control.description import RobotDescription, read_description
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointLimits
+from bullet_gazebo.control.transmissions import RobotDescription, read_description
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.state.names import did_you_mean
+from bullet_gazebo.state import did_you_mean
 from robot_envs.description import controllers, files
 from robot_envs.description.controllers import CommandPort
 from robot_envs.description.files import Source

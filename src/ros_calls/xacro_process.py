@@ -98,7 +98,7 @@ def _answer_request() -> NoReturn:
         try:
             import xacro
 
-            from file_reading.xml_text import decode, without_declaration
+            from files.xml_text import decode, without_declaration
         except ImportError as fault:
             answer.write(f"{fault}: is it installed?".encode())
             sys.exit(BROKEN)

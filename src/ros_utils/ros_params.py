@@ -7,9 +7,8 @@ from typing import Any
 
 import rosparam
 
-from file_reading.content import read_file
-from file_reading.errors import FileError
-from file_reading.yaml_text import load_parameters
+from files.content import FileError, read_file
+from files.yaml_text import load_parameters
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages

@@ -6,10 +6,10 @@ from collections import Counter
 
 import pytest
 from gazebo_msgs.srv import GetModelState
-from stress.bad_clients import SERVICE, BadClient, address
-from stress.places import waits
-from stress.scenario import Scenario
-from stress.worlds import Usage, world
+from support.stress.bad_clients import SERVICE, BadClient, address
+from support.stress.places import waits
+from support.stress.scenario import Scenario
+from support.stress.worlds import Usage, world
 
 from ros_calls import master
 from ros_calls.service import ServiceClient

@@ -6,9 +6,9 @@ import sys
 from collections import Counter
 
 import pytest
-from stress.places import BOUND
-from stress.scenario import Scenario
-from stress.worlds import world
+from support.stress.places import BOUND
+from support.stress.scenario import Scenario
+from support.stress.worlds import world
 
 BATCHES, BATCH = 20, 50
 full = pytest.mark.stress(full=True)
@@ -28,7 +28,7 @@ def test_damaged_files(scenario: Scenario, engine: str) -> None:
 
         def case(number: int, dice: random.Random) -> None:
             numbers = (str(dice.randrange(2**31)), str(size), str(here.place.folder))
-            odd = here.place.start(sys.executable, "-m", "stress.odd_files", *numbers)
+            odd = here.place.start(sys.executable, "-m", "support.stress.odd_files", *numbers)
             assert odd.end(20 * BOUND) == 0, odd.output[-4000:]
             done.update(json.loads(odd.output.splitlines()[-1]))
             here.check()

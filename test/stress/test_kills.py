@@ -9,10 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from stress.places import place, waits
-from stress.scenario import Scenario
-from stress.trainings import BOUND, forked, new, random_moment
-from training_runs import assert_no_doubles, assert_same_run, summary
+from support.stress.places import place, waits
+from support.stress.scenario import Scenario
+from support.stress.trainings import BOUND, forked, new, random_moment
+from support.training.training_runs import assert_no_doubles, assert_same_run, summary
 
 KILLS = 3  # of one training
 full = pytest.mark.stress(full=True)

@@ -7,8 +7,8 @@ import signal
 
 import pytest
 from gazebo_msgs.srv import GetWorldProperties
-from stress.places import BOUND, pid_of, place, waits
-from stress.scenario import Scenario
+from support.stress.places import BOUND, pid_of, place, waits
+from support.stress.scenario import Scenario
 
 from ros_calls import master
 from ros_calls.service import ServiceClient, ServiceFailed

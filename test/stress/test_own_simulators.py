@@ -8,7 +8,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from stress.scenario import Scenario
+from support.stress.scenario import Scenario
 
 import cartpole  # noqa: F401 - registers the environments
 from robot_envs.backends.side_by_side import side_by_side

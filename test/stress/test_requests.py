@@ -6,9 +6,9 @@ import sys
 from collections import Counter
 
 import pytest
-from stress.places import BOUND
-from stress.scenario import Scenario
-from stress.worlds import world
+from support.stress.places import BOUND
+from support.stress.scenario import Scenario
+from support.stress.worlds import world
 
 BATCHES, BATCH = 10, 1000
 full = pytest.mark.stress(full=True)
@@ -27,7 +27,11 @@ def test_odd_requests(scenario: Scenario, engine: str, mode: str) -> None:
 
         def case(number: int, dice: random.Random) -> None:
             odd = here.place.start(
-                sys.executable, "-m", "stress.odd_calls", str(dice.randrange(2**31)), str(size)
+                sys.executable,
+                "-m",
+                "support.stress.odd_calls",
+                str(dice.randrange(2**31)),
+                str(size),
             )
             assert odd.end(20 * BOUND) == 0, odd.output[-3000:]
             sent.update(json.loads(odd.output.splitlines()[-1])["sent"])

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from stress.disks import can_mount, small_disk
-from stress.scenario import Scenario
-from stress.trainings import Forked, forked, new
-from training_runs import assert_no_doubles, assert_same_run, summary
+from support.stress.disks import can_mount, small_disk
+from support.stress.scenario import Scenario
+from support.stress.trainings import Forked, forked, new
+from support.training.training_runs import assert_no_doubles, assert_same_run, summary
 
 NAMES = ["dqn", "reinforce"]
 LARGE = 64 << 20  # [bytes]; more than any of these trainings writes

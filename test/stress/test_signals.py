@@ -9,11 +9,11 @@ import time
 from pathlib import Path
 
 import pytest
-from pg_train_runs import NETWORKS
-from stress.places import launch, leftovers, no_traceback, pid_of, place, send, waits
-from stress.scenario import Scenario
-from stress.trainings import BOUND, forked, new, wait_for_newer_checkpoint
-from training_runs import assert_no_doubles, assert_same_run, summary
+from support.ros.pg_train_runs import NETWORKS
+from support.stress.places import launch, leftovers, no_traceback, pid_of, place, send, waits
+from support.stress.scenario import Scenario
+from support.stress.trainings import BOUND, forked, new, wait_for_newer_checkpoint
+from support.training.training_runs import assert_no_doubles, assert_same_run, summary
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)  # it saves, and ends
 FATAL = (signal.SIGQUIT, signal.SIGUSR1)  # nobody listens to them: it ends, as after kill -9

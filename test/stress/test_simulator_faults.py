@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 from gazebo_msgs.srv import GetModelState
-from stress.bad_clients import SERVICE, address
-from stress.disks import can_mount, small_disk
-from stress.places import BOUND, launch, place, send, waits
-from stress.robots import random_robot
-from stress.scenario import Scenario
-from stress.worlds import World, world
+from support.stress.bad_clients import SERVICE, address
+from support.stress.disks import can_mount, small_disk
+from support.stress.places import BOUND, launch, place, send, waits
+from support.stress.robots import random_robot
+from support.stress.scenario import Scenario
+from support.stress.worlds import World, world
 
 from cartpole.robot import ROBOT
 from robot_envs.backends.ros.bringup.robots import bring_up

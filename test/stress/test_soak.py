@@ -3,9 +3,9 @@
 import random
 
 import pytest
-from stress.robots import random_robot
-from stress.scenario import Case, Row, Scenario
-from stress.worlds import Usage, World, world
+from support.stress.robots import random_robot
+from support.stress.scenario import Case, Row, Scenario
+from support.stress.worlds import Usage, World, world
 
 from cartpole.robot import ROBOT
 from robot_envs.backends.ros.bringup.robots import bring_up

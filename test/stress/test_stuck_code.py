@@ -6,9 +6,9 @@ import signal
 
 from gazebo_msgs.srv import GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Pose
-from pg_train_runs import Place, Process
-from stress.places import BOUND, place, waits
-from stress.scenario import Scenario
+from support.ros.pg_train_runs import Place, Process
+from support.stress.places import BOUND, place, waits
+from support.stress.scenario import Scenario
 
 from ros_calls import master
 from ros_calls.service import ServiceClient, ServiceFailed

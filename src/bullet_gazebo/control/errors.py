@@ -2,7 +2,7 @@
 
 import threading
 
-from file_reading.errors import one_line
+from files.content import one_line
 
 
 class ControlError(ValueError):

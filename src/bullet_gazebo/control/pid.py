@@ -6,7 +6,23 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.samples import PidSample
+
+
+class PidSample(NamedTuple):
+    """control_msgs/PidState, without its header."""
+
+    timestep: float  # [s]
+    error: float
+    error_dot: float
+    p_error: float
+    i_error: float
+    d_error: float
+    p_term: float
+    i_term: float
+    d_term: float
+    i_max: float
+    i_min: float
+    output: float
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from bullet_gazebo.physics.pose import Pose, Vector
-from file_reading.errors import one_line
+from files.content import one_line
 
 MOVABLE = ("revolute", "continuous", "prismatic")
 

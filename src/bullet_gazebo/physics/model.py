@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from math import isfinite
 
 from bullet_gazebo.physics.description import ModelDescription, Shape
+from bullet_gazebo.physics.dynamics import effective_inertias, poses_at_zero
 from bullet_gazebo.physics.engine import FASTEST, Body, Twist
-from bullet_gazebo.physics.mechanics.lumping import WORLD
-from bullet_gazebo.physics.mechanics.mass_matrix import effective_inertias, poses_at_zero
+from bullet_gazebo.physics.lumping import WORLD
 from bullet_gazebo.physics.pose import ZERO, Pose
 
 NO_STOP = 1e16  # [rad, m]; what Gazebo calls no limit

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 from bullet_gazebo.physics.description import Inertia
-from bullet_gazebo.physics.mechanics.inertia import is_positive_definite
+from bullet_gazebo.physics.dynamics import is_positive_definite
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.world import World
 

@@ -1,5 +1,6 @@
 """The physics world: models by name, Gazebo's name look-up, and the step that integrates them all."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from bullet_gazebo.physics.description import (
@@ -13,7 +14,25 @@ from bullet_gazebo.physics.description import (
 from bullet_gazebo.physics.engine import Engine, Twist
 from bullet_gazebo.physics.model import AT_REST, Model
 from bullet_gazebo.physics.pose import Pose, Vector, conjugate, rotate, subtract
-from bullet_gazebo.physics.settings import SolverSettings
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """ODE's figures, with sdformat's defaults (docs/contract/gazebo.md 2.20).
+
+    PyBullet's solver is another one: only `iterations` acts on it. The others are kept for who reads them.
+    """
+
+    auto_disable_bodies: bool = False
+    precon_iterations: int = 0
+    iterations: int = 50
+    sor: float = 1.3
+    contact_surface_layer: float = 0.001  # [m]
+    contact_max_correcting_vel: float = 100.0  # [m/s]
+    cfm: float = 0.0
+    erp: float = 0.2
+    max_contacts: int = 20
+
 
 GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
 TIME_STEP = 0.001  # [s], Gazebo's default

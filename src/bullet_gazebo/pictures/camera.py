@@ -1,4 +1,4 @@
-"""The camera of a picture, and the background that it sees: a sky, and tiles that fade towards the horizon."""
+"""The camera of a picture, and its background: a sky, and tiles that fade towards the horizon."""
 
 import math
 from dataclasses import dataclass, replace

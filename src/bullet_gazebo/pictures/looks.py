@@ -1,7 +1,7 @@
 """Mesh files with their colours and textures.
 
-Our checked reader reads a file first. If it refuses the file, nothing is shown; else the file may be read once more
-for its materials, which that reader skips.
+Our checked reader reads a file first. If it refuses the file, nothing is shown; else the file may be read
+once more for its materials, which that reader skips.
 """
 
 import os
@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bullet_gazebo.physics.description import Color, DescriptionError
-from bullet_gazebo.physics.elements import parse_xml
-from bullet_gazebo.physics.meshes.collada import axes_of
-from bullet_gazebo.physics.meshes.reader import FAULTS, check_mesh, read_mesh
+from bullet_gazebo.physics.files.elements import parse_xml
+from bullet_gazebo.physics.files.mesh_formats import axes_of
+from bullet_gazebo.physics.files.meshes import FAULTS, check_mesh, read_mesh
 
 if TYPE_CHECKING:  # imported with the first mesh, because they take long
     import trimesh

@@ -7,7 +7,7 @@ import numpy as np
 import viser
 
 from bullet_gazebo.physics.description import Light
-from bullet_gazebo.physics.elements import shown
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.page_batches import NUMBERS, Batches, Singles
 from bullet_gazebo.pictures.page_shapes import ShapeMaker, color_bytes
@@ -108,7 +108,7 @@ class Picture:
                 self._shapes.add_joint(places[joint.child], joint)
 
     def _light(self, lights: list[Light]) -> None:
-        """Approximates the lights by directional and point lights, and ambient light so that nothing is dark."""
+        """Approximates the lights, and adds ambient light so that nothing is dark."""
         if lights == self._lit:
             return
         self._lit = lights

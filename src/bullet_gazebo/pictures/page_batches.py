@@ -1,7 +1,7 @@
 """Nodes of a page that move with links: batches of shapes with one geometry, and single nodes.
 
-With a node and two messages for each moved link, a browser would hang at a thousand links. A batch has the poses
-of up to 128 shapes in one array.
+With a node and two messages for each moved link, a browser would hang at a thousand links. A batch has the
+poses of up to 128 shapes in one array.
 """
 
 from collections import defaultdict
@@ -72,7 +72,9 @@ class Batches:
     def add(self, number: int, link: int, look: Appearance, instance: Instance) -> None:
         """Adds an instance; it is drawn with the next `move` after `settle`."""
         batches = self._batches[look]
-        batch = next((each for each in reversed(batches) if len(each.entries) < MOST_INSTANCES), None)
+        batch = next(
+            (each for each in reversed(batches) if len(each.entries) < MOST_INSTANCES), None
+        )
         if batch is None:
             self._made += 1
             batch = _Batch(self._scene, f"{self._below}/batch{self._made}", look)
@@ -124,7 +126,10 @@ class _Batch:
     def settle(self, first: dict[int, int]) -> None:
         self._rows = np.array([first[each.number] + each.link for each in self.entries])
         self._inner = np.array(
-            [(*each.instance.pose.position, *each.instance.pose.orientation) for each in self.entries]
+            [
+                (*each.instance.pose.position, *each.instance.pose.orientation)
+                for each in self.entries
+            ]
         )
 
     def move(self, poses: np.ndarray, moved: np.ndarray) -> None:
@@ -197,7 +202,7 @@ class Singles:
         self._rows = np.zeros(0, dtype=int)
 
     def name(self) -> str:
-        """Returns a name for a new node, never that of a removed one: its removal may come late in a browser."""
+        """Returns a new node's name, never a removed one's: the removal may reach a browser late."""
         self._named += 1
         return f"{self._below}/single{self._named}"
 

@@ -9,7 +9,7 @@ import viser
 from trimesh import creation
 
 from bullet_gazebo.physics.description import Color, DescriptionError, Shape
-from bullet_gazebo.physics.elements import shown
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.pose import Pose, Vector, rotate
 from bullet_gazebo.pictures.looks import MeshLook, read_look
 from bullet_gazebo.pictures.page_batches import (

@@ -1,7 +1,8 @@
 """Records a simulation as it runs: poses are copied within ticks, frames are drawn in another process.
 
-The simulator sends the visible shapes once, and poses for each frame, through a pipe. The other process lives in a
-session of its own and ends with the pipe, so that even a killed simulator leaves a video that can be played.
+The simulator sends the visible shapes once, and poses for each frame, through a pipe. The other process
+lives in a session of its own and ends with the pipe, so that even a killed simulator leaves a video that
+can be played.
 """
 
 import logging
@@ -245,13 +246,19 @@ def main(arguments: Sequence[str]) -> int:
     path, rate, width, height, model = arguments
     options = RecordingOptions(Path(path), float(rate), int(width), int(height), model)
     inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    stopping = threading.Event()
-    signal.signal(signal.SIGTERM, lambda *_: (stopping.set(), inbox.put(None)))
+    stopping = False
+
+    def stop(*_: object) -> None:
+        nonlocal stopping
+        stopping = True
+        inbox.put(None)
+
+    signal.signal(signal.SIGTERM, stop)
     # In a thread, so that the simulator never waits for a frame.
     threading.Thread(target=_read, args=(sys.stdin.buffer, inbox), daemon=True).start()
     film, writer, count = Film(options, Renderer()), Mp4Writer(options.path, options.rate), 0
     try:
-        while (message := inbox.get()) is not None and not stopping.is_set():
+        while (message := inbox.get()) is not None and not stopping:
             models, poses = message
             if models is not None:
                 film.change(models)

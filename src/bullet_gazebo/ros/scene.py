@@ -1,7 +1,7 @@
 """The scene for windows: what the world looks like, where its links are, and where they touch.
 
-An empty world offers exactly what Gazebo's does (docs/contract/gazebo.md 7), so the service and the topics come
-when a window asks for them through the node's XML-RPC server (node/world_control.py).
+An empty world offers exactly what Gazebo's does (docs/contract/gazebo.md 7), so the service and the topics
+come when a window asks for them through the node's XML-RPC server (node/world_control.py).
 """
 
 import secrets
@@ -78,8 +78,8 @@ class SceneService:
 class SceneTopics:
     """~scene_poses and ~scene_contacts, thirty times a second of wall time, while somebody subscribes.
 
-    A thread of its own publishes them. The world is copied within a tick, so that the thread neither waits for
-    the end of a long request in lock-step nor delays ticks.
+    A thread of its own publishes them. The world is copied within a tick, so that the thread neither waits
+    for the end of a long request in lock-step nor delays ticks.
     """
 
     def __init__(self, sim: Simulator, first: int) -> None:

@@ -6,14 +6,14 @@ from std_msgs.msg import ColorRGBA
 
 from bullet_gazebo.physics.description import Color, Light, Shape
 from bullet_gazebo.physics.model import Model
-from bullet_gazebo.pictures.visuals import SeenJoint, SeenLink, SeenModel, seen_model
+from bullet_gazebo.pictures.visuals import VisibleJoint, VisibleLink, VisibleModel, visible_model
 from bullet_gazebo.ros.common.messages import from_pose_msg, to_pose_msg, to_vector
 
 
 def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
     """Converts the visible parts of a model, with its collision shapes if `collisions`."""
     description = model.description
-    seen = seen_model(
+    seen = visible_model(
         description, number, model.name, model.link_names, model.joint_names, collisions
     )
     return SceneModel(
@@ -27,8 +27,8 @@ def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
     )
 
 
-def from_model(message: SceneModel) -> SeenModel:
-    return SeenModel(
+def from_model(message: SceneModel) -> VisibleModel:
+    return VisibleModel(
         message.number,
         message.name,
         [_from_link(link) for link in message.links],
@@ -58,7 +58,7 @@ def from_light(message: SceneLight) -> Light:
     )
 
 
-def _to_link(link: SeenLink) -> SceneLink:
+def _to_link(link: VisibleLink) -> SceneLink:
     return SceneLink(
         link.name,
         [_to_shape(shape) for shape in link.visuals],
@@ -66,15 +66,15 @@ def _to_link(link: SeenLink) -> SceneLink:
     )
 
 
-def _from_link(message: SceneLink) -> SeenLink:
-    return SeenLink(
+def _from_link(message: SceneLink) -> VisibleLink:
+    return VisibleLink(
         message.name,
         [_from_shape(shape) for shape in message.visuals],
         [_from_shape(shape) for shape in message.collisions],
     )
 
 
-def _to_joint(joint: SeenJoint) -> SceneJoint:
+def _to_joint(joint: VisibleJoint) -> SceneJoint:
     return SceneJoint(
         name=joint.name,
         kind=joint.kind,
@@ -86,8 +86,8 @@ def _to_joint(joint: SeenJoint) -> SceneJoint:
     )
 
 
-def _from_joint(message: SceneJoint) -> SeenJoint:
-    return SeenJoint(
+def _from_joint(message: SceneJoint) -> VisibleJoint:
+    return VisibleJoint(
         message.name,
         message.kind,
         message.child,

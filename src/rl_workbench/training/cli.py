@@ -1,11 +1,9 @@
 """`train`: one command line for every algorithm; errors in one line, exit codes."""
 
 import argparse
-import shlex
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
-from functools import partial
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
@@ -16,11 +14,11 @@ from rl_workbench.output import reader_may_go
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm, recorded_kind
 from rl_workbench.training.options.command_line import USAGE, check_flag
 from rl_workbench.training.options.kind import AlgorithmKind
-from rl_workbench.training.options.training_options import MakePool, TrainingOptions, choose
+from rl_workbench.training.options.training_options import TrainingOptions, choose
 from rl_workbench.training.page import page_beside
 from rl_workbench.training.run import folder as run_folder
 from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell, warn
+from rl_workbench.training.run.progress import tell
 
 PROG = "rl-workbench train"
 PROGRAM = starting.program("rl_workbench")
@@ -117,9 +115,6 @@ def train(
     run = options.run
     try:
         with ExitStack() as holding:
-            if options.session.ray is not None:
-                make_pool = holding.enter_context(_workers(options.session.ray, options))
-                options = options._replace(make_pool=make_pool)
             if options.resume:
                 folder = options.resume.resolve()
                 holding.enter_context(run_folder.held(folder))
@@ -133,26 +128,6 @@ def train(
     finally:
         interrupt.defer()
     return folder
-
-
-@contextmanager
-def _workers(address: str, options: TrainingOptions) -> Iterator[MakePool]:
-    """What makes the workers on a cluster, as long as that is joined.
-
-    Raises:
-        WorkbenchError: if it can't be.
-    """
-    from rl_workbench.training.cluster.address import LOCAL
-    from rl_workbench.training.cluster.joining import joined, local_processors
-    from rl_workbench.training.cluster.nodes import check_processors
-
-    if address == LOCAL:  # it takes long to start
-        check_processors(options.run.num_envs, local_processors())
-    folder = str(options.resume or options.run.run_dir or "RUN_DIR")
-    with joined(address, f"--resume {shlex.quote(folder)} goes on, if that is there") as cluster:
-        from rl_workbench.training.rollouts.workers import Workers  # needs what joining sets
-
-        yield partial(Workers, cluster, say=warn)
 
 
 @reader_may_go()

@@ -2,7 +2,7 @@
 
 from importlib.util import find_spec
 
-from bullet_gazebo.state.names import did_you_mean
+from bullet_gazebo.state import did_you_mean
 from robot_envs.backends.backend import PHYSICS_STEP, RobotBackend, ticks_per_action
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import EMPTY

@@ -12,15 +12,14 @@ from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import STRICT
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.engine import Twist
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose, normalized
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
-from bullet_gazebo.state.names import UnknownName, find_link, find_model
-from bullet_gazebo.state.query import NOTHING, StateReader
+from bullet_gazebo.state import NOTHING, StateReader, UnknownName, find_link, find_model
 from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action
 from robot_envs.backends.in_process_variation import InProcessChanges
 from robot_envs.backends.world_files import fill, spawn
@@ -56,7 +55,7 @@ class InProcessWorld:
     Args:
         scene: the robots and objects.
         control_period: simulated time [s] of one action.
-        engine: "bullet", or "mujoco"; see `bullet_gazebo.physics.engines.registry`.
+        engine: "bullet", or "mujoco"; see `bullet_gazebo.physics.engines`.
 
     Raises:
         ValueError: if the period isn't a whole number of physics steps, or there is no such

@@ -4,13 +4,13 @@ import logging
 from dataclasses import replace
 
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
-from bullet_gazebo.physics.files.model_file import read_entity
 from bullet_gazebo.physics.files.reading import Reading
 from bullet_gazebo.physics.files.world_file import (
     WorldDescription,
     empty_world,
     load_world,
     parse_world,
+    read_entity,
 )
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.simulator import Simulator

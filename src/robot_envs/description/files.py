@@ -7,11 +7,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from bullet_gazebo.physics.meshes.mesh_files import Resources
-from bullet_gazebo.state.names import did_you_mean
-from file_reading.content import read_file
-from file_reading.errors import FileError
-from file_reading.yaml_text import load_documents
+from bullet_gazebo.physics.files.reading import Resources
+from bullet_gazebo.state import did_you_mean
+from files.content import FileError, read_file
+from files.yaml_text import load_documents
 from robot_envs.errors import RobotEnvError
 from ros_calls.expansion import CannotExpand, expand
 

@@ -13,7 +13,7 @@ from robot_envs.pictures.picture import RobotPicture
 from robot_envs.pictures.surroundings import Surroundings
 from robot_envs.scene import Scene
 from robot_envs.world_state import InitialState, WorldState
-from web_page.display import hindrance
+from viewer.display import hindrance
 
 if TYPE_CHECKING:
     from viser import ViserServer

@@ -12,8 +12,8 @@ from bullet_gazebo.physics.description import Shape
 from bullet_gazebo.physics.files.world_file import empty_world
 from bullet_gazebo.physics.pose import IDENTITY, ZERO
 from bullet_gazebo.pictures.camera import Camera, overview
-from bullet_gazebo.pictures.page.picture import Picture
-from bullet_gazebo.pictures.page.seen import SeenLink, SeenModel, seen_model
+from bullet_gazebo.pictures.page import Picture
+from bullet_gazebo.pictures.visuals import VisibleLink, VisibleModel, visible_model
 from robot_envs.pictures.placement import Placement
 
 WORLD = "/world"  # node
@@ -130,7 +130,7 @@ class RobotOnPage:
 def _draw_ground(server: viser.ViserServer) -> None:
     world = empty_world()
     seen = [
-        seen_model(model, number, name, list(model.links), [], collisions=False)
+        visible_model(model, number, name, list(model.links), [], collisions=False)
         for number, (name, model) in enumerate(world.models.items())
     ]
     ground = Picture(server, logger.warning, below=WORLD)
@@ -138,7 +138,7 @@ def _draw_ground(server: viser.ViserServer) -> None:
     ground.move(np.array([(*ZERO, *IDENTITY)] * sum(len(model.links) for model in seen)))
 
 
-def _seen(placement: Placement) -> list[SeenModel]:
+def _seen(placement: Placement) -> list[VisibleModel]:
     """The robot with all of its links, and of what is beside it those that are seen."""
     models = []
     for number, (name, shapes) in enumerate(placement.models.items()):
@@ -147,7 +147,7 @@ def _seen(placement: Placement) -> list[SeenModel]:
             links |= {link: [] for link in placement.description.links}
         for link, shape in shapes:
             links[link].append(shape)
-        models.append(SeenModel(number, name, [SeenLink(*each) for each in links.items()]))
+        models.append(VisibleModel(number, name, [VisibleLink(*each) for each in links.items()]))
     return models
 
 

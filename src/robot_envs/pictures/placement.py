@@ -7,10 +7,10 @@ from math import pi
 import numpy as np
 
 from bullet_gazebo.physics.description import DescriptionError, Joint
-from bullet_gazebo.physics.mechanics.kinematics import link_poses
+from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.pose import Pose, Vector, subtract
 from bullet_gazebo.pictures.camera import Camera, overview
-from bullet_gazebo.pictures.solids import box_around, moved, solid_of, visible_shapes
+from bullet_gazebo.pictures.visuals import box_around, moved, solid_of, visible_shapes
 from robot_envs.pictures.surroundings import Shapes, Surroundings
 from robot_envs.robot import Robot
 

@@ -5,7 +5,7 @@ from functools import cached_property
 
 from bullet_gazebo.physics.description import ModelDescription, Shape
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.pictures.solids import visible_shapes
+from bullet_gazebo.pictures.visuals import visible_shapes
 from robot_envs.backends.world_files import object_model, world_models
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene

@@ -3,11 +3,11 @@
 import time
 from collections.abc import Mapping
 
-from bullet_gazebo.physics.engines.bullet.quiet_import import pybullet
+from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.scratch import scratch_folder
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
-from web_page.display import hindrance
+from viewer.display import hindrance
 
 Camera = tuple[float, float, float, tuple[float, float, float]]
 OPTIONS = "--window_title={title} --width=800 --height=500"

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from bullet_gazebo.physics.description import Inertia
-from bullet_gazebo.physics.mechanics.inertia import tensor_in
+from bullet_gazebo.physics.dynamics import tensor_in
 from bullet_gazebo.physics.pose import IDENTITY, Quaternion, conjugate
 from robot_envs.variation.variation import LinkScale
 

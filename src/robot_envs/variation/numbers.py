@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bullet_gazebo.state.names import did_you_mean
+from bullet_gazebo.state import did_you_mean
 
 
 def is_number(value: Any) -> bool:

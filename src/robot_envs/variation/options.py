@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bullet_gazebo.state.names import did_you_mean
+from bullet_gazebo.state import did_you_mean
 from robot_envs.variation.numbers import by_name, is_number
 
 

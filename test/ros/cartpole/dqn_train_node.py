@@ -8,9 +8,9 @@ from pathlib import Path
 
 import rostest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from pg_train_runs import Place
+from support.ros.pg_train_runs import Place
 
 SHORT = ["total_timesteps:=300", "eval_frequency:=0"]
 

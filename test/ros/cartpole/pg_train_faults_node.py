@@ -11,9 +11,9 @@ from pathlib import Path
 
 import rostest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from pg_train_runs import NETWORKS, Place, Process
+from support.ros.pg_train_runs import NETWORKS, Place, Process
 
 ENDLESS = ("--episodes=100000", "--stop-at-length=0")
 

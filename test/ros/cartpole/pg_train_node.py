@@ -13,9 +13,9 @@ import rostest
 import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from pg_train_runs import NETWORKS, Place
+from support.ros.pg_train_runs import NETWORKS, Place
 
 TAGS = {
     "Reward",

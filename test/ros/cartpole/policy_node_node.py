@@ -14,11 +14,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-import training_runs
-from pg_train_runs import Place, Process
-from subscribed import wait_until_heard
+from support.ros.pg_train_runs import Place, Process
+from support.ros.subscribed import wait_until_heard
+from support.training import training_runs
 
 import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli

@@ -10,9 +10,9 @@ from pathlib import Path
 import rospkg
 import rostest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from pg_train_runs import Place
+from support.ros.pg_train_runs import Place
 
 BLOCK = re.compile(r"## As a Gymnasium environment\n+```python\n(.*?)```", re.DOTALL)
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import rostest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
-from virtual_display import missing, virtual_display
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from support.ros.virtual_display import missing, virtual_display
 
 from ros_utils.simulation import reserved_port
 

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import rostest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from pg_train_runs import Place
+from support.ros.pg_train_runs import Place
 
 ARM = "robot_envs/TwoLinkReachGoal-v0"
 HAS_SB3 = importlib.util.find_spec("stable_baselines3") is not None

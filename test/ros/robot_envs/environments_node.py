@@ -18,9 +18,9 @@ import rosservice
 import rostest
 from gazebo_msgs.srv import GetLinkProperties
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from environment_conformance import IDS, RICH, EnvironmentConformance
+from support.training.environment_conformance import IDS, RICH, EnvironmentConformance
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.robot import CONTROLLER

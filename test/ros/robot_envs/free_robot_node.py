@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import rostest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from pendulum import FILES, PENDULUM, Upright
+from support.robots.pendulum import FILES, PENDULUM, Upright
 
 from robot_envs.backends.ros.session import RosSession
 from robot_envs.environment import RobotEnv

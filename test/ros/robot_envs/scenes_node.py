@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import rostest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from scenes.rover import ROVER, Push
-from scenes.two_arms import LEFT, RIGHT, Volley
+from support.scenes.rover import ROVER, Push
+from support.scenes.two_arms import LEFT, RIGHT, Volley
 
 from robot_envs import InitialState, Pose, RobotEnv, RobotEnvError, SimulatorError
 from robot_envs.backends.ros.bringup import world

@@ -11,9 +11,9 @@ import numpy as np
 import rosgraph
 import rostest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from pendulum import MOTOR, PENDULUM, hanging, make_pendulum
+from support.robots.pendulum import MOTOR, PENDULUM, hanging, make_pendulum
 
 from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.backends.ros.session import RosSession

@@ -10,10 +10,10 @@ import rospy
 import rostest
 from gazebo_msgs.srv import GetLinkProperties, GetPhysicsProperties
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from gymnasium.utils.env_checker import data_equivalence as same
-from rig import MASS, RIG, SLEDGE, make_both, make_rig
+from support.robots.rig import MASS, RIG, SLEDGE, make_both, make_rig
 
 from robot_envs import SimulatorError
 from robot_envs.backends.ros.service import ServiceClient

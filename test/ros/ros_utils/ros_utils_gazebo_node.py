@@ -13,8 +13,8 @@ from sensor_msgs.msg import JointState
 
 from ros_utils import ros_controllers, ros_gazebo, ros_node, ros_params, ros_spawn
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
-from subscribed import wait_until_heard
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from support.ros.subscribed import wait_until_heard
 
 CONTROLLERS = ["joint_state_controller", "stand_cart_position_controller"]
 

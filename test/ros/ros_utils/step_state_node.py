@@ -9,9 +9,9 @@ from pathlib import Path
 import rostest
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from arm_and_box import (
+from support.robots.arm_and_box import (
     ARM,
     ARM_PARAMETERS,
     BOX,

@@ -1,9 +1,9 @@
 """Environments and tasks that each break one promise; see robot_envs.testing."""
 
 import numpy as np
+from support.scenes.solo_arm import SOLO, Hold, Reach
 
 from robot_envs import InitialState, RobotEnv
-from scenes.solo_arm import SOLO, Hold, Reach
 
 
 def of(task, environment=RobotEnv, **own):

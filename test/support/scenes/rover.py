@@ -2,6 +2,7 @@
 
 import numpy as np
 from gymnasium.spaces import Box
+from support.scenes.parts import joint, link, plugin, transmission
 
 from robot_envs import (
     Commands,
@@ -15,7 +16,6 @@ from robot_envs import (
     Task,
     WorldState,
 )
-from scenes.parts import joint, link, plugin, transmission
 
 WHEEL = '<cylinder radius="0.1" length="0.04"/>'
 PARTS = [

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box
+from support.scenes.two_arms import LEFT, arm
 
 from robot_envs import Commands, GoalTask, Robot, RobotEnv, Task, WorldState
-from scenes.two_arms import LEFT, arm
 
 SOLO: Robot = replace(
     LEFT, urdf=arm("", "Position", "Position"), namespace="", name="arm", world="empty"

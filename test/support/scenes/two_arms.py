@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box
+from support.scenes.parts import INERTIA, joint, link, plugin, transmission
 
 from robot_envs import (
     Commands,
@@ -24,7 +25,6 @@ from robot_envs import (
     Task,
     WorldState,
 )
-from scenes.parts import INERTIA, joint, link, plugin, transmission
 
 WORLD = """<sdf version="1.6"><world name="hall">
   <include><uri>model://ground_plane</uri></include><include><uri>model://sun</uri></include>

@@ -26,16 +26,16 @@ from gazebo_msgs.srv import (
 )
 from geometry_msgs.msg import Point, Pose
 from hypothesis import strategies as st
-from odd_requests import BOX, SIMPLE, messages, requests
 from std_srvs.srv import Empty
+from support.ros.odd_requests import BOX, SIMPLE, messages, requests
+from support.stress.drawing import drawn
 
-from bullet_gazebo.ros.clients.world_client import METHOD
+from bullet_gazebo.ros.clients.gz import METHOD
 from cartpole.robot import ROBOT
 from robot_envs.backends.ros.bringup.robots import bring_up
 from robot_envs.scene import Scene
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceGone
 from ros_calls.xmlrpc import BadAnswer, Refused, call
-from stress.drawing import drawn
 
 NODE = "/gazebo"
 OFTEN = 50  # calls, after which the world is completed again

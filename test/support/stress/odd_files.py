@@ -15,14 +15,14 @@ from typing import Any
 
 from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
-from mesh_worker import SDF
-from mutations_mesh import mesh_files
-from mutations_models import CASES
+from support.mutations.mesh_worker import SDF
+from support.mutations.meshes import mesh_files
+from support.mutations.models import CASES
+from support.stress.drawing import drawn
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.meshes.reader import read_mesh
+from bullet_gazebo.physics.files.meshes import read_mesh
 from ros_calls.service import ServiceClient, ServiceFailed
-from stress.drawing import drawn
 
 BOUND = 120.0  # [s] for an answer
 AT_ONCE = 5  # files of one kind that are drawn at a time

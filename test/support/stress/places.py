@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from pg_train_runs import Place, Process
+from support.ros.pg_train_runs import Place, Process
 
 BOUND = 120.0  # [s] for anything to come up, or to end
 OURS = re.compile(r'File "[^"]*/(?:src|scripts|companions)/(?!\.)[^"]*"')  # of a traceback
@@ -29,7 +29,7 @@ def place(folder: Path | None = None) -> Iterator[Place]:
     temporary.mkdir()
     made.environment |= {"TMPDIR": str(temporary), "ROS_LOG_DIR": str(logs)}
     # For nodes that are modules of this folder.
-    modules = [os.environ.get("PYTHONPATH", ""), str(Path(__file__).resolve().parents[1])]
+    modules = [os.environ.get("PYTHONPATH", ""), str(Path(__file__).resolve().parents[2])]
     made.environment |= {"ROS_HOME": str(made.folder / "home"), "PYTHONPATH": ":".join(modules)}
     try:
         yield made

@@ -21,9 +21,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from stress.scenario import Row
+from support.stress.scenario import Row
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / ".ws/stress"

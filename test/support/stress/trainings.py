@@ -16,7 +16,7 @@ from multiprocessing import connection
 from pathlib import Path
 from typing import Any
 
-from training_runs import SMALL, flags
+from support.training.training_runs import SMALL, flags
 
 BOUND = 120.0  # [s] for anything that a training does
 # Trainings of about two seconds, with checkpoints and evaluations as often as a kill is to find one.

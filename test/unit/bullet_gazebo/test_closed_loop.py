@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from robots import CartPole, cartpole_urdf
 from scipy.integrate import solve_ivp
+from support.robots.cartpole import CartPole, cartpole_urdf
 
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
+from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World

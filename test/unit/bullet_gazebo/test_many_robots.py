@@ -7,12 +7,12 @@ from types import FrameType
 from typing import Any
 
 import pytest
-from robots import cartpole_urdf
+from support.robots.cartpole import cartpole_urdf
 
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
+from bullet_gazebo.control.transmissions import read_description
+from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane

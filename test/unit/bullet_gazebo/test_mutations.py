@@ -6,7 +6,7 @@ from xml.etree.ElementTree import fromstring
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mutations_models import CASES, CONTROLLERS, SDF, URDF, WORLD, XACRO, spawn
+from support.mutations.models import CASES, CONTROLLERS, SDF, URDF, WORLD, XACRO, spawn
 
 from bullet_gazebo.physics.world import World
 

@@ -3,18 +3,18 @@
 import threading
 
 import pytest
-from robots import cartpole_urdf
+from support.robots.cartpole import cartpole_urdf
 
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
+from bullet_gazebo.control.transmissions import read_description
+from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import NotInLockstep, Simulator
-from bullet_gazebo.timing.fair_lock import FairLock
+from bullet_gazebo.timing import FairLock
 
 BOUND = 60.0  # [s]
 CART = {"type": "effort_controllers/JointPositionController", "joint": "stand_cart",

@@ -5,15 +5,14 @@ import math
 import re
 
 import pytest
-from robots import cartpole_urdf
-from robots_in_trouble import Rig, beyond_stops, urdf_of
-from trajectory_rig import Listener
+from support.robots.cartpole import cartpole_urdf
+from support.robots.robots_in_trouble import Rig, beyond_stops, urdf_of
+from support.robots.trajectory_rig import Listener
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.manager import STRICT
 from bullet_gazebo.control.pid import Gains
-from bullet_gazebo.control.trajectory.goal import GoalRequest
-from bullet_gazebo.control.trajectory.message import Trajectory, TrajectoryPoint
+from bullet_gazebo.control.trajectory_goals import GoalRequest, Trajectory, TrajectoryPoint
 
 INERTIA = 0.1  # [kg m²] of the wheel
 PLUGIN = '<gazebo><plugin filename="libgazebo_ros_control.so" name="c">{}</plugin></gazebo>'

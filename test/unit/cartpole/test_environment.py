@@ -5,8 +5,8 @@ import warnings
 import gymnasium
 import numpy as np
 import pytest
-from fake_plant import FakePlant, cartpole_world
 from gymnasium.utils.env_checker import check_env
+from support.robots.fake_plant import FakePlant, cartpole_world
 
 from cartpole.environment import CartPoleEnv
 from cartpole.robot import CONTROLLER

@@ -8,7 +8,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from environment_conformance import IDS, RICH
+from support.training.environment_conformance import IDS, RICH
 
 import cartpole  # noqa: F401 - registers the environments
 from robot_envs.testing import differences, rollout

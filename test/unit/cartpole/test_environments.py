@@ -6,7 +6,7 @@ import sys
 
 import gymnasium
 import pytest
-from environment_conformance import EnvironmentConformance
+from support.training.environment_conformance import EnvironmentConformance
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.environment import CartPoleEnv

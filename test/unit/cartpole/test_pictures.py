@@ -5,7 +5,7 @@ import math
 import gymnasium
 import numpy as np
 import pytest
-from pictures import pixel
+from support.pages.pictures import pixel
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.environment import CAMERA

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import workbench_runs
+from support.training import workbench_runs
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole import policy_node

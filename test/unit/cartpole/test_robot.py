@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from robots import CartPole
+from support.robots.cartpole import CartPole
 
 from cartpole.robot import CONTROL_PERIOD, CONTROLLER, ROBOT
 from cartpole.tasks import CartPoleState

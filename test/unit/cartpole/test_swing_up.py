@@ -5,8 +5,8 @@ import math
 import gymnasium
 import numpy as np
 import pytest
-from robots import GRAVITY, CartPole
 from scipy.linalg import solve_continuous_are
+from support.robots.cartpole import GRAVITY, CartPole
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.tasks import SET_POINT_STEP

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from fake_plant import cartpole_world
+from support.robots.fake_plant import cartpole_world
 
 from cartpole.robot import CART_JOINT, CONTROLLER, MODEL, POLE_JOINT
 from cartpole.tasks import (

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from training_runs import (
+from support.training.training_runs import (
     InterruptAfter,
     assert_same,
     assert_same_run,

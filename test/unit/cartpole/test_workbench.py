@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-import workbench_runs
+from support.training import workbench_runs
 
 from cartpole.workbench import PROGRAM, main
 

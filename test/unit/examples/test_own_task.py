@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 import torch
-from fake_plant import cartpole_world
 from gymnasium.utils.env_checker import check_env
+from support.robots.fake_plant import cartpole_world
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 LONGEST = 40  # [lines]

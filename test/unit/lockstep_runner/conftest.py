@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 import rospy
-from lockstep_world import Counter
+from support.ros.lockstep_world import Counter
 
 from lockstep_runner.runner import Runner
 

@@ -7,7 +7,7 @@ import pytest
 import rospy
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lockstep_world import MS, Counter
+from support.ros.lockstep_world import MS, Counter
 
 from lockstep_runner.notices import Notices
 from lockstep_runner.simulation import clock as module

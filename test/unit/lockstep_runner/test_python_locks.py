@@ -3,7 +3,7 @@
 import threading
 
 import pytest
-from lockstep_world import MS
+from support.ros.lockstep_world import MS
 
 from lockstep_runner import originals
 from lockstep_runner.replaced import python_locks, python_threads

@@ -9,7 +9,7 @@ from concurrent.futures import thread as pools
 
 import pytest
 import rospy
-from lockstep_world import MS
+from support.ros.lockstep_world import MS
 
 from lockstep_runner import originals
 from lockstep_runner.replaced import python_futures, python_threads

@@ -6,7 +6,7 @@ import time
 
 import pytest
 import rospy
-from lockstep_world import MS
+from support.ros.lockstep_world import MS
 
 from lockstep_runner import originals
 from lockstep_runner.silence import watch

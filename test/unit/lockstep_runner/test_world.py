@@ -6,7 +6,7 @@ import threading
 import pytest
 import rospy
 from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldResponse
-from ros_fakes import FakeMaster, FakeService, on_wire
+from support.ros.ros_fakes import FakeMaster, FakeService, on_wire
 
 from lockstep_runner.simulation import world as world_module
 from lockstep_runner.simulation.world import World, WorldFailed

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from mesh_files import binary_stl
-from new_robots import (
+from support.mutations.mesh_files import binary_stl
+from support.robots.new_robots import (
     BARE,
     FIXED,
     LINK,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from new_robots import (
+from support.robots.new_robots import (
     BARE,
     FIXED,
     JOINT,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from new_robots import (
+from support.robots.new_robots import (
     BARE,
     FIXED,
     LINK,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import yaml
-from mesh_files import binary_stl
-from new_robots import (
+from support.mutations.mesh_files import binary_stl
+from support.robots.new_robots import (
     BARE,
     JOINT,
     LIMIT,

@@ -15,7 +15,7 @@ ROOT = SRC.parent
 MODULES = sorted(SRC.rglob("*.py"))
 FOLDERS = sorted({path.parent for path in MODULES} | {SRC})
 OURS = {"bullet_gazebo", "cartpole", "rl_workbench", "robot_envs", "ros_calls", "ros_utils",
-        "file_reading", "lockstep_runner", "package_writing", "video_writing", "web_page"}  # fmt: skip
+        "files", "lockstep_runner", "package_writing", "viewer"}  # fmt: skip
 ROS = ("rospy", "rosgraph", "rosnode", "roslib", "rosparam", "roslaunch", "rosservice")
 ROS_ROOMS = (
     "bullet_gazebo/ros",
@@ -27,16 +27,15 @@ ROS_ROOMS = (
 
 # A library, and which of ours it may import.
 ALLOWED = {
-    "bullet_gazebo": {"ros_calls", "file_reading", "video_writing", "web_page"},
-    "ros_calls": {"file_reading"},
-    "file_reading": set(),
-    "ros_utils": {"ros_calls", "file_reading"},
-    "robot_envs": {"bullet_gazebo", "file_reading", "ros_calls", "ros_utils", "web_page"},
+    "bullet_gazebo": {"ros_calls", "files", "viewer"},
+    "ros_calls": {"files"},
+    "files": set(),
+    "ros_utils": {"ros_calls", "files"},
+    "robot_envs": {"bullet_gazebo", "files", "ros_calls", "ros_utils", "viewer"},
     "lockstep_runner": {"ros_calls"},
-    "package_writing": {"bullet_gazebo", "file_reading", "robot_envs", "ros_calls"},
-    "rl_workbench": {"file_reading", "video_writing", "web_page"},
-    "video_writing": set(),
-    "web_page": {"file_reading"},
+    "package_writing": {"bullet_gazebo", "files", "robot_envs", "ros_calls"},
+    "rl_workbench": {"files", "viewer"},
+    "viewer": {"files"},
     "cartpole": {"rl_workbench", "robot_envs"},
 }
 # A folder, and what nothing in it may import beside that.

@@ -5,7 +5,9 @@ import subprocess
 import sys
 
 import pytest
-from progress_plugin import ROSTEST, weight
+from support.plugins.progress_plugin import ROSTEST, weight
+
+PLUGIN = "support.plugins.progress_plugin"
 
 TEN_TESTS = """import pytest
 @pytest.mark.parametrize("number", range(10))
@@ -22,8 +24,8 @@ def run(tmp_path, root):
 
     def run(*options):
         done = subprocess.run(
-            [sys.executable, "-m", "pytest", "-p", "progress_plugin", "--rootdir", tmp_path, *options],
-            cwd=tmp_path, env={"PYTHONPATH": str(root / "test/support")}, text=True, check=False,
+            [sys.executable, "-m", "pytest", "-p", PLUGIN, "--rootdir", tmp_path, *options],
+            cwd=tmp_path, env={"PYTHONPATH": str(root / "test")}, text=True, check=False,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip
         assert done.returncode == 1, done.stdout

@@ -3,8 +3,8 @@
 import json
 from dataclasses import asdict
 
-from stress import table
-from stress.scenario import Row, Scenario
+from support.stress import table
+from support.stress.scenario import Row, Scenario
 
 
 def test_the_page_holds_what_was_measured() -> None:

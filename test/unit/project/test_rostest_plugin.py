@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 import pytest
-import rostest_plugin
+from support.plugins import rostest_plugin
 
 pytestmark = pytest.mark.slow
 

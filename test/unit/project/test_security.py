@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.files.model_file import read_entity
-from bullet_gazebo.physics.files.reading import Reading
-from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.physics.files.reading import Reading, Resources
+from bullet_gazebo.physics.files.world_file import read_entity
 from bullet_gazebo.scratch import scratch_folder
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -24,8 +23,6 @@ DANGEROUS = {
 }  # fmt: skip
 # The launcher runs the script that its user names, as `python3 script.py` does.
 RUNS_A_SCRIPT = {("src/lockstep_runner/script/running.py", name) for name in ("compile", "exec")}
-# What a worker is sent by its own driver, through Ray, all of whose calls are pickles.
-RUNS_A_SCRIPT |= {("src/rl_workbench/training/rollouts/worker.py", "pickle.loads")}
 MODEL = '<sdf version="1.6"><model name="m">{}</model></sdf>'
 INCLUDE = "<include><uri>{}</uri></include>"
 MESH = """<link name="l"><collision name="c"><geometry><mesh><uri>{}</uri></mesh></geometry></collision>

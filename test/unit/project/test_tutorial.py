@@ -129,14 +129,14 @@ def check_tutorial(run: Callable[[list[str]], tuple[int, str]]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.extras("imageio_ffmpeg", "optuna", "stable_baselines3", "Box2D")
+@pytest.mark.extras("optuna", "stable_baselines3", "Box2D")
 def test_every_command_of_the_tutorial_works(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     check_tutorial(here)
 
 
 @pytest.mark.long
-@pytest.mark.extras("imageio_ffmpeg", "optuna", "stable_baselines3", "Box2D")
+@pytest.mark.extras("optuna", "stable_baselines3", "Box2D")
 def test_every_command_of_the_tutorial_works_as_a_process(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     check_tutorial(as_process)

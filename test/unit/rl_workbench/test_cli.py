@@ -7,8 +7,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-import workbench_runs
-from training_runs import SMALL, flags, summary
+from support.training import workbench_runs
+from support.training.training_runs import SMALL, flags, summary
 
 from rl_workbench.cli import COMMANDS, main
 from rl_workbench.training.cli import PROGRAM

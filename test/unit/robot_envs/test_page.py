@@ -4,8 +4,8 @@ import math
 
 import gymnasium
 import pytest
-from rover import ROVER_ROBOT
-from viser_recording import Recording
+from support.pages.viser_recording import Recording
+from support.robots.bodies import ROVER_ROBOT
 
 import cartpole  # noqa: F401 - registers its environments
 from bullet_gazebo.physics.pose import Pose

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from pendulum import PENDULUM
-from rover import ROVER_ROBOT
+from support.robots.bodies import ROVER_ROBOT
+from support.robots.pendulum import PENDULUM
 
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from scenes.rover import ROVER, Push
-from scenes.two_arms import LEFT, RIGHT, Volley
+from support.scenes.rover import ROVER, Push
+from support.scenes.two_arms import LEFT, RIGHT, Volley
 
 from robot_envs import InitialState, Pose, RobotEnv
 

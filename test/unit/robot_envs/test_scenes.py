@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gymnasium.spaces import Box
-from scenes.rover import ROVER, Push
-from scenes.two_arms import LEFT, RIGHT, SKIN, Volley
+from support.scenes.rover import ROVER, Push
+from support.scenes.two_arms import LEFT, RIGHT, SKIN, Volley
 
 from robot_envs import (
     InitialState,

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from pendulum import FILES, MOTOR, PENDULUM, STRONGEST, hanging, make_pendulum
+from support.robots.pendulum import FILES, MOTOR, PENDULUM, STRONGEST, hanging, make_pendulum
 
 from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.errors import RobotEnvError
@@ -129,7 +129,8 @@ def test_the_same_seed_gives_the_same_bits():
 
 def test_nothing_of_the_cart_pole_nor_of_ros_is_loaded():
     script = (
-        "import sys, pendulum; env = pendulum.make_pendulum(varied=True); env.reset(seed=0);"
+        "import sys; from support.robots.pendulum import make_pendulum;"
+        "env = make_pendulum(varied=True); env.reset(seed=0);"
         "print([m for m in sys.modules if m.split('.')[0] in ('cartpole', 'rospy', 'ros_utils')])"
     )
     shown = subprocess.run(

@@ -7,10 +7,10 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.spaces import Box
-from scenes import broken
-from scenes.broken import of, wobbling
-from scenes.rover import ROVER, Push
-from scenes.solo_arm import SOLO, Hold, Reach
+from support.scenes import broken
+from support.scenes.broken import of, wobbling
+from support.scenes.rover import ROVER, Push
+from support.scenes.solo_arm import SOLO, Hold, Reach
 
 from robot_envs import GoalTask, RobotEnv, register
 from robot_envs.testing import check_robot_env, episodes, goals, repetition, suite
@@ -29,7 +29,7 @@ def test_so_does_a_rover_that_pushes_something():
 
 
 def test_so_does_one_with_an_id_and_options():
-    register("suite/Reach-v0", "scenes.solo_arm:SOLO", "scenes.solo_arm:Reach")
+    register("suite/Reach-v0", "support.scenes.solo_arm:SOLO", "support.scenes.solo_arm:Reach")
     options = {"sensor_noise": 0.01, "sensor_delay": 2, "action_delay": 1}
     check_robot_env("suite/Reach-v0", options=options, steps=STEPS)
     with pytest.raises(AssertionError, match="NameNotFound: Environment `Rich` doesn't exist"):

@@ -3,9 +3,9 @@
 import gymnasium
 import numpy as np
 import pytest
-from environment_conformance import IDS, RICH
 from gymnasium.utils.env_checker import data_equivalence as same
 from gymnasium.vector import AutoresetMode
+from support.training.environment_conformance import IDS, RICH
 
 import cartpole  # noqa: F401 - registers the environments
 import robot_envs.robots  # noqa: F401 - the same of others

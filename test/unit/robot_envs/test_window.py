@@ -4,7 +4,7 @@ import time
 
 import pybullet
 import pytest
-from pendulum import PENDULUM
+from support.robots.pendulum import PENDULUM
 
 from robot_envs.errors import RobotEnvError
 from robot_envs.pictures import window

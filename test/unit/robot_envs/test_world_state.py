@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from pendulum import MOTOR, PENDULUM, hanging
+from support.robots.pendulum import MOTOR, PENDULUM, hanging
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.in_process import InProcessWorld

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scenes.solo_arm import NOTHING, SOLO, Hold, Reach, episode, is_a_line
+from support.scenes.solo_arm import NOTHING, SOLO, Hold, Reach, episode, is_a_line
 
 from robot_envs import InitialState, Robot, RobotEnv, RobotEnvError
 from robot_envs.making import make_environment
@@ -80,17 +80,25 @@ def test_a_refused_action_moves_nothing():
 @pytest.mark.parametrize(
     ("robot", "task", "text"),
     [
-        ("scenes.solo_arm", "Hold", "'scenes.solo_arm' must be written as module:attribute"),
-        ("scenes.solo_am:SOLO", "Hold", "no module 'scenes.solo_am'"),
-        ("scenes.solo_arm:SOLE", "Hold", "has no 'SOLE'; did you mean 'SOLO'"),
-        ("scenes.solo_arm:arm", "Hold", "is <function arm at .*no robot_envs.Robot, nor a list"),
-        ("scenes.solo_arm:SOLO", "Hol", "has no 'Hol'; did you mean 'Hold'"),
-        ("scenes.solo_arm:SOLO", "SOLO", "which is no class of robot_envs.Task"),
+        (
+            "support.scenes.solo_arm",
+            "Hold",
+            "'support.scenes.solo_arm' must be written as module:attribute",
+        ),
+        ("support.scenes.solo_am:SOLO", "Hold", "no module 'support.scenes.solo_am'"),
+        ("support.scenes.solo_arm:SOLE", "Hold", "has no 'SOLE'; did you mean 'SOLO'"),
+        (
+            "support.scenes.solo_arm:arm",
+            "Hold",
+            "is <function arm at .*no robot_envs.Robot, nor a list",
+        ),
+        ("support.scenes.solo_arm:SOLO", "Hol", "has no 'Hol'; did you mean 'Hold'"),
+        ("support.scenes.solo_arm:SOLO", "SOLO", "which is no class of robot_envs.Task"),
     ],
 )
 def test_names_of_what_an_id_is_made_of(robot, task, text):
     with pytest.raises(RobotEnvError, match=text) as error:
-        make_environment(robot, f"scenes.solo_arm:{task}")
+        make_environment(robot, f"support.scenes.solo_arm:{task}")
     assert is_a_line(error.value)
 
 
@@ -98,4 +106,6 @@ def test_an_option_that_nobody_knows():
     with pytest.raises(
         RobotEnvError, match="no option 'sensor_noize'; did you mean 'sensor_noise'"
     ):
-        make_environment("scenes.solo_arm:SOLO", "scenes.solo_arm:Hold", sensor_noize=1)
+        make_environment(
+            "support.scenes.solo_arm:SOLO", "support.scenes.solo_arm:Hold", sensor_noize=1
+        )

@@ -4,8 +4,8 @@ import math
 from dataclasses import replace
 
 import pytest
-from scenes.solo_arm import SOLO, episode, is_a_line
-from scenes.two_arms import LEFT_CONTROLLERS
+from support.scenes.solo_arm import SOLO, episode, is_a_line
+from support.scenes.two_arms import LEFT_CONTROLLERS
 
 from robot_envs import Pose, RobotEnvError
 

@@ -5,8 +5,8 @@ import math
 import gymnasium
 import numpy as np
 import pytest
-from scenes.solo_arm import Hold, Reach, episode, is_a_line
-from scenes.two_arms import PLINTH
+from support.scenes.solo_arm import Hold, Reach, episode, is_a_line
+from support.scenes.two_arms import PLINTH
 
 from robot_envs import InitialState, LinkQuery, Object, Pose, RobotEnvError, StateQuery
 

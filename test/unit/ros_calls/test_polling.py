@@ -7,8 +7,8 @@ import math
 import os
 
 import pytest
-from ros_fakes import FakeService, ok
 from std_srvs.srv import SetBool, SetBoolRequest
+from support.ros.ros_fakes import FakeService, ok
 
 from ros_calls import polling
 from ros_calls.polling import FIRST_REST, FORGIVEN, LONGEST, LONGEST_REST, RECENT, AdaptivePoll

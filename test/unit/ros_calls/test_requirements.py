@@ -21,8 +21,8 @@ SRC = ROOT / "src"
 STARTED = "\n".join(
     [
         "import sys, bullet_gazebo.ros.node.gzserver",
-        "from bullet_gazebo.physics.engines.registry import make_engine",
-        "import bullet_gazebo.physics.meshes.collada, bullet_gazebo.physics.meshes.hull",
+        "from bullet_gazebo.physics.engines import make_engine",
+        "import bullet_gazebo.physics.files.mesh_formats, bullet_gazebo.physics.files.mesh_formats",
         "make_engine()",
         "print(*sys.modules)",
     ]

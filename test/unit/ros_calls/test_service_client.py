@@ -7,8 +7,8 @@ import time
 
 import pytest
 import rospy
-from ros_fakes import FakeService, failed, ok
 from std_srvs.srv import Empty, SetBool, SetBoolRequest
+from support.ros.ros_fakes import FakeService, failed, ok
 
 from ros_calls import master as ros_master
 from ros_calls.service import (

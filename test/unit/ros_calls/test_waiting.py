@@ -8,8 +8,8 @@ import time
 
 import pytest
 import rospy
-from ros_fakes import FakeService
 from std_srvs.srv import SetBool
+from support.ros.ros_fakes import FakeService
 
 from ros_calls import master as ros_master
 from ros_calls.service import ServiceMissing

@@ -9,18 +9,18 @@ from bullet_gazebo.control.controllers.forward import (
     VelocityGroup,
     VelocityJoint,
 )
-from bullet_gazebo.control.controllers.group_position import EffortGroupPosition
-from bullet_gazebo.control.controllers.joint_position import (
-    EffortJointPosition,
-    VelocityJointPosition,
-)
 from bullet_gazebo.control.controllers.joint_state import JointStateController
 from bullet_gazebo.control.controllers.joint_trajectory import (
     EffortTrajectory,
     PositionTrajectory,
     VelocityTrajectory,
 )
-from bullet_gazebo.control.controllers.joint_velocity import EffortJointVelocity
+from bullet_gazebo.control.controllers.pid_controllers import (
+    EffortGroupPosition,
+    EffortJointPosition,
+    EffortJointVelocity,
+    VelocityJointPosition,
+)
 
 BUILT_IN: dict[str, type[Controller]] = {
     controller.type_name: controller

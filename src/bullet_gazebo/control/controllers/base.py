@@ -12,11 +12,14 @@ from bullet_gazebo.control.pid import Loop, Pid, one_listener
 
 
 class Output:
-    """A topic that a controller writes to: `sink` takes a record, if there is one. `listeners` tells how many
-    hear it; records for nobody needn't be made.
+    """A topic that a controller publishes.
 
-    `topic` is relative to the controller's namespace, or to the manager's if `shared`. `kind` names a
-    record of control/samples.py, or is a ROS message type whose messages are then published as they are.
+    `topic` is relative to the controller's namespace, or to the manager's if `shared`. `kind` is a ROS
+    message type, whose messages are published as they are, or names one of the records that the ROS
+    adapters convert: JointState, JointControllerState, ...
+
+    `sink` takes the records, once a ROS adapter has set it. `listeners` returns the number of subscribers,
+    so that no record needs to be made for nobody.
     """
 
     __slots__ = ("kind", "listeners", "shared", "sink", "topic")

@@ -4,17 +4,27 @@ See docs/contract/ros_control.md 3.1.
 """
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from bullet_gazebo.control.controllers.base import Controller, Output, number_param
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import STATE, RobotHardware
 from bullet_gazebo.control.joint import JointHandle
-from bullet_gazebo.control.samples import JointStateSample
 
 NANOSECONDS = 1_000_000_000
 SLOWEST = 1e-6  # [Hz]; below it, as at 0, nothing is ever published
 Extra = tuple[str, float, float, float]  # a constant joint: name, position, velocity, effort
 EXTRA_FIELDS = ("position", "velocity", "effort")
+
+
+class JointStateSample(NamedTuple):
+    """sensor_msgs/JointState: positions [rad, m], velocities [rad/s, m/s], efforts [N m, N]."""
+
+    stamp: int  # [ns]
+    names: tuple[str, ...]
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...]
+    efforts: tuple[float, ...]
 
 
 class JointStateController(Controller):

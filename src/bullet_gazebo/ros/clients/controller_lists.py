@@ -1,7 +1,7 @@
 """Finds and filters controller managers and controllers: the Python module `controller_manager_msgs.utils`.
 
-rqt's plugins use it. Names and effects are those that ros_control documents; a namespace is the manager's own,
-such as `/my_robot/controller_manager` (docs/contract/ros_control.md 1.1).
+rqt's plugins use it. Names and effects are those that ros_control documents; a namespace is the manager's
+own, such as `/my_robot/controller_manager` (docs/contract/ros_control.md 1.1).
 """
 
 from collections.abc import Iterable, Sequence
@@ -104,8 +104,8 @@ def get_rosparam_controller_names(namespace: str = "/") -> list[str]:
     return found
 
 
-# The filters take and return lists, and keep the order. With `match_substring` the text only has to contain the
-# wanted one.
+# The filters take and return lists, and keep the order. With `match_substring` the text only has to contain
+# the wanted one.
 
 
 def filter_by_name(

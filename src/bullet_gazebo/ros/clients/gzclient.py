@@ -23,8 +23,7 @@ from bullet_gazebo.ros.common.rospy_node import stop_hearing_clock
 from ros_calls.nodes import living_address
 from ros_calls.requirements import WINDOW, lack
 from ros_calls.xmlrpc import NoAnswer
-from web_page.address import PortInUse, find_address
-from web_page.flags import add_flags
+from viewer.address import PortInUse, add_flags, find_address
 
 NAME = "gazebo_gui"
 

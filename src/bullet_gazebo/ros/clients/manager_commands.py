@@ -93,7 +93,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _run("controller_manager", lambda: _on_controllers(steps, rest))
     if (command, *rest) in ON_MANAGER:
         services, act = ON_MANAGER[command, *rest]
-        return _run("controller_manager", lambda: (_require(services), act()))
+        return _run("controller_manager", lambda: _on_manager(services, act))
     print(MANAGER_USAGE)
     return 0 if command in HELP else 2
 
@@ -119,6 +119,11 @@ def _run(name: str, act: Callable[[], object]) -> int:
         print(f"{name}: {fault}", file=sys.stderr)
         return 1
     return 0
+
+
+def _on_manager(services: Sequence[str], act: Callable[[], object]) -> None:
+    _require(services)
+    act()
 
 
 def _on_controllers(steps: Sequence[Step], names: Sequence[str]) -> None:

@@ -1,9 +1,9 @@
 """Clients of a controller manager (docs/contract/ros_control.md 2).
 
-The functions are the Python module `controller_manager.controller_manager_interface`. They print what they did,
-in the words of the script `controller_manager`, and those that change something return whether the manager did
-it. They talk to the manager in the namespace of the program, need no initialised node, and wait for its services
-without limit. rospy.ServiceException says that the manager went away during a call.
+The functions are the Python module `controller_manager.controller_manager_interface`. They print what they
+did, in the words of the script `controller_manager`, and those that change something return whether the
+manager did it. They talk to the manager in the namespace of the program, need no initialised node, and wait
+for its services without limit. rospy.ServiceException says that the manager went away during a call.
 
 `ManagerClient` is the same with a time limit on each call, for spawner and unspawner.
 """

@@ -1,9 +1,9 @@
 """The command shown_joints.py: a robot's joint states and place for RViz, thirty times a second.
 
-RViz draws a link white, and at the wrong place, until it knows where the link is. Joint states come only while
-simulated time passes, in a paused world or in lock-step maybe never. So until one comes, this node asks the
-simulator by a service that answers while paused, too. Then it forwards the newest state; not those of
-joint_state_publisher, which are zeros.
+RViz draws a link white, and at the wrong place, until it knows where the link is. Joint states come only
+while simulated time passes, in a paused world or in lock-step maybe never. So until one comes, this node
+asks the simulator by a service that answers while paused, too. Then it forwards the newest state; not those
+of joint_state_publisher, which are zeros.
 
 Of a robot that isn't fixed to the world nobody publishes the place to tf: this node asks the simulator, and
 publishes the transform from world to the root link.

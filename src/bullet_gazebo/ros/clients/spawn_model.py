@@ -84,7 +84,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )  # fmt: skip
     parser.add_argument("-package_to_model", action="store_true",
                         help="meshes: model:// instead of package://")  # fmt: skip
-    parser.add_argument("-b", dest="bond", action="store_true", help="stay, and delete the model at the end")
+    parser.add_argument(
+        "-b", dest="bond", action="store_true", help="stay, and delete the model at the end"
+    )
     options = parser.parse_args([_not_an_option(argument) for argument in arguments])
     options.joints = [(name, _position(parser, text)) for name, text in options.joints]
     return options
@@ -137,7 +139,7 @@ def _spawn(options: argparse.Namespace, xml: str, gazebo: str) -> None:
 
 
 class _Bond:
-    """Deletes the model when the node is shut down, also in the middle of the ``with`` block that spawns it."""
+    """Deletes the model at the node's shutdown, also in the middle of the block that spawns it."""
 
     def __init__(self, gazebo: str, model: str) -> None:
         self._service, self._model = f"{gazebo}/delete_model", model

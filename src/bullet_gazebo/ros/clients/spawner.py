@@ -1,7 +1,8 @@
 """The commands `spawner` and `unspawner` of package controller_manager (docs/contract/ros_control.md 2).
 
-spawner loads and starts controllers, and stays until it is shut down; then it stops and unloads them. unspawner
-stops controllers, again whenever somebody starts them; when it is shut down, it starts those that it stopped.
+spawner loads and starts controllers, and stays until it is shut down; then it stops and unloads them.
+unspawner stops controllers, again whenever somebody starts them; when it is shut down, it starts those that
+it stopped.
 """
 
 import argparse

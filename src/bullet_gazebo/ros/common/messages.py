@@ -10,10 +10,11 @@ from geometry_msgs.msg import Pose as PoseMsg
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from bullet_gazebo.control.samples import JointControllerSample, JointStateSample
+from bullet_gazebo.control.controllers.joint_state import JointStateSample
+from bullet_gazebo.control.controllers.pid_controllers import JointControllerSample
 from bullet_gazebo.physics import pose as poses
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.state.contacts import ContactPair
+from bullet_gazebo.state import ContactPair
 
 NANOSECONDS = 1_000_000_000
 LARGEST = 1e12  # in any SI unit; beyond it the engine's arithmetic ends in infinities

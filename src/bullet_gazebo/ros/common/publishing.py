@@ -135,7 +135,9 @@ class Thinner:
                     topic.flush()
                 except Exception:  # noqa: BLE001 - a message that can't be sent silences no other topic
                     if not rospy.is_shutdown():
-                        rospy.logerr_throttle(REPEAT, f"a message is lost:\n{traceback.format_exc()}")
+                        rospy.logerr_throttle(
+                            REPEAT, f"a message is lost:\n{traceback.format_exc()}"
+                        )
 
     def _stop(self) -> None:
         self._ending.set()

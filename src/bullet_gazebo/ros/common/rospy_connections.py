@@ -1,9 +1,9 @@
-"""Changes of rospy that protect the node from clients which connect and then send nothing, too much or nonsense.
+"""Changes of rospy that protect the node from clients that send nothing, too much or nonsense.
 
 - `Reception`: a client that sends nothing keeps all others out; many of them, or a lack of file
   descriptors, end the thread that accepts connections (gazebo_clients.test, test_connections.py)
 - `bound_messages`: rospy reads whatever size a client claims into memory (test_connections.py)
-- `bound_calls`: so does its XML-RPC server, where silent clients keep a thread each for ever (test_connections.py)
+- `bound_calls`: so does its XML-RPC server, where silent clients keep a thread each for ever (the same)
 - `hang_up_on_nonsense`: a client whose request can't be read waits for ever (gazebo_clients.test)
 """
 

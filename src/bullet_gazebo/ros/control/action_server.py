@@ -21,9 +21,9 @@ ENDED = (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalSta
 class SteadyActionServer(ActionServer):
     """An action server without a timer: its owner calls publish_status() now and then.
 
-    actionlib's own timer stands still with simulated time, and dies when it goes back. Then the status of an
-    ended goal would be kept until time has passed its old value, and a stamped cancel request would refuse all
-    goals until then.
+    actionlib's own timer stands still with simulated time, and dies when it goes back. Then the status of
+    an ended goal would be kept until time has passed its old value, and a stamped cancel request would
+    refuse all goals until then.
     """
 
     last_cancel: rospy.Time

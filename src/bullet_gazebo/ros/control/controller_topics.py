@@ -1,4 +1,4 @@
-"""Topics of loaded controllers and PIDs: they exist from load to unload (docs/contract/ros_control.md 1.4 and 4)."""
+"""Topics of controllers and PIDs, from load to unload (docs/contract/ros_control.md 1.4 and 4)."""
 
 import math
 import traceback
@@ -16,8 +16,7 @@ from bullet_gazebo.control.controllers.base import Controller, Input, Output
 from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryController
 from bullet_gazebo.control.errors import ControlError, faults
 from bullet_gazebo.control.manager import ControllerManager
-from bullet_gazebo.control.pid import Gains, Pid
-from bullet_gazebo.control.samples import PidSample
+from bullet_gazebo.control.pid import Gains, Pid, PidSample
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import to_joint_controller_state, to_joint_state, to_time
 from bullet_gazebo.ros.common.publishing import ThinnedTopic, Thinner
@@ -84,9 +83,7 @@ class ControllerTopics:
     def _publish(self, output: Output, namespace: str) -> None:
         # A user's controller names a message type, and sends messages as they are.
         kind, convert, queue = (
-            OUTPUTS[output.kind]
-            if isinstance(output.kind, str)
-            else (output.kind, lambda sample: sample, 1)
+            OUTPUTS[output.kind] if isinstance(output.kind, str) else (output.kind, _unchanged, 1)
         )
         publisher = rospy.Publisher(
             rospy.names.ns_join(namespace, output.topic), kind, queue_size=queue, tcp_nodelay=True
@@ -110,12 +107,12 @@ class ControllerTopics:
 
     def _subscribe(self, port: Input, namespace: str) -> None:
         topic = rospy.names.ns_join(namespace, port.topic)
-        own = isinstance(port.kind, str)
-        kind, read = INPUTS[port.kind] if own else (port.kind, lambda message: message)
+        known = isinstance(port.kind, str)
+        kind, read = INPUTS[port.kind] if isinstance(port.kind, str) else (port.kind, _unchanged)
 
         def receive(message: object) -> None:
             command = read(message)
-            if own and not _finite(command):
+            if known and not _finite(command):
                 rospy.logerr_throttle(
                     REPEAT, f"{topic}: a command is not finite: no effort, or the position is held"
                 )
@@ -136,6 +133,10 @@ class ControllerTopics:
     def shutdown(self) -> None:
         """Closes all of them."""
         self._closing.close()
+
+
+def _unchanged(message: Any) -> Any:
+    return message
 
 
 def _publish(publisher: rospy.Publisher, message: Any) -> None:

@@ -24,15 +24,17 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryController
-from bullet_gazebo.control.trajectory.goal import (
+from bullet_gazebo.control.trajectory_goals import (
     ABORTED,
     SUCCEEDED,
     GoalRequest,
     Outcome,
+    Tolerance,
+    Trajectory,
+    TrajectoryPoint,
+    TrajectoryRefused,
     TrajectorySample,
 )
-from bullet_gazebo.control.trajectory.message import Trajectory, TrajectoryPoint, TrajectoryRefused
-from bullet_gazebo.control.trajectory.tolerances import Tolerance
 from bullet_gazebo.ros.common.messages import to_time
 from bullet_gazebo.ros.control.action_server import SteadyActionServer
 from bullet_gazebo.simulator import Simulator
@@ -225,7 +227,9 @@ def to_controller_state(sample: TrajectorySample) -> JointTrajectoryControllerSt
 def _fields(sample: TrajectorySample) -> tuple[Any, ...]:
     """Returns header, names, desired, actual, error: the fields of state and feedback, in their order."""
     points = [
-        JointTrajectoryPoint(**dict(zip(("positions", "velocities", "accelerations"), values, strict=False)))
+        JointTrajectoryPoint(
+            **dict(zip(("positions", "velocities", "accelerations"), values, strict=False))
+        )
         for values in (sample.desired, sample.actual, sample.error)
     ]
     return Header(stamp=to_time(sample.stamp)), sample.names, *points

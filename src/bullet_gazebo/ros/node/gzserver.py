@@ -1,4 +1,4 @@
-"""The commands `gzserver`, which runs the node `gazebo`, and `gazebo`, which runs it together with its window."""
+"""The node `gazebo`: the command `gzserver`, and `gazebo`, which also opens the window."""
 
 import argparse
 import contextlib
@@ -15,7 +15,7 @@ import rospy
 
 from bullet_gazebo.heap import use_one_arena
 from bullet_gazebo.physics.engine import Engine
-from bullet_gazebo.physics.engines.registry import BULLET, ENGINES, EngineError, make_engine
+from bullet_gazebo.physics.engines import BULLET, ENGINES, EngineError, make_engine
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures.recording import RecordingError, RecordingOptions, SimulationRecorder
 from bullet_gazebo.ros.common.node_process import (

@@ -1,4 +1,4 @@
-"""The node's name at the master: refused to a second simulator, and registered again at a restarted master."""
+"""The node's name at the master: refused to a second simulator, registered again at a new master."""
 
 import threading
 from collections.abc import Callable

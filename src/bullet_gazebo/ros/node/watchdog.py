@@ -16,7 +16,7 @@ import rospy
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.timing.fair_lock import FairLock
+from bullet_gazebo.timing import FairLock
 
 STOP_TIMEOUT = 5.0  # [s] for the tick in progress
 GRACE = 0.5  # [s] the same where the tick was found to hang

@@ -1,8 +1,8 @@
 """The XML-RPC call `gazeboWorld` of the simulator's node, which `gz world` makes.
 
-Every ROS node answers XML-RPC calls of master and tools (getPid, shutdown and so on). The simulator answers one
-more: it is found by the node's name from any machine, and is neither a topic nor a service, of which there
-must be only Gazebo's own (docs/contract/gazebo.md 7).
+Every ROS node answers XML-RPC calls of master and tools (getPid, shutdown and so on). The simulator answers
+one more: it is found by the node's name from any machine, and is neither a topic nor a service, of which
+there must be only Gazebo's own (docs/contract/gazebo.md 7).
 """
 
 from collections.abc import Callable

@@ -10,10 +10,10 @@ import rosgraph
 import rospy
 from std_msgs.msg import Bool
 
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import GAINS, RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
+from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.ros.control.controller_services import ControllerServices
 from bullet_gazebo.ros.control.controller_topics import PidTopics
@@ -61,7 +61,7 @@ class ControlPlugin:
                 self._sim.remove_robot(self._robot)
 
     def _wait_and_start(self) -> None:
-        """Waits for the robot description. Gazebo blocks the whole world meanwhile; here only this model waits."""
+        """Waits for the robot description. Gazebo blocks the world meanwhile; here only this model waits."""
         reminder = time.monotonic() + REMIND
         while not self._gone.wait(POLL) and not rospy.is_shutdown() and not self._try_start():
             if time.monotonic() >= reminder:

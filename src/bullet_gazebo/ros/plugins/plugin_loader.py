@@ -1,7 +1,8 @@
 """Finds, starts and ends the plugins that a model file names by their shared libraries.
 
-A user's plugin is registered by a parameter (docs/plugins.md). Its exceptions are caught wherever it is called,
-SystemExit and KeyboardInterrupt included: a Ctrl-C raises nothing in this process (common/node_process.py).
+A user's plugin is registered by a parameter (docs/plugins.md). Its exceptions are caught wherever it is
+called, SystemExit and KeyboardInterrupt included: a Ctrl-C raises nothing in this process
+(common/node_process.py).
 """
 
 import importlib

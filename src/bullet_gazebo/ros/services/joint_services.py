@@ -28,10 +28,10 @@ from gazebo_msgs.srv import (
     SetModelConfigurationResponse,
 )
 
+from bullet_gazebo.applied_forces import AppliedEffort, AppliedWrench, Interval, in_world
 from bullet_gazebo.physics.properties import JointProperties, PropertyError, set_joint_properties
 from bullet_gazebo.ros.common.messages import bad_number, to_vector
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.timing.applied_forces import AppliedEffort, AppliedWrench, Interval, in_world
 
 LONGEST_NAME = 80  # of a joint in the log
 MOST_NAMES = 10  # in a line of the log

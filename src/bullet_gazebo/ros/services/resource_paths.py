@@ -7,7 +7,7 @@ from pathlib import Path
 
 import rospkg
 
-from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.physics.files.reading import Resources
 from files.content import FileError, read_file
 from files.xml_text import decode, parse
 

@@ -18,10 +18,15 @@ from gazebo_msgs.srv import (
 )
 
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
-from bullet_gazebo.physics.elements import shown
-from bullet_gazebo.physics.files.model_file import UnknownFormat, read_entity
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.files.reading import Reading
-from bullet_gazebo.physics.files.world_file import WorldDescription, empty_world, load_world
+from bullet_gazebo.physics.files.world_file import (
+    UnknownFormat,
+    WorldDescription,
+    empty_world,
+    load_world,
+    read_entity,
+)
 from bullet_gazebo.physics.pose import Pose, is_finite
 from bullet_gazebo.physics.world import NameTaken
 from bullet_gazebo.ros.common.messages import from_pose_msg

@@ -30,7 +30,7 @@ from geometry_msgs.msg import Vector3
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
-from bullet_gazebo.physics.settings import SolverSettings
+from bullet_gazebo.physics.world import SolverSettings
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import bad_number, from_pose_msg, to_vector
 from bullet_gazebo.ros.services.joint_services import ForceServices, JointServices

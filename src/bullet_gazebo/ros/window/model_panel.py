@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from bullet_gazebo.physics.elements import shown
+from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.pictures.page import DrawnModel
 from bullet_gazebo.pictures.visuals import VisibleJoint
 from bullet_gazebo.ros.window.panels import Attempt, Controllers
@@ -54,7 +54,9 @@ class ModelPanel:
         self._start: np.ndarray | None = None  # [m] where the followed model was at first
         self._followed = ""
         self._turn = threading.Lock()
-        self._wanted: dict[tuple[str, str], float] = {}  # [rad, m] by model and joint, not yet carried out
+        self._wanted: dict[
+            tuple[str, str], float
+        ] = {}  # [rad, m] by model and joint, not yet carried out
         self._touched: dict[str, float] = {}  # [s] when somebody moved a joint's slider
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._choice = server.gui.add_dropdown("Model", [NONE], initial_value=NONE)
@@ -104,7 +106,7 @@ class ModelPanel:
         return slider
 
     def _move_newest(self, model: str, joint: str) -> None:
-        """Moves a joint to where its slider was left; threads with older positions may wait for the same lock."""
+        """Moves a joint to where its slider was left; older positions may wait for the same lock."""
         with self._turn:
             position = self._wanted.pop((model, joint), None)
             if position is not None:

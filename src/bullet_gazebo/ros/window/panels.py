@@ -65,7 +65,9 @@ class TimePanel:
         steps = gui.add_number("Steps", 100, min=1, max=MOST_STEPS, step=1)
         many = gui.add_button("Do these steps", icon=viser.Icon.PLAYER_TRACK_NEXT)
         many.on_click(lambda _: attempt(lambda: commands.step(int(steps.value))))
-        world = gui.add_button("Reset world", hint="put models back to where they were spawned; time goes on")
+        world = gui.add_button(
+            "Reset world", hint="put models back to where they were spawned; time goes on"
+        )
         world.on_click(lambda _: attempt(lambda: commands.reset(everything=False)))
         simulation = gui.add_button("Reset simulation", hint="set joints and time to zero as well")
         simulation.on_click(lambda _: attempt(lambda: commands.reset(everything=True)))

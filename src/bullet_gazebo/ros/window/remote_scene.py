@@ -1,4 +1,4 @@
-"""The window's connection to the simulator: the scene that it subscribes to, and the commands that it calls."""
+"""The window's connection to the simulator: the scene that it sees, and the commands that it sends."""
 
 import threading
 import time

@@ -23,9 +23,9 @@ from bullet_gazebo.ros.window.model_panel import ModelPanel
 from bullet_gazebo.ros.window.panels import Controllers, TimePanel
 from bullet_gazebo.ros.window.remote_scene import Commands, RemoteScene
 from ros_calls.service import ServiceFailed
-from web_page.address import Address
-from web_page.curves import Curves
-from web_page.server import open_browser, serve, stop
+from viewer.address import Address
+from viewer.curves import Curves
+from viewer.server import open_browser, serve, stop
 
 TITLE = "gzclient"
 CAMERA, LOOK_AT = (1.4, -1.9, 1.1), (0.0, 0.0, 0.35)  # [m]
@@ -33,7 +33,11 @@ ADVICE = "~window"  # parameter: the lines that say where the page is
 CURVES = "~curves"  # parameter: a run folder, or the table of one
 TRAINED = "/gazebo_gui/curves"  # the same; a training sets it, for windows of any name
 WAIT = 0.5  # [s] for a message
-OFTEN, SELDOM, CURVES_PERIOD = 0.25, 2.0, 1.0  # [s] between two updates of texts, controllers, curves
+OFTEN, SELDOM, CURVES_PERIOD = (
+    0.25,
+    2.0,
+    1.0,
+)  # [s] between two updates of texts, controllers, curves
 NOTICE = 8.0  # [s] that a fault is shown
 RENDERING = 30.0  # [s] for a browser to draw a screenshot
 WORLD = "/world"  # the scene node above all models
@@ -197,7 +201,7 @@ class TrainingTab:
             if self._curves is None:
                 self._curves = Curves(self._server.gui, self._tabs.add_tab("Training"))
             self._curves.follow(Path(named))
-        return self._curves is not None and self._curves.look()
+        return self._curves is not None and self._curves.update()
 
 
 def show(address: Address, browser: bool) -> None:
@@ -212,7 +216,9 @@ def show(address: Address, browser: bool) -> None:
         advice = address.advice("the window", "moves the simulation")
         for line in advice:
             print(f"gzclient: {line}", flush=True)
-        if not address.token:  # a token is for nobody else; without one other programs may show the lines
+        if (
+            not address.token
+        ):  # a token is for nobody else; without one other programs may show the lines
             rospy.set_param(ADVICE, advice)
         if browser:  # may block until its user closes it
             threading.Thread(target=open_browser, args=(address, _warn), daemon=True).start()

@@ -214,18 +214,6 @@ class ReinforceAgent(TwoNetworks):
     def _value_loss(self, observations: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
         return nn.functional.mse_loss(self.value(observations).squeeze(1), targets)
 
-    def policy_state(self) -> dict[str, Any]:
-        """What another agent of these options needs to act as this one does."""
-        normaliser = None if self._normaliser is None else self._normaliser.state_dict()
-        return {"policy": self._network.state_dict(), "normaliser": normaliser}
-
-    def act_by(self, state: dict[str, Any]) -> None:
-        """Acts as the agent whose `policy_state` this is."""
-        if self._normaliser is not None:
-            self._normaliser.load_state_dict(state["normaliser"])
-        self._network.load_state_dict(state["policy"])
-        self.sync()
-
     def state_dict(self) -> dict[str, Any]:
         """As every learner's, with the episodes that wait for their batch to fill."""
         return {

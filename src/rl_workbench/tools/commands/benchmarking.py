@@ -10,7 +10,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from file_reading.content import open_text
+from files.content import open_text
 from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.plotting.curves import evaluation_curves, seed_curves

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from file_reading.content import open_text
+from files.content import open_text
 from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.extras import need

@@ -15,7 +15,7 @@ from rl_workbench.tools.viewing.page import Place, Wanted, show_run
 from rl_workbench.tools.viewing.recorder import POLICIES
 from rl_workbench.training.environments.names import import_module_of
 from rl_workbench.training.run.interrupt import Interrupt
-from web_page.flags import add_flags as add_page_flags
+from viewer.address import add_flags as add_page_flags
 
 KINDNESS = 10  # of a page beside a training: whatever it does, the training goes first
 

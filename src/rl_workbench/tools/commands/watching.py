@@ -39,7 +39,7 @@ from rl_workbench.training.environments.names import threshold
 from rl_workbench.training.run.files import as_json, check_writable, write_file
 from rl_workbench.training.run.interrupt import Interrupt
 from rl_workbench.training.run.progress import tell
-from web_page.address import LOOPBACK
+from viewer.address import LOOPBACK
 
 WINDOWS = (*DISPLAYS, "SDL_VIDEODRIVER")  # where any of them is given, a window may be opened
 

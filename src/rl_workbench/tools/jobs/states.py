@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from file_reading.content import open_text
+from files.content import open_text
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.jobs.job import last_words, log_of
 from rl_workbench.tools.jobs.ledger import ALIVE, DONE, FAILED, NAME, RUNNING, WAITING, Entry

@@ -14,7 +14,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.pictures.filming import Player, Recorded, Shot, frame_rate, shots
 from rl_workbench.training.environments.making import shares_robot
 from rl_workbench.training.run.files import write_file
-from web_page.hidden import hidden_page
+from viewer.server import hidden_page
 
 DRAW = "draw_on"  # method of an environment
 END = 1.0  # [s] for which the end is seen, before it begins anew

@@ -13,9 +13,8 @@ import numpy as np
 from PIL import Image
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.extras import installing
 from rl_workbench.training.run.files import write_file
-from video_writing.mp4 import EncoderFailed, Mp4Writer, find_encoder
+from viewer.video import EncoderFailed, Mp4Writer
 
 RATES = {
     ".gif": 25.0,
@@ -36,24 +35,11 @@ def check_format(path: Path) -> None:
     """
     if path.suffix.lower() not in RATES:
         raise WorkbenchError(f"a video's name ends in {' or '.join(RATES)}: not {path}")
-    if path.suffix.lower() == ".mp4":
-        _encoder()
 
 
 def default_rate(path: Path) -> float:
     """Frames a second [Hz] of a video whose rate nobody asked for."""
     return RATES[path.suffix.lower()]
-
-
-def _encoder() -> str:
-    try:
-        return find_encoder()
-    except EncoderFailed as error:
-        command = installing("imageio-ffmpeg")
-        raise WorkbenchError(
-            f"MP4, unlike GIF, needs ffmpeg, an extra: {command} installs it, "
-            "and so does apt-get install ffmpeg"
-        ) from error
 
 
 def write_video(path: Path, frames: Sequence[np.ndarray], rate: float) -> None:
@@ -108,7 +94,7 @@ def _write_mp4(stream: BinaryIO, frames: Sequence[np.ndarray], rate: float) -> N
     """ffmpeg writes files only, so it writes one beside."""
     with tempfile.TemporaryDirectory(prefix="cartpole_") as folder:
         path = Path(folder, "video.mp4")
-        writer = Mp4Writer(path, rate, _encoder())
+        writer = Mp4Writer(path, rate)
         try:
             try:
                 for frame in frames:

@@ -15,7 +15,7 @@ import torch
 from gymnasium import spaces
 from torch import nn
 
-from file_reading.content import open_file
+from files.content import open_file
 from rl_workbench.errors import WorkbenchError
 
 FORMAT = "rl_workbench policy 1"  # changes when older files can't be read any more

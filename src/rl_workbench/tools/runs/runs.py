@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from file_reading.content import open_text
+from files.content import open_text
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.record import CONFIG_RECORD
 from rl_workbench.training.run.scalar_log import EVALUATION, RETURN, SUCCESS

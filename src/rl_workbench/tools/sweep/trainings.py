@@ -8,7 +8,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.jobs.job import Job
 from rl_workbench.tools.runs.runs import open_run
 from rl_workbench.training.run.scalar_log import EVALUATION
-from web_page.table import GrowingTable
+from viewer.table import GrowingTable
 
 
 def flags(algorithm: str, options: dict[str, Any]) -> list[str]:
@@ -45,11 +45,11 @@ class Evaluations:
 
         Episodes and vectors pass over some steps, so two trainings may be evaluated at steps that differ.
         """
-        look = self._table.look()
+        look = self._table.read()
         for step, tag, value in look.points:
             if tag == EVALUATION and self._frequency:
                 yield int(step) // self._frequency * self._frequency, value
-        if look.is_behind:
+        if look.has_more:
             yield from self.new()
 
 

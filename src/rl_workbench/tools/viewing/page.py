@@ -14,9 +14,9 @@ from rl_workbench.tools.viewing.player import Player
 from rl_workbench.tools.viewing.recorder import Recorder
 from rl_workbench.tools.viewing.views import CAMERA, LOOK_AT
 from rl_workbench.training.run.progress import tell, warn
-from web_page.address import PortInUse, find_address
-from web_page.curves import Curves
-from web_page.server import open_browser, serve, stop
+from viewer.address import PortInUse, find_address
+from viewer.curves import Curves
+from viewer.server import open_browser, serve, stop
 
 PERIOD = 1.0 / 30.0  # [s] of the player's pictures
 CURVES = 1.0  # [s] between two looks at the table
@@ -105,4 +105,4 @@ def _play(server: viser.ViserServer, player: Player, is_over: Callable[[], bool]
 def _draw(server: viser.ViserServer, curves: Curves, ended: threading.Event) -> None:
     is_behind = True
     while not ended.wait(0.0 if is_behind else CURVES):
-        is_behind = bool(server.get_clients()) and curves.look()
+        is_behind = bool(server.get_clients()) and curves.update()

@@ -23,7 +23,6 @@ class AlgorithmKind:
         presets: whether the file has sections that no environment is called after.
         keeps_dict: whether it learns from a Dict of arrays as it is; others get all of its numbers in one
             vector.
-        plays_elsewhere: whether it learns from whole rollouts, which workers on other machines can play.
         learns_in_several: whether it learns in several environments at the same time.
         package: the extra that it needs, as (module, name); None if none.
     """
@@ -37,7 +36,6 @@ class AlgorithmKind:
     defaults: Mapping[str, Any] = field(default_factory=dict)
     presets: bool = False
     keeps_dict: bool = False
-    plays_elsewhere: bool = False
     learns_in_several: bool = False
     package: tuple[str, str] | None = None
 

@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from file_reading.content import open_text
+from files.content import open_text
 from rl_workbench.errors import WorkbenchError
 
 CONFIG_RECORD = "config.json"

@@ -19,8 +19,8 @@ class ClusterOptions:
 
 
 @dataclass(frozen=True)
-class SessionOptions(ClusterOptions):
-    """What is seen of a training beside the terminal, and where its environments are."""
+class SessionOptions:
+    """What is seen of a training beside the terminal."""
 
     gui: bool = option(
         False, "show it on a page in the browser: its curves, and episodes of its newest checkpoint"

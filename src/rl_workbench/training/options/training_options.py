@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,15 +15,10 @@ from rl_workbench.training.options.options import Options
 from rl_workbench.training.options.record import CONFIG_RECORD, read_record
 from rl_workbench.training.options.run_options import RunOptions
 from rl_workbench.training.options.session import SessionOptions
-from rl_workbench.training.player import Pool
 
 # May be changed when resuming.
 EXTENDING = ("total_timesteps", "episodes", "stop_at_length", "stop_at_return", "device")
-SHORTEST = 512  # [steps] of a fragment that workers play
 RECORDED_AS = {"n_envs": "num_envs"}  # of trainings of earlier versions, which can be gone on with
-
-
-MakePool = Callable[["TrainingOptions"], Pool]
 
 
 class TrainingOptions(NamedTuple):
@@ -34,7 +29,6 @@ class TrainingOptions(NamedTuple):
     hyperparameters: Any  # an instance of the kind's dataclass
     resume: Path | None = None
     session: SessionOptions = SessionOptions()
-    make_pool: MakePool | None = None  # of the workers that play its rollouts; None: none, it does
 
     def record(self) -> dict[str, Any]:
         """All settings as plain values, for config.json and checkpoints."""
@@ -125,34 +119,14 @@ def choose(
     given, special, session = line.given(flags, parameters or {})
     if "resume" in special:
         old = resumed(kind, Path(special["resume"]), given, special)
-        return _in_session(old, session)
+        return old._replace(session=session)
     origin = f"--config {special['config']}" if "config" in special else f"config/{kind.config}"
     path = Path(special["config"]) if "config" in special else default_file(kind.config)
     preset = special.get("preset")
     wanted = given.get("env_id", None if preset else default)
     section = read_section(path, section_names(kind.section, wanted), preset)
     merged = ({"env_id": wanted} if wanted else {}) | options.read(section, origin)
-    return _in_session(make_options(kind, until_the_steps(merged, given)), session)
-
-
-def _in_session(options: TrainingOptions, session: SessionOptions) -> TrainingOptions:
-    """The options with those of this session.
-
-    Raises:
-        WorkbenchError: if workers can't play what the algorithm learns from.
-    """
-    name = options.kind.name
-    length = getattr(options.hyperparameters, "n_steps", SHORTEST)
-    if session.ray is not None and not options.kind.plays_elsewhere:
-        raise WorkbenchError(
-            f"--ray is for reinforce, ppo and a2c, which learn from whole rollouts, not for {name}"
-        )
-    if session.ray is not None and length < SHORTEST:
-        raise WorkbenchError(
-            f"--ray carries at least {SHORTEST} steps at a time, since each way costs what some steps "
-            f"cost: {name} needs --n-steps {SHORTEST} or more, not {length}"
-        )
-    return options._replace(session=session)
+    return make_options(kind, until_the_steps(merged, given))._replace(session=session)
 
 
 def resumed(

@@ -34,7 +34,6 @@ REINFORCE = AlgorithmKind(
     config="pg.yaml",
     implementation="rl_workbench.training.pg.making",
     hyperparameters=lambda: ReinforceOptions,
-    plays_elsewhere=True,
     learns_in_several=True,
     defaults={**_EPISODIC, "normalize_observations": True},
 )

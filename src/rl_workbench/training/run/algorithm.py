@@ -7,7 +7,6 @@ what it is made of, what one step of its loop does, and what a checkpoint holds.
 import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -16,9 +15,8 @@ import gymnasium
 import numpy as np
 
 from rl_workbench.training.environments.checked import CheckedEnvironment
-from rl_workbench.training.environments.elsewhere import Elsewhere
 from rl_workbench.training.environments.making import make_environment
-from rl_workbench.training.environments.several import close_all, make_several, own_robot
+from rl_workbench.training.environments.several import close_all, make_several
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.scalar_log import ScalarLog
 
@@ -192,21 +190,6 @@ def training_environments(options: TrainingOptions) -> list[gymnasium.Env[Any, A
         lambda given: environment_for(options, given),
         run.training_environment, run.env_id, run.num_envs,
     )  # fmt: skip
-
-
-def environments_elsewhere(options: TrainingOptions) -> tuple[Elsewhere, TrainingOptions]:
-    """What stands for the environments that workers play in, and the options by which these make them.
-
-    Raises:
-        WorkbenchError: if they can't be made, or there is but one robot.
-    """
-    run = options.run
-    env = environment_for(options, run.training_environment)
-    with contextlib.closing(env):
-        apart = own_robot(env, run.env_id, "workers need one each")
-        here = Elsewhere(env)
-    theirs = replace(run, train_env_kwargs=run.train_env_kwargs | apart)
-    return here, options._replace(run=theirs)
 
 
 Made = TypeVar("Made", bound=Algorithm)

@@ -19,7 +19,7 @@ from typing import Any
 
 import torch
 
-from file_reading.content import open_file
+from files.content import open_file
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.run.files import save_tensors
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.environments.answers import as_float32, succeeded
-from rl_workbench.training.environments.elsewhere import Elsewhere
 from rl_workbench.training.environments.making import shares_robot
 from rl_workbench.training.options.training_options import TrainingOptions
 from rl_workbench.training.run.algorithm import Algorithm, Say, environment_for
@@ -107,7 +106,7 @@ class Evaluator:
             try:
                 self._env = environment_for(options, self._run.evaluation_environment)
             except WorkbenchError as error:
-                if not is_same or isinstance(algorithm.env, Elsewhere):
+                if not is_same:
                     raise
                 self._is_guest = True
                 say(

@@ -102,9 +102,7 @@ class TrainingOutcome(NamedTuple):
     def _how_to_go_on(self) -> str:
         if not self.is_in_place or not candidates(self.folder):
             return ""
-        ray = self.options.session.ray
-        again = "" if ray is None else f" --ray {shlex.quote(ray)}"
-        return f"; --resume {shlex.quote(str(self.folder))}{again} goes on from the last checkpoint"
+        return f"; --resume {shlex.quote(str(self.folder))} goes on from the last checkpoint"
 
 
 def write_traceback(folder: Path, failure: WorkbenchError) -> str:

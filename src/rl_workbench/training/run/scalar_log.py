@@ -16,7 +16,7 @@ from tensorboard.compat.proto.summary_pb2 import Summary
 from tensorboard.summary.writer.record_writer import RecordWriter
 from torch.utils.tensorboard.summary import hparams, scalar, text
 
-from file_reading.content import open_file
+from files.content import open_file
 
 NAME = "scalars.csv"
 # Tags, as CleanRL and Stable-Baselines3 name them.

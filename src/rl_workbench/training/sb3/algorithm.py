@@ -20,7 +20,7 @@ from rl_workbench.training.sb3.model import make_model
 from rl_workbench.training.sb3.network import greedy_network
 from rl_workbench.training.sb3.options import ON_POLICY
 from rl_workbench.training.sb3.positions import Positions
-from rl_workbench.training.sb3.state import FRAGMENTS, check_weights, restore, state_of
+from rl_workbench.training.sb3.state import check_weights, restore, state_of
 
 # What the library raises in the midst of learning: weights or options that are no good.
 _LEARNING = (ArithmeticError, AssertionError, LookupError, RuntimeError, TypeError, ValueError)
@@ -90,10 +90,6 @@ class SB3Training(Algorithm):
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """See `Algorithm.load_state_dict`."""
-        if FRAGMENTS in state:
-            raise WorkbenchError(
-                "it was begun with --ray: it goes on with --ray, on whatever cluster"
-            )
         restore(self._model, state, self._run.total_timesteps)
 
     def environment_state(self) -> dict[str, Any] | None:

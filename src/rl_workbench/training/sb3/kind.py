@@ -3,7 +3,7 @@
 from functools import partial
 
 from rl_workbench.training.options.kind import AlgorithmKind
-from rl_workbench.training.sb3.options import CLASSES, ON_POLICY, options_class
+from rl_workbench.training.sb3.options import CLASSES, options_class
 
 _CONTINUOUS = ("sac", "td3", "ddpg")
 
@@ -18,7 +18,6 @@ def _kind(name: str) -> AlgorithmKind:
         implementation="rl_workbench.training.sb3.making",
         hyperparameters=partial(options_class, name),
         keeps_dict=True,
-        plays_elsewhere=name in ON_POLICY,
         learns_in_several=True,
         defaults={"env_id": env_id, "total_timesteps": 100_000},
         package=("stable_baselines3", "Stable-Baselines3"),

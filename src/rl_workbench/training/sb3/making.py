@@ -2,13 +2,10 @@
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.player import Player
 from rl_workbench.training.sb3.algorithm import SB3Training, load_policy
-from rl_workbench.training.sb3.fragments import FragmentPlayer
 from rl_workbench.training.sb3.model import checked_of, make_model
-from rl_workbench.training.sb3.remote import make_remote
 
-__all__ = ["load_policy", "make", "make_player"]
+__all__ = ["load_policy", "make"]
 
 
 def make(options: TrainingOptions) -> SB3Training:
@@ -17,12 +14,5 @@ def make(options: TrainingOptions) -> SB3Training:
         raise WorkbenchError(
             f"{options.kind.name} needs total_timesteps: its schedules depend on them"
         )
-    if options.make_pool is not None:
-        return make_remote(options, options.make_pool)
     model = make_model(options)
     return SB3Training(options, model, checked_of(model.get_env()))
-
-
-def make_player(options: TrainingOptions, index: int) -> Player:
-    """What plays in the environment `index`, for a worker; see `Player`."""
-    return FragmentPlayer(options, index)

@@ -15,7 +15,6 @@ from rl_workbench.training.sb3.buffer import buffer_state, restore_buffer
 
 COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_n_calls", "stride")
 ENTROPY = "log_ent_coef"  # SAC's, no part of a network
-FRAGMENTS = "fragments"  # where the environments are of which workers play fragments
 LOSSES = {  # Stable-Baselines3's names: our tags
     "train/loss": "losses/loss",
     "train/value_loss": "losses/value_loss",

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from bullet_gazebo.physics.mechanics.kinematics import link_poses
+from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.pose import (
     Pose,
     Vector,
@@ -11,7 +11,7 @@ from bullet_gazebo.physics.pose import (
     scale,
     subtract,
 )
-from bullet_gazebo.state.names import SCOPE, did_you_mean
+from bullet_gazebo.state import SCOPE, did_you_mean
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.world_state import JointState, LinkQuery, Motion, StateQuery, link_keys

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from file_reading.content import read_file
-from file_reading.errors import FileError
-from file_reading.xml_text import decode
+from files.content import FileError, read_file
+from files.xml_text import decode
 from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages
 from ros_utils._internal.gazebo.calls import GAZEBO, TIMEOUT

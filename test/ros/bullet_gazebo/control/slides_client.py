@@ -17,8 +17,8 @@ from controller_manager_msgs.srv import (
 from gazebo_msgs.srv import DeleteModel, SpawnModel, SpawnModelRequest
 from std_srvs.srv import Empty
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
-from subscribed import wait_until_heard
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+from support.ros.subscribed import wait_until_heard
 
 BOUND = 60.0  # [s of wall time]
 STRICT = 2

@@ -15,8 +15,8 @@ from control_msgs.msg import (
 from controller_client import wait_until
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
-from subscribed import is_heard
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+from support.ros.subscribed import is_heard
 
 NAMES = {value: name for name, value in vars(GoalStatus).items() if name.isupper()}
 

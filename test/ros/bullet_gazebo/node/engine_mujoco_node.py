@@ -22,8 +22,8 @@ from gazebo_msgs.srv import (
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
-from subscribed import wait_until_heard
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+from support.ros.subscribed import wait_until_heard
 
 BOUND = 60.0  # [s of wall time]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"

@@ -10,20 +10,13 @@ import threading
 import unittest
 from pathlib import Path
 
+import imageio_ffmpeg
 import rostest
 
 from ros_utils.simulation import reserved_port
-from video_writing.mp4 import EncoderFailed, find_encoder
 
 BOUND = 100.0  # [s]
 WORLD = ("gazebo_ros", "empty_world.launch", "gui:=false", "server_required:=true")
-
-
-def has_ffmpeg():
-    try:
-        return bool(find_encoder())
-    except EncoderFailed:
-        return False
 
 
 class Recording(unittest.TestCase):
@@ -52,7 +45,6 @@ class Recording(unittest.TestCase):
             pause.wait(0.2)
         raise AssertionError(f"nothing said {pattern!r}:\n{self.log.read_text()}")
 
-    @unittest.skipUnless(has_ffmpeg(), "there is no ffmpeg: ./ws extras")
     def test_a_video_is_whole_after_ctrl_c(self):
         video = self.folder / "it's a video.mp4"
         launch = self.launch("cartpole", "simulation.launch", "lockstep:=false", "paused:=false",
@@ -62,7 +54,7 @@ class Recording(unittest.TestCase):
         launch.wait(BOUND)
         told = self.await_line(r"recording: .*video\.mp4: (\d+) pictures, [0-9.]+ s")
         self.assertGreater(int(told[1]), 0)
-        read = [find_encoder(), "-v", "error", "-i", str(video), "-f", "null", "-"]
+        read = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(video), "-f", "null", "-"]
         self.assertEqual(subprocess.run(read, check=False, timeout=BOUND).returncode, 0)
 
     def test_what_cannot_be_recorded_is_one_line(self):

@@ -16,9 +16,9 @@ from geometry_msgs.msg import Point, Pose
 from hypothesis import HealthCheck, given, settings
 from std_srvs.srv import Empty
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from odd_requests import BOX, JOINTS, LINKS, MODELS, requests
+from support.ros.odd_requests import BOX, JOINTS, LINKS, MODELS, requests
 
 BOUND = 60.0  # [s of wall time]
 SPAN = 1.0  # [s] for each service, longer where none was a sound one yet

@@ -12,8 +12,8 @@ from gazebo_world import BOUND, BOX, INF, NAN, GazeboTest, call, now, run, wait_
 from geometry_msgs.msg import Point, Pose, Twist, Vector3
 from rosgraph_msgs.msg import Clock
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
-from subscribed import wait_until_heard
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+from support.ros.subscribed import wait_until_heard
 
 
 class JointsTest(GazeboTest):

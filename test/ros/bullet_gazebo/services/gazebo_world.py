@@ -9,7 +9,7 @@ from gazebo_msgs.msg import ODEPhysics
 from geometry_msgs.msg import Point, Pose, Vector3
 from std_srvs.srv import Empty
 
-from bullet_gazebo.ros.clients.world_client import RemoteWorld
+from bullet_gazebo.ros.clients.gz import RemoteWorld
 
 BOUND = 60.0  # [s of wall time]
 NAN, INF = float("nan"), float("inf")

@@ -14,8 +14,8 @@ from gazebo_msgs.srv import GetWorldProperties, SpawnModel, SpawnModelRequest
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "support"))
-from subscribed import wait_until_heard
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+from support.ros.subscribed import wait_until_heard
 
 BOUND = 60.0  # [s of wall time]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"

@@ -11,10 +11,10 @@ from gazebo_msgs.srv import GetJointProperties
 from std_msgs.msg import Float64
 from trajectory_msgs.msg import JointTrajectory
 
-sys.path.append(str(Path(__file__).resolve().parents[3] / "support"))
+sys.path.append(str(Path(__file__).resolve().parents[3]))
 
-from browser import wait_for
-from window_page import WindowCase, proxy
+from support.pages.browser import wait_for
+from support.pages.window_page import WindowCase, proxy
 
 HELD = ["position_hold", "effort_arm", "velocity_drive"]
 PRESSES = 5  # of a key, each of which moves a slider by a five hundredth of its way

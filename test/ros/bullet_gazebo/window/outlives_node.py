@@ -17,10 +17,10 @@ import zstandard
 from gazebo_msgs.srv import SpawnModel, SpawnModelRequest
 from websockets.sync.client import connect
 
-sys.path.append(str(Path(__file__).resolve().parents[3] / "support"))
+sys.path.append(str(Path(__file__).resolve().parents[3]))
 
-from browser import BOUND, wait_for
-from window_page import INERTIAL, Output, proxy
+from support.pages.browser import BOUND, wait_for
+from support.pages.window_page import INERTIAL, Output, proxy
 
 HEADER = 16  # [bytes] in front of what viser sends: its lengths
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}

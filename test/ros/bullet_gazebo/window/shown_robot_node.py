@@ -16,9 +16,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-sys.path.append(str(Path(__file__).resolve().parents[3] / "support"))
+sys.path.append(str(Path(__file__).resolve().parents[3]))
 
-from rover import ROVER
+from support.robots.bodies import ROVER
 
 BOUND = 180.0  # [s] for anything
 NAME = "robot with a/b"  # of the model: nobody tells it to who shows the robot

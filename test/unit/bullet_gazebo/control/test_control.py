@@ -6,16 +6,22 @@ from itertools import pairwise
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from robots import cartpole_urdf
+from support.robots.cartpole import cartpole_urdf
 
-from bullet_gazebo.control.angles import normalized, shortest_distance, shortest_distance_within
-from bullet_gazebo.control.controllers import BUILT_IN, joint_state, loops
-from bullet_gazebo.control.description import read_description
+from bullet_gazebo.control.controllers import BUILT_IN, joint_state, pid_controllers
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
-from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
+from bullet_gazebo.control.joint import (
+    JointHandle,
+    JointLimits,
+    SoftLimits,
+    normalized,
+    shortest_distance,
+    shortest_distance_within,
+)
 from bullet_gazebo.control.limits import effort_enforcer
 from bullet_gazebo.control.pid import Pid
+from bullet_gazebo.control.transmissions import read_description
 
 MS = 1_000_000  # [ns]
 STATE = "joint_state_controller/JointStateController"
@@ -257,7 +263,10 @@ def test_no_record_is_made_that_nobody_hears_and_the_next_one_once_somebody_does
     listeners = 0
     controller.outputs[0].listeners = lambda: listeners
     made = []
-    for module, record in ((joint_state, "JointStateSample"), (loops, "JointControllerSample")):
+    for module, record in (
+        (joint_state, "JointStateSample"),
+        (pid_controllers, "JointControllerSample"),
+    ):
         make = getattr(module, record)
         monkeypatch.setattr(
             module, record, lambda *fields, make=make: made.append(0) or make(*fields)

@@ -3,13 +3,13 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from robots import cartpole_urdf
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.control.controllers.base import Controller
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import BEST_EFFORT, STRICT, ControllerManager
+from bullet_gazebo.control.transmissions import read_description
 
 PARAMS = {
     "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 120},

@@ -4,13 +4,12 @@ import math
 
 import pytest
 
-from bullet_gazebo.control.description import read_description
-from bullet_gazebo.control.drives import PositionDrive
 from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.hardware import PositionDrive, RobotHardware
 from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
 from bullet_gazebo.control.limits import PositionLimiter, VelocityLimiter
 from bullet_gazebo.control.manager import STRICT, ControllerManager
+from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World

@@ -6,19 +6,19 @@ See docs/contract/ros_control.md 3.5.
 import math
 
 import pytest
-from trajectory_rig import GAINS, KINDS, MS, Rig, S, move
+from support.robots.trajectory_rig import GAINS, KINDS, MS, Rig, S, move
 
 from bullet_gazebo.control.controllers import BUILT_IN
 from bullet_gazebo.control.errors import ControlError
-from bullet_gazebo.control.trajectory.goal import Outcome
-from bullet_gazebo.control.trajectory.message import (
+from bullet_gazebo.control.trajectory import Segment, Waypoint
+from bullet_gazebo.control.trajectory_goals import (
     INVALID_GOAL,
     INVALID_JOINTS,
+    Outcome,
+    Tolerance,
     Trajectory,
     TrajectoryRefused,
 )
-from bullet_gazebo.control.trajectory.segment import Segment, Waypoint
-from bullet_gazebo.control.trajectory.tolerances import Tolerance
 
 # parameters
 

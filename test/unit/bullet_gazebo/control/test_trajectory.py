@@ -6,9 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bullet_gazebo.control.trajectory.message import (
+from bullet_gazebo.control.trajectory import JointSpline, Segment, State, Waypoint, still, stop_ramp
+from bullet_gazebo.control.trajectory_goals import (
     INVALID_GOAL,
     INVALID_JOINTS,
+    Tolerance,
     Trajectory,
     TrajectoryPoint,
     TrajectoryRefused,
@@ -16,9 +18,6 @@ from bullet_gazebo.control.trajectory.message import (
     check_points,
     dropped_points,
 )
-from bullet_gazebo.control.trajectory.segment import Segment, State, Waypoint, still, stop_ramp
-from bullet_gazebo.control.trajectory.spline import JointSpline
-from bullet_gazebo.control.trajectory.tolerances import Tolerance
 
 S = 1_000_000_000  # [ns]
 values = st.floats(-10.0, 10.0)

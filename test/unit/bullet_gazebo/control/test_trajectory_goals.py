@@ -3,16 +3,16 @@
 import math
 
 import pytest
-from trajectory_rig import Rig, S, move
+from support.robots.trajectory_rig import Rig, S, move
 
-from bullet_gazebo.control.trajectory.goal import Outcome
-from bullet_gazebo.control.trajectory.message import (
+from bullet_gazebo.control.trajectory_goals import (
     GOAL_TOLERANCE_VIOLATED,
     PATH_TOLERANCE_VIOLATED,
+    Outcome,
+    Tolerance,
     Trajectory,
     TrajectoryRefused,
 )
-from bullet_gazebo.control.trajectory.tolerances import Tolerance
 
 
 def test_a_goal_is_told_of_at_the_monitors_rate_and_succeeds():

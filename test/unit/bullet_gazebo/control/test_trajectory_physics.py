@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.control.trajectory.goal import GoalRequest, Outcome
-from bullet_gazebo.control.trajectory.message import Trajectory, TrajectoryPoint
-from bullet_gazebo.control.trajectory.tolerances import Tolerance
+from bullet_gazebo.control.trajectory_goals import (
+    GoalRequest,
+    Outcome,
+    Tolerance,
+    Trajectory,
+    TrajectoryPoint,
+)
+from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World

@@ -6,11 +6,11 @@ import subprocess
 import sys
 from functools import partial
 
-import engine_runs as runs
 import numpy as np
 import pytest
+from support.robots import engine_runs as runs
 
-from bullet_gazebo.physics.engines.registry import BULLET, EngineError, make_engine
+from bullet_gazebo.physics.engines import BULLET, EngineError, make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
@@ -57,7 +57,7 @@ def test_both_engines_go_the_same_way(state, force):
 @pytest.mark.extras("mujoco")
 def test_what_is_left_of_the_error_is_the_step():
     """Integrated by RK4, MuJoCo's model gives what the equations of motion do: the figures are the same."""
-    from bullet_gazebo.physics.engines.mujoco.engine import MujocoEngine
+    from bullet_gazebo.physics.engines.mujoco_engine import MujocoEngine
 
     exact = partial(MujocoEngine, runge_kutta=True)
     assert runs.fall_error(exact, 0.001) < 1e-8
@@ -74,7 +74,7 @@ def test_an_unknown_engine_is_named():
 @pytest.mark.parametrize("name", BULLET)
 def test_names_of_gazebos_engines_mean_pybullet_which_needs_no_mujoco(name):
     code = (
-        "import sys; from bullet_gazebo.physics.engines.registry import make_engine;"
+        "import sys; from bullet_gazebo.physics.engines import make_engine;"
         f" print(type(make_engine({name!r})).__name__, 'mujoco' in sys.modules)"
     )
     answer = subprocess.run(

@@ -5,16 +5,16 @@ import subprocess
 import sys
 
 import pytest
-from comma_locale import NAME, write_comma_locale
+from support.comma_locale import NAME, write_comma_locale
 
 PROGRAM = """
 import locale, sys
-from mesh_files import obj
-from robots import cartpole_urdf
+from support.mutations.mesh_files import obj
+from support.robots.cartpole import cartpole_urdf
 locale.setlocale(locale.LC_NUMERIC, sys.argv[1])
 print(locale.localeconv()["decimal_point"], file=sys.stderr)
-from bullet_gazebo.physics.engines.registry import make_engine
-from bullet_gazebo.physics.files.sdf.models import parse_sdf
+from bullet_gazebo.physics.engines import make_engine
+from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane

@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from memory import stays
-from robots import cartpole_urdf
+from support.memory import stays
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.engines.bullet import engine as bullet
+from bullet_gazebo.physics.engines import bullet_engine as bullet
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.properties import (
@@ -100,7 +100,7 @@ def test_models_that_the_engine_refuses_leave_no_memory_behind(often, monkeypatc
         raise DescriptionError("no")
 
     world = World(bullet.BulletEngine())
-    monkeypatch.setattr("bullet_gazebo.physics.engines.bullet.body.check_meshes", refuse)
+    monkeypatch.setattr("bullet_gazebo.physics.engines.bullet_body.check_meshes", refuse)
 
     def cycle(number: int) -> None:
         with pytest.raises(DescriptionError):
@@ -134,7 +134,7 @@ def test_without_room_for_its_files_a_model_keeps_the_old_world(often, monkeypat
     def full(*args: object, **kwargs: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    writer = "bullet_gazebo.physics.engines.bullet.urdf_writer.write_mesh"
+    writer = "bullet_gazebo.physics.engines.bullet_files.write_mesh"
     assert not stays_among_others(tmp_path, lambda: monkeypatch.setattr(writer, full))
 
 
@@ -145,7 +145,7 @@ def test_a_full_disk_is_a_reason_and_leaves_the_world_as_it_was(monkeypatch, fun
 
     world, model = World(bullet.BulletEngine()), parse_urdf(chain(2))
     with monkeypatch.context() as disk:
-        disk.setattr(f"bullet_gazebo.physics.engines.bullet.client.{function}", full)
+        disk.setattr(f"bullet_gazebo.physics.engines.bullet_engine.{function}", full)
         with pytest.raises(DescriptionError, match="files can't be written: No space left"):
             world.spawn("chain", model, Pose())
     assert list(world.models) == []

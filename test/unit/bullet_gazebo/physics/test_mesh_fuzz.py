@@ -2,11 +2,11 @@
 
 import pytest
 from hypothesis import HealthCheck, given, settings
-from mesh_worker import MeshWorker
-from mutations_mesh import mesh_files
+from support.mutations.mesh_worker import MeshWorker
+from support.mutations.meshes import mesh_files
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.meshes.reader import read_mesh
+from bullet_gazebo.physics.files.meshes import read_mesh
 
 QUICK = settings(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 ENGINES = ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]

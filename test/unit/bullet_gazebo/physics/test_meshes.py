@@ -6,13 +6,22 @@ import sys
 from pathlib import Path
 
 import pytest
-from mesh_files import CORNERS, FACES, ascii_stl, binary_stl, dae, library, obj, polylist
+from support.mutations.mesh_files import (
+    CORNERS,
+    FACES,
+    ascii_stl,
+    binary_stl,
+    dae,
+    library,
+    obj,
+    polylist,
+)
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.engines.bullet.engine import BulletEngine
-from bullet_gazebo.physics.files.sdf.models import parse_sdf
+from bullet_gazebo.physics.engines.bullet_engine import BulletEngine
+from bullet_gazebo.physics.files.reading import Resources
+from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.meshes.mesh_files import Resources
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
 
@@ -172,8 +181,8 @@ def test_each_object_of_a_file_has_a_hull_of_its_own(tmp_path):
 def test_a_world_without_meshes_does_not_pay_for_them():
     code = (
         "import sys\nfrom bullet_gazebo.physics import world\n"
-        "from bullet_gazebo.physics.engines.bullet.engine import BulletEngine\n"
-        "from bullet_gazebo.physics.files.sdf.models import parse_sdf\n"
+        "from bullet_gazebo.physics.engines.bullet_engine import BulletEngine\n"
+        "from bullet_gazebo.physics.files.sdf import parse_sdf\n"
         "there = world.World(BulletEngine())\n"
         "there.spawn('m', parse_sdf(sys.argv[1]), world.Pose())\n"
         "assert not {'trimesh', 'collada', 'scipy.spatial'} & set(sys.modules)"

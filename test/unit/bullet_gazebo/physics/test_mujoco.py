@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from robots import cartpole_urdf
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.physics.description import DescriptionError, Inertia, Shape
-from bullet_gazebo.physics.engines.registry import make_engine
-from bullet_gazebo.physics.files.sdf.models import parse_sdf
+from bullet_gazebo.physics.engines import make_engine
+from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.world import World, ground_plane

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from robots import CartPole, cartpole_urdf
 from scipy.integrate import solve_ivp
+from support.robots.cartpole import CartPole, cartpole_urdf
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 SRC = Path(__file__).resolve().parents[4] / "src"
-LIBRARY = SRC / "bullet_gazebo/physics/engines/bullet/quiet_import.py"
+LIBRARY = SRC / "bullet_gazebo/physics/engines/quiet_pybullet.py"
 BESIDE = """
 import os, sys, threading
 sys.setswitchinterval(1e-6)
@@ -21,7 +21,7 @@ def write():
         count += 1
 thread = threading.Thread(target=write, daemon=True)
 thread.start()
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
 make_engine()
 done.set()
 thread.join()
@@ -37,7 +37,7 @@ def outcome(code: str, *python: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     "code",
     [
-        "from bullet_gazebo.physics.engines.registry import make_engine; make_engine()",
+        "from bullet_gazebo.physics.engines import make_engine; make_engine()",
         "import gymnasium, cartpole; gymnasium.make('cartpole/Balance-v0').reset(seed=0)",
         "import robot_envs.pictures.window",
     ],
@@ -55,7 +55,7 @@ def test_what_another_thread_writes_meanwhile_comes_whole() -> None:
 
 def test_what_c_writes_meanwhile_comes_afterwards(tmp_path: Path) -> None:
     (tmp_path / "pybullet.py").write_text("import ctypes; ctypes.CDLL(None).perror(b'of C')")
-    code = f"sys.path.insert(0, {str(tmp_path)!r}); import bullet_gazebo.physics.engines.bullet.quiet_import"
+    code = f"sys.path.insert(0, {str(tmp_path)!r}); import bullet_gazebo.physics.engines.quiet_pybullet"
     assert outcome(code).stderr.startswith("of C: ")
 
 
@@ -64,7 +64,7 @@ def test_a_library_that_cannot_be_loaded_says_why(tmp_path: Path) -> None:
         "import sys; print('a reason', file=sys.stderr); raise ImportError('broken')"
     )
     code = (
-        f"sys.path.insert(0, {str(tmp_path)!r}); import bullet_gazebo.physics.engines.bullet.engine"
+        f"sys.path.insert(0, {str(tmp_path)!r}); import bullet_gazebo.physics.engines.bullet_engine"
     )
     with pytest.raises(subprocess.CalledProcessError) as caught:
         outcome(code)
@@ -73,7 +73,7 @@ def test_a_library_that_cannot_be_loaded_says_why(tmp_path: Path) -> None:
 
 
 def test_without_a_standard_error() -> None:
-    code = "from bullet_gazebo.physics.engines.registry import make_engine; make_engine(); print('made')"
+    code = "from bullet_gazebo.physics.engines import make_engine; make_engine(); print('made')"
     assert outcome(code, "sh", "-c", 'exec "$@" 2>&-', "sh").stdout == "made\n"
 
 

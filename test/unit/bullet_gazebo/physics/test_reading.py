@@ -3,20 +3,18 @@
 import os
 
 import pytest
-from mesh_files import obj
+from support.mutations.mesh_files import obj
 
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
 from bullet_gazebo.physics.files import reading as limits
-from bullet_gazebo.physics.files.model_file import read_entity
-from bullet_gazebo.physics.files.reading import Reading
-from bullet_gazebo.physics.files.sdf.models import MAX_NESTING, parse_sdf
+from bullet_gazebo.physics.files.meshes import read_mesh
+from bullet_gazebo.physics.files.reading import Reading, Resources
+from bullet_gazebo.physics.files.sdf import MAX_NESTING, parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.files.world_file import load_world, parse_world
-from bullet_gazebo.physics.mechanics.tree import MAX_LINKS
-from bullet_gazebo.physics.meshes.mesh_files import Resources
-from bullet_gazebo.physics.meshes.reader import read_mesh
-from file_reading import yaml_text
-from file_reading.xml_parser import MAX_DEPTH
+from bullet_gazebo.physics.files.world_file import load_world, parse_world, read_entity
+from bullet_gazebo.physics.lumping import MAX_LINKS
+from files import yaml_text
+from files.xml_text import MAX_DEPTH
 
 WIDTH, LEVELS = 10, 7  # a bomb: ten includes of ten includes of ...
 MODEL = '<sdf version="1.6"><model name="{}">{}</model></sdf>'

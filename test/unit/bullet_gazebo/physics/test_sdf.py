@@ -7,8 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.files.sdf.models import parse_sdf
-from bullet_gazebo.physics.meshes.mesh_files import Resources
+from bullet_gazebo.physics.files.reading import Resources
+from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.pose import Pose, from_rpy, rotate
 from bullet_gazebo.physics.world import World, ground_plane
 

@@ -5,10 +5,10 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from robots import cartpole_urdf
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.engines.bullet.urdf_writer import write_urdf
+from bullet_gazebo.physics.engines.bullet_files import write_urdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, from_rpy, multiply, normalized, rotate, to_rpy
 from bullet_gazebo.physics.world import World, ground_plane

@@ -5,8 +5,8 @@ import os
 import pytest
 
 from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.meshes.mesh_files import Resources
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
+from bullet_gazebo.control.transmissions import read_description
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from viser_recording import Recording
+from support.pages.viser_recording import Recording
 
 from bullet_gazebo.physics.description import Shape
 from bullet_gazebo.physics.pose import Pose, normalized
-from bullet_gazebo.pictures.page.batches import MOST_PARTS, compose
-from bullet_gazebo.pictures.page.picture import Picture
-from bullet_gazebo.pictures.page.seen import SeenLink, SeenModel
+from bullet_gazebo.pictures.page import Picture
+from bullet_gazebo.pictures.visuals import VisibleLink, VisibleModel
+from bullet_gazebo.pictures.page_batches import MOST_PARTS, compose
 
 AT_REST = (0.0, 0.0, 0.0, 1.0)
 
@@ -26,10 +26,10 @@ def picture(server, complaints):
 def boxes(number, count, **look):
     """A model of `count` links, each a box of its own size."""
     links = [
-        SeenLink(f"l{i}", [Shape("box", (0.1, 0.1, number + i / 1000), **look)])
+        VisibleLink(f"l{i}", [Shape("box", (0.1, 0.1, number + i / 1000), **look)])
         for i in range(count)
     ]
-    return SeenModel(number, f"m{number}", links)
+    return VisibleModel(number, f"m{number}", links)
 
 
 def heights(server):
@@ -93,9 +93,9 @@ def test_what_is_lost_stays_where_it_was_seen_last(server, picture):
 
 
 def test_looks_go_together_and_a_mesh_that_is_not_there_is_a_box(server, picture, complaints):
-    mesh = [SeenLink("l", [Shape("mesh", (1.0, 1.0, 1.0), mesh="gone.stl")])]
+    mesh = [VisibleLink("l", [Shape("mesh", (1.0, 1.0, 1.0), mesh="gone.stl")])]
     clear = boxes(2, 1, rgba=(1.0, 0.0, 0.0, 0.5))
-    picture.draw([boxes(1, 1), clear, SeenModel(3, "m3", mesh)], [])
+    picture.draw([boxes(1, 1), clear, VisibleModel(3, "m3", mesh)], [])
     picture.move(in_a_row(3))
     found = Recording(server.get_scene_serializer().serialize())
     opacities = [each["props"]["opacity"] for each in found.of("BatchedMeshesMessage")]
@@ -110,7 +110,7 @@ def test_a_file_with_looks_is_sent_once_for_all_models(server, picture, tmp_path
     path = tmp_path / "triangle.obj"
     path.write_text("mtllib looks.mtl\nv 0 0 0\nv 1 0 0\nv 0 0 1\nusemtl red\nf 1 2 3\n")
     models = [
-        SeenModel(i, f"m{i}", [SeenLink("l", [Shape("mesh", (1.0, 1.0, 2.0), mesh=str(path))])])
+        VisibleModel(i, f"m{i}", [VisibleLink("l", [Shape("mesh", (1.0, 1.0, 2.0), mesh=str(path))])])
         for i in range(5)
     ]
     picture.draw(models, [])

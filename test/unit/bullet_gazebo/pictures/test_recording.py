@@ -1,15 +1,14 @@
 """A simulation recorded while it runs: pictures at simulated times, of who comes and goes."""
 
-import os
 import signal
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from robots import cartpole_urdf
+from support.robots.cartpole import cartpole_urdf
 
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
@@ -22,8 +21,6 @@ BALL = """<robot name="ball"><link name="base">
   <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
   <visual><geometry><sphere radius="0.2"/></geometry>
     <material name="red"><color rgba="1 0 0 1"/></material></visual></link></robot>"""
-
-pytestmark = pytest.mark.extras("imageio_ffmpeg")
 
 
 @pytest.fixture
@@ -94,7 +91,7 @@ def test_a_simulator_that_is_killed_leaves_a_video(tmp_path):
     """The pipe ends, whatever the way."""
     script = f"""
 import os, signal
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures.recording import Recorder, RecordingOptions
 from bullet_gazebo.simulator import Simulator
@@ -154,10 +151,3 @@ def test_what_the_other_process_cannot_take_in_time_is_left_out(sim, tmp_path, m
 def test_what_cannot_be_recorded_is_refused(tmp_path, changed, text):
     with pytest.raises(RecordingError, match=text):
         RecordingOptions(**{"path": tmp_path / "a.mp4", **changed}).check()
-
-
-def test_a_missing_encoder_is_told_with_what_installs_it(tmp_path, monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    monkeypatch.setenv("PATH", os.fspath(tmp_path))
-    with pytest.raises(RecordingError, match="no ffmpeg: './ws extras' installs one"):
-        options(tmp_path).check()

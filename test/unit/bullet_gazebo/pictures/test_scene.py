@@ -5,17 +5,17 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from pictures import pixel
-from robots import cartpole_urdf
+from support.pages.pictures import pixel
+from support.robots.cartpole import cartpole_urdf
 
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.dynamics import link_poses
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.mechanics.kinematics import link_poses
 from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.pictures.camera import Camera
-from bullet_gazebo.pictures.scene import Scene
-from bullet_gazebo.pictures.solids import visible_shapes
+from bullet_gazebo.pictures.renderer import Renderer
+from bullet_gazebo.pictures.visuals import visible_shapes
 
 WIDTH, HEIGHT = 160, 120
 CAMERA = Camera(target=(0.0, 0.0, 1.0), distance=3.0, yaw=0.0, pitch=-10.0)
@@ -34,12 +34,12 @@ BOX = '<box size="0.4 0.4 0.4"/>'
 
 @pytest.fixture
 def scene():
-    made = Scene()
+    made = Renderer()
     yield made
     made.close()
 
 
-def shown(scene: Scene, camera: Camera = CAMERA) -> np.ndarray:
+def shown(scene: Renderer, camera: Camera = CAMERA) -> np.ndarray:
     return scene.picture(camera, WIDTH, HEIGHT).astype(int)
 
 
@@ -148,7 +148,7 @@ def test_pictures_are_the_callers_own_and_the_same_each_time(scene):
 
 
 def test_a_closed_scene_may_be_closed_again():
-    scene = Scene()
+    scene = Renderer()
     scene.close()
     scene.close()
 
@@ -159,7 +159,7 @@ def test_taking_pictures_changes_no_bit_of_the_simulation(engine):
         pytest.importorskip("mujoco")
     finals = []
     for looking in (False, True):
-        world, scene = World(make_engine(engine)), Scene()
+        world, scene = World(make_engine(engine)), Renderer()
         model = world.spawn("it", parse_urdf(cartpole_urdf()), Pose())
         model.set_joint_positions({"cart_pole": 0.1})
         scene.add("it", visible_shapes(model.description))
@@ -187,9 +187,8 @@ ANCHORED = """<sdf version="1.6"><model name="it"><pose>0.3 0 1 0 0 0.4</pose>
 
 
 def test_links_are_where_the_engine_has_them():
-    from bullet_gazebo.physics.files.model_file import read_entity
-    from bullet_gazebo.physics.files.reading import Reading
-    from bullet_gazebo.physics.meshes.mesh_files import Resources
+    from bullet_gazebo.physics.files.reading import Reading, Resources
+    from bullet_gazebo.physics.files.world_file import read_entity
 
     world, joints = World(make_engine()), {"turn": 0.7, "slide": -0.3}
     model = world.spawn("it", read_entity(ANCHORED, "it", Resources(), Reading()), Pose())
@@ -212,6 +211,8 @@ def test_the_part_that_is_rendered_has_all_of_it(scene, place, monkeypatch):
     scene.add("it", visible_shapes(parse_urdf(body('<box size="0.9 0.3 0.5"/>'))))
     scene.place("it", {"base": Pose(place, from_rpy(0.3, 0.2, 0.9))})
     part = shown(scene)
-    monkeypatch.setattr(Scene, "_region", lambda self, camera, width, height: (0, 0, width, height))
+    monkeypatch.setattr(
+        Renderer, "_region", lambda self, camera, width, height: (0, 0, width, height)
+    )
     assert np.abs(part - shown(scene)).max() <= 60  # of edges, whose samples lie elsewhere
     assert (np.abs(part - shown(scene)).max(axis=-1) > 8).sum() < 20

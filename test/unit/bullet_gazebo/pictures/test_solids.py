@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bullet_gazebo.physics.description import Shape
-from bullet_gazebo.pictures.solids import solid_of
+from bullet_gazebo.pictures.visuals import solid_of
 
 SHAPES = [
     Shape("box", (0.2, 0.4, 0.3)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import rospy
-from ros_fakes import FakeMaster
+from support.ros.ros_fakes import FakeMaster
 
 from bullet_gazebo.ros.node import master_watch
 from bullet_gazebo.ros.node.master_watch import MasterWatch

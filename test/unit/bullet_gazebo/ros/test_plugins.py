@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import rospy
 
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World

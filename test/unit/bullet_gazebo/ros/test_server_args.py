@@ -7,9 +7,9 @@ import pytest
 
 from bullet_gazebo.ros.clients import gz
 from bullet_gazebo.ros.clients.spawn_model import parse
+from bullet_gazebo.ros.common.node_process import seed_random_numbers
 from bullet_gazebo.ros.node.server_args import parse_args
 from bullet_gazebo.ros.services import model_paths
-from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 
 
 def test_options_stand_in_any_order():

@@ -14,14 +14,14 @@ import rospy
 
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.physics.description import Plugin
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.ros.node import stall
 from bullet_gazebo.ros.node.stall import StallWatch
 from bullet_gazebo.ros.node.watchdog import Watchdog
 from bullet_gazebo.ros.plugins import PluginContext
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.timing.fair_lock import FairLock
+from bullet_gazebo.timing import FairLock
 
 BOUND = 60.0  # [s]
 

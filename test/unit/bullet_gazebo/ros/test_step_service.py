@@ -17,10 +17,10 @@ from bullet_gazebo_msgs.srv import StepWorldRequest, StepWorldResponse
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 
-from bullet_gazebo.control.description import read_description
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.physics.engines.registry import make_engine
+from bullet_gazebo.control.transmissions import read_description
+from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane

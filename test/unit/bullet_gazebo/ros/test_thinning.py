@@ -4,8 +4,8 @@ import threading
 
 import pytest
 
+from bullet_gazebo.ros.common.publishing import ThinnedTopic, Thinner
 from bullet_gazebo.ros.wire import thinning
-from bullet_gazebo.ros.wire.thinning import ThinnedTopic, Thinner
 
 BOUND = 60.0  # [s]
 

@@ -12,7 +12,7 @@ import rospy
 
 from bullet_gazebo.ros.node.gzserver import GazeboNode
 from bullet_gazebo.ros.node.watchdog import Watchdog
-from bullet_gazebo.timing.fair_lock import FairLock
+from bullet_gazebo.timing import FairLock
 
 BOUND = 60.0  # [s]
 
@@ -152,7 +152,7 @@ def test_no_time_passes_once_a_signal_has_come(monkeypatch) -> None:
 
 def test_a_process_whose_threads_do_not_end_ends_all_the_same_with_its_exit_code() -> None:
     code = (
-        "import threading; from bullet_gazebo.ros.wire.signals import end_within;"
+        "import threading; from bullet_gazebo.ros.common.node_process import end_within;"
         "threading.Thread(target=threading.Event().wait).start(); end_within(0.1, 7)"
     )
     result = subprocess.run(

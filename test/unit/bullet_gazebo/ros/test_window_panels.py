@@ -8,7 +8,7 @@ import pytest
 import viser
 
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.pictures.page.picture import Picture
+from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.page.seen import SeenJoint, SeenLink, SeenModel
 from bullet_gazebo.ros.clients.window.model_panel import NONE, ModelPanel
 from bullet_gazebo.ros.clients.window.time_panel import ONLY_STEPS, TimePanel

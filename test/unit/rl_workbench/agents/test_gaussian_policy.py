@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
-from goal_environments import REACH
+from support.training.goal_environments import REACH
 from torch.distributions import Normal
 
 from rl_workbench.agents.pg.gaussian_policy import Bounds, GaussianNetwork

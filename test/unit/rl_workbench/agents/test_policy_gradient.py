@@ -5,7 +5,7 @@ import random
 import numpy as np
 import pytest
 import torch
-from learning_fakes import learned_lengths
+from support.training.learning_fakes import learned_lengths
 from torch import nn
 
 from rl_workbench.agents.pg.document import (

@@ -8,7 +8,7 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from learning_fakes import learned_lengths
+from support.training.learning_fakes import learned_lengths
 
 from rl_workbench.agents.pg.document import Episode
 from rl_workbench.agents.pg.reinforce import ReinforceAgent, generalised_advantages

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-import workbench_runs
+from support.training import workbench_runs
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from training_runs import ALL, InterruptAfter, train
+from support.training.training_runs import ALL, InterruptAfter, train
 
 from rl_workbench import cli
 

@@ -9,8 +9,8 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
-import workbench_runs
 from gymnasium import spaces
+from support.training import workbench_runs
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-import workbench_runs
+from support.training import workbench_runs
 
 from rl_workbench import cli
 from rl_workbench.tools.jobs.cluster import parcels

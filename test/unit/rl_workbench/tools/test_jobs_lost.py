@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from fake_ray import FakeRay, ObjectStoreFullError, RayError, WorkerCrashedError
+from support.training.fake_ray import FakeRay, ObjectStoreFullError, RayError, WorkerCrashedError
 
 from rl_workbench import cli
 from rl_workbench.tools.jobs import runner

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from ray_nodes import QUIET, RayCluster, in_session, title, wait_until
+from support.training.ray_nodes import QUIET, RayCluster, in_session, title, wait_until
 
 from rl_workbench.tools.jobs.states import JobState, read_states
 

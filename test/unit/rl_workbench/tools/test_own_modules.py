@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.slow]
 ENV_ID = "own_arm.tasks:own_arm/Reach-v0"
 MODULE = """
 import gymnasium
-from goal_environments import Reach
+from support.training.goal_environments import Reach
 
 gymnasium.register("own_arm/Reach-v0", Reach, reward_threshold=-7.5)
 """
@@ -37,12 +37,12 @@ def module(tmp_path_factory: pytest.TempPathFactory):
     (folder / "own_arm").mkdir()
     (folder / "own_arm/__init__.py").touch()
     (folder / "own_arm/tasks.py").write_text(MODULE)
-    support = Path(__file__).resolve().parents[3] / "support"
+    tests = Path(__file__).resolve().parents[3]
     source = Path(rl_workbench.__file__).parents[1]
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         known = os.environ.get("PYTHONPATH", "")
-        patch.setenv("PYTHONPATH", f"{folder}:{support}:{source}:{known}")
+        patch.setenv("PYTHONPATH", f"{folder}:{tests}:{source}:{known}")
         yield folder
 
 

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from training_runs import assert_same_run
-from workbench_runs import job
+from support.training.training_runs import assert_same_run
+from support.training.workbench_runs import job
 
 from rl_workbench.tools.benchmark.suites import (
     make_variant,

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
-import viser_recording
-import workbench_runs
+from support.pages import viser_recording
+from support.training import workbench_runs
 
 import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli

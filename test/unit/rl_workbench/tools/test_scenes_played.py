@@ -6,9 +6,9 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from browser import Browser, find_browser, wait_for
-from pictures import pixel
 from PIL import Image
+from support.pages.browser import Browser, find_browser, wait_for
+from support.pages.pictures import pixel
 
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.environment import CAMERA

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 import pytest
-from workbench_runs import dqn, policy_gradient, record
+from support.training.workbench_runs import dqn, policy_gradient, record
 
 import cartpole  # noqa: F401 - registers its environments
 from rl_workbench import cli

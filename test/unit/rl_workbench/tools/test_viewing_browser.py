@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import BOUND, Browser, find_browser, wait_for
 from PIL import Image
-from workbench_runs import policy_gradient
+from support.pages.browser import BOUND, Browser, find_browser, wait_for
+from support.training.workbench_runs import policy_gradient
 
 pytestmark = [
     pytest.mark.slow,

@@ -11,8 +11,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
-import workbench_runs
-from workbench_runs import QUICK, job
+from support.training import workbench_runs
+from support.training.workbench_runs import QUICK, job
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError

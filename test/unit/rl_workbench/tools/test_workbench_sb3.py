@@ -5,7 +5,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-import workbench_runs
+from support.training import workbench_runs
 
 from rl_workbench import cli
 from rl_workbench.tools.runs.policies import load_learned

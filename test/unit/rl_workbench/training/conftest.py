@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from training_runs import InterruptAfter, train
+from support.training.training_runs import InterruptAfter, train
 
 SHORT = {"total_timesteps": 120, "eval_frequency": 0}
 

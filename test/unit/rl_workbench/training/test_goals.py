@@ -8,9 +8,18 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
-from goal_environments import REACH, Reach
-from learning_fakes import POLE, register_with
-from training_runs import checkpoint, options_of, points, resume, rows, run, summary, train
+from support.training.goal_environments import REACH, Reach
+from support.training.learning_fakes import POLE, register_with
+from support.training.training_runs import (
+    checkpoint,
+    options_of,
+    points,
+    resume,
+    rows,
+    run,
+    summary,
+    train,
+)
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.environments.making import make_environment

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from training_runs import assert_same_run
+from support.training.training_runs import assert_same_run
 
 from rl_workbench.training import cli, page
 from rl_workbench.training.algorithms import ALGORITHMS

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from training_runs import OTHERS, SMALL, flags, record, summary
+from support.training.training_runs import OTHERS, SMALL, flags, record, summary
 
 from rl_workbench.training import cli
 from rl_workbench.training.algorithms import ALGORITHMS

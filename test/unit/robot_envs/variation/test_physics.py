@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rig import INERTIA, MASS, PERIOD, RIG, Watch, make_both, make_rig
+from support.robots.rig import INERTIA, MASS, PERIOD, RIG, Watch, make_both, make_rig
 
 from robot_envs import RobotEnv, SimulatorError
 from robot_envs.variation import LinkScale, Variation

@@ -8,7 +8,7 @@ import pytest
 from gymnasium.utils.env_checker import data_equivalence as same
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rig import RIG, SLEDGE, make_rig
+from support.robots.rig import RIG, SLEDGE, make_rig
 
 from robot_envs import Robot, RobotEnv
 from robot_envs.scene import Scene

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bullet_gazebo.physics.description import Inertia
-from bullet_gazebo.physics.mechanics.inertia import tensor_in
+from bullet_gazebo.physics.dynamics import tensor_in
 from bullet_gazebo.physics.pose import IDENTITY, Pose
 from robot_envs.variation import LinkScale, Variation
 from robot_envs.variation.inertia import length_axis, scaled

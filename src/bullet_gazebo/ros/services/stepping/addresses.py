@@ -15,7 +15,7 @@ from bullet_gazebo.physics.model import Model
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.ros.services.stepping.answers import ToldJoints
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.state.names import did_you_mean
+from bullet_gazebo.state import did_you_mean
 
 MOST_LISTS = 16  # of each kind that are kept; more than clients of one world send by turns
 Found = TypeVar("Found")

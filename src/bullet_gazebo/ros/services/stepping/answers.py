@@ -11,14 +11,14 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.robot import ControlledRobot
-from bullet_gazebo.ros.wire.conversions import (
+from bullet_gazebo.ros.common.messages import (
     to_contact_state,
     to_pose_msg,
     to_time,
     to_twist_msg,
 )
 from bullet_gazebo.simulator import NANOSECONDS
-from bullet_gazebo.state.query import StateAnswer
+from bullet_gazebo.state import StateAnswer
 
 # As StepWorld.srv has them: success, length of no text, sim_time; the joints' header: seq, stamp, no frame.
 HEAD = struct.Struct("<BId3II")

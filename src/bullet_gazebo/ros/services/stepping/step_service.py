@@ -6,15 +6,14 @@ from contextlib import AbstractContextManager
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
 
 from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.ros.common.node_process import seed_random_numbers
+from bullet_gazebo.ros.common.rospy_polling import PolledService
 from bullet_gazebo.ros.services.stepping.addresses import Addresses
 from bullet_gazebo.ros.services.stepping.answers import JointsAnswer, fields_of
 from bullet_gazebo.ros.services.stepping.step_requests import StepPlan
 from bullet_gazebo.ros.services.stepping.usual_requests import UsualRequests
-from bullet_gazebo.ros.wire.rospy_patches.polling import PolledService
-from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.state.names import UnknownName
-from bullet_gazebo.state.query import NOTHING, StateQuery, StateReader
+from bullet_gazebo.state import NOTHING, StateQuery, StateReader, UnknownName
 
 SLICE = 500  # ticks between which other services get their turn
 

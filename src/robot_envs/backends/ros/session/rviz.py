@@ -6,7 +6,7 @@ from collections.abc import Callable
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from ros_utils import ros_launch
-from web_page.display import hindrance
+from viewer.display import hindrance
 
 
 def check_rviz(robot: Robot) -> None:

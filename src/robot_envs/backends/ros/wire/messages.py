@@ -11,7 +11,7 @@ from geometry_msgs.msg import Pose as PoseMsg
 from sensor_msgs.msg import JointState as JointStateMsg
 
 from bullet_gazebo.physics.pose import Pose, Vector
-from bullet_gazebo.state.query import NOTHING
+from bullet_gazebo.state import NOTHING
 from robot_envs.errors import SimulatorFault
 from robot_envs.scene import Scene
 from robot_envs.world_state import (

@@ -1,8 +1,8 @@
 """A world with a ground, and what is in it."""
 
 import pytest
-from box_and_wheel import BOX, UP, WHEEL
-from robots import cartpole_urdf
+from support.robots.bodies import BOX, UP, WHEEL
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose

@@ -3,8 +3,8 @@
 import math
 
 import pytest
-from box_and_wheel import run
-from robots import cartpole_urdf
+from support.robots.bodies import run
+from support.robots.cartpole import cartpole_urdf
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from box_and_wheel import UP, run
+from support.robots.bodies import UP, run
 
 from bullet_gazebo.physics.description import Inertia
 from bullet_gazebo.physics.files.urdf import parse_urdf

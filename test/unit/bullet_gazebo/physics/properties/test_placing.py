@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from box_and_wheel import UP, WHEEL
-from robots import CartPole
+from support.robots.bodies import UP, WHEEL
+from support.robots.cartpole import CartPole
 
+from bullet_gazebo.physics.dynamics import effective_inertias
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.mechanics.mass_matrix import effective_inertias
 from bullet_gazebo.physics.model import AT_REST
 from bullet_gazebo.physics.pose import Pose, from_rpy
 from bullet_gazebo.physics.projection import place_link

@@ -1,10 +1,10 @@
 """Gravity, time step and frames of a world."""
 
 import pytest
-from box_and_wheel import BOX, UP, run
+from support.robots.bodies import BOX, UP, run
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from bullet_gazebo.physics.settings import SolverSettings
+from bullet_gazebo.physics.world import SolverSettings
 
 
 def test_gravity_and_time_step_act(world, box):

@@ -1,6 +1,5 @@
 """Addresses where no cluster is: one line, found out without Ray."""
 
-import os
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -10,7 +9,7 @@ import pytest
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.cluster import address, joining
+from rl_workbench.training.cluster import address
 from rl_workbench.training.cluster.address import check_address
 
 Answering = Callable[[bytes], str]
@@ -131,7 +130,6 @@ def test_what_speaks_as_a_head_does_and_refuses(code: str, line: str) -> None:
 @pytest.mark.extras("ray")
 @pytest.mark.usefixtures("signals")
 @pytest.mark.parametrize("command", [
-    ["train", "--algo", "reinforce"],
     ["benchmark", "--seeds", "1"],
 ])  # fmt: skip
 def test_a_command_says_it_in_one_line(
@@ -147,16 +145,3 @@ def test_a_command_says_it_in_one_line(
         assert cli.main([*command, *place, "--ray", where]) == 1
         said = capsys.readouterr().err.splitlines()
         assert len(said) == 1 and where in said[0] and said[0].startswith("rl-workbench"), said
-
-
-@pytest.mark.extras("ray")
-@pytest.mark.usefixtures("signals")
-def test_more_workers_than_this_machine_has_processors(tmp_path, monkeypatch, capsys) -> None:
-    """Nobody waits until a cluster has started."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(joining, "_init", lambda *_, **__: pytest.fail())
-    count = len(os.sched_getaffinity(0))
-    command = ["train", "--algo", "reinforce", f"--num-envs={count + 1}", "--ray=local"]
-    assert cli.main(command) == 1
-    (said,) = capsys.readouterr().err.splitlines()
-    assert f"num_envs {count + 1} takes as many processors, and the cluster has {count}: " in said

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from fake_ray import FakeRay, RayError
+from support.training.fake_ray import FakeRay, RayError
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.cluster import joining

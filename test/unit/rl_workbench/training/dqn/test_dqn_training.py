@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from training_runs import (
+from support.training.training_runs import (
     InterruptAfter,
     checkpoint,
     points,

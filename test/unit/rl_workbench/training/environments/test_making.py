@@ -5,7 +5,7 @@ import math
 import gymnasium
 import numpy as np
 import pytest
-from learning_fakes import POLE, SPOILT, Died
+from support.training.learning_fakes import POLE, SPOILT, Died
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.environments.making import (

@@ -6,8 +6,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from goal_environments import REACH
-from learning_fakes import POLE, Dicing
+from support.training.goal_environments import REACH
+from support.training.learning_fakes import POLE, Dicing
 
 from rl_workbench.training.environments.answers import as_vector
 from rl_workbench.training.environments.making import make_environment

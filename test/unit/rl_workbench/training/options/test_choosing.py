@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from training_runs import ALL, EXACT
+from support.training.training_runs import ALL, EXACT
 
 from rl_workbench.agents.dqn.settings import DQNSettings
 from rl_workbench.errors import WorkbenchError

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from training_runs import ALL, EXACT, flags, resume, small, summary, train
+from support.training.training_runs import ALL, EXACT, flags, resume, small, summary, train
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm, recorded_options

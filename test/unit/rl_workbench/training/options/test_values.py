@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from training_runs import EXACT
+from support.training.training_runs import EXACT
 
 import robot_envs.robots  # noqa: F401 - registers what some sections are for
 from rl_workbench.agents.dqn.settings import DQNSettings

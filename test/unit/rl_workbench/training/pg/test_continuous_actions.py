@@ -5,9 +5,9 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from goal_environments import REACH, Reach
-from learning_fakes import register_with
-from training_runs import (
+from support.training.goal_environments import REACH, Reach
+from support.training.learning_fakes import register_with
+from support.training.training_runs import (
     InterruptAfter,
     assert_same_run,
     checkpoint,

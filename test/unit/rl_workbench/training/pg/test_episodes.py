@@ -5,7 +5,7 @@ import random
 import gymnasium
 import numpy as np
 import torch
-from learning_fakes import POLE
+from support.training.learning_fakes import POLE
 
 from rl_workbench.agents.pg.reinforce import ReinforceAgent
 from rl_workbench.training.pg.episodes import run_episode

@@ -4,7 +4,16 @@ from pathlib import Path
 
 import pytest
 import torch
-from training_runs import EXACT, checkpoint, files, points, record, rows, summary, train
+from support.training.training_runs import (
+    EXACT,
+    checkpoint,
+    files,
+    points,
+    record,
+    rows,
+    summary,
+    train,
+)
 
 from rl_workbench.agents.pg.document import PolicyNetwork, ValueNetwork
 

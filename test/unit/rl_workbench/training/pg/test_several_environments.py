@@ -6,8 +6,8 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from learning_fakes import POLE, Elsewhere, Fragile, OnlyOne, Pole, register_with
-from training_runs import (
+from support.training.learning_fakes import POLE, Elsewhere, Fragile, OnlyOne, Pole, register_with
+from support.training.training_runs import (
     InterruptAfter,
     assert_no_doubles,
     assert_same,

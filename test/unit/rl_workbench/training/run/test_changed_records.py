@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from training_runs import record, resume, summary
+from support.training.training_runs import record, resume, summary
 
 
 @pytest.mark.parametrize("versions", [None, ["python"], 3])

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 import torch
-from training_runs import ALL, InterruptAfter, resume, train
+from support.training.training_runs import ALL, InterruptAfter, resume, train
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import check_optimizer

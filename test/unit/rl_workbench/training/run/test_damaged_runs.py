@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from training_runs import (
+from support.training.training_runs import (
     ALL,
     EXACT,
     InterruptAfter,

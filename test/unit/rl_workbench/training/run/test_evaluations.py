@@ -5,9 +5,9 @@ from typing import ClassVar
 
 import gymnasium
 import pytest
-from goal_environments import REACH, SHARED_REACH
-from learning_fakes import POLE, Dicing, OnlyOne, Pole, register_with
-from training_runs import (
+from support.training.goal_environments import REACH, SHARED_REACH
+from support.training.learning_fakes import POLE, Dicing, OnlyOne, Pole, register_with
+from support.training.training_runs import (
     ALL,
     EXACT,
     OTHERS,

@@ -9,8 +9,8 @@ from pathlib import Path
 import gymnasium
 import pytest
 import torch
-from learning_fakes import POLE, SPOILT, Died, Pole, register_with
-from training_runs import (
+from support.training.learning_fakes import POLE, SPOILT, Died, Pole, register_with
+from support.training.training_runs import (
     ALL,
     EXACT,
     OTHERS,

@@ -13,8 +13,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from stress.trainings import OPTIONS, forked, new, wait_for_newer_checkpoint
-from training_runs import (
+from support.stress.trainings import OPTIONS, forked, new, wait_for_newer_checkpoint
+from support.training.training_runs import (
     EXACT,
     assert_no_doubles,
     assert_same_run,

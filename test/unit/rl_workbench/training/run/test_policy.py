@@ -6,7 +6,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from training_runs import ALL, EXACT
+from support.training.training_runs import ALL, EXACT
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import recorded_options

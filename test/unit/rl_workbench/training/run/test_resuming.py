@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from learning_fakes import Dicing, OnlyOne, register_with
-from training_runs import (
+from support.training.learning_fakes import Dicing, OnlyOne, register_with
+from support.training.training_runs import (
     EXACT,
     InterruptAfter,
     assert_no_doubles,

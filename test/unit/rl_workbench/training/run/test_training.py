@@ -5,9 +5,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
-from tensorboard.plugins.hparams import plugin_data_pb2
-from training_runs import (
+from support.training.training_runs import (
     ALL,
     EXACT,
     assert_no_doubles,
@@ -22,6 +20,8 @@ from training_runs import (
     summary,
     train,
 )
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from tensorboard.plugins.hparams import plugin_data_pb2
 
 from rl_workbench.errors import WorkbenchError
 

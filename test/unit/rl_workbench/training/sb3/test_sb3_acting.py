@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from training_runs import options_of, record
+from support.training.training_runs import options_of, record
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.algorithms import recorded_options

@@ -7,8 +7,8 @@ from typing import Any
 import gymnasium
 import pytest
 import torch
-from goal_environments import REACH
-from training_runs import (
+from support.training.goal_environments import REACH
+from support.training.training_runs import (
     InterruptAfter,
     assert_no_doubles,
     assert_same,

@@ -8,8 +8,8 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
-from learning_fakes import POLE, Elsewhere, Fragile, register_with
-from training_runs import (
+from support.training.learning_fakes import POLE, Elsewhere, Fragile, register_with
+from support.training.training_runs import (
     InterruptAfter,
     assert_no_doubles,
     assert_same,

@@ -14,8 +14,8 @@ from pathlib import Path
 import gymnasium
 import pytest
 import rospy
-from environment_conformance import RICH, EnvironmentConformance
-from scenes.two_arms import LEFT, RIGHT, Volley
+from support.scenes.two_arms import LEFT, RIGHT, Volley
+from support.training.environment_conformance import RICH, EnvironmentConformance
 
 from robot_envs import RobotEnv
 from robot_envs.backends.ros.own_world import memory

@@ -1,4 +1,0 @@
-"""Joint trajectories: splines, plans, tolerances, goals. No ROS, no engine.
-
-See docs/contract/ros_control.md 3.5.
-"""

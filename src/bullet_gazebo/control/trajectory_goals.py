@@ -1,0 +1,279 @@
+"""A goal of follow_joint_trajectory: whether it is reached, missed or still on its way."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.trajectory import NANOSECONDS, Axis, Waypoint
+
+SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS = 0, -1, -2  # control_msgs/FollowJointTrajectoryResult
+PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
+MOST_NAMED = 10  # joints in an error text
+LARGEST = 1e12  # of a position and its derivatives; beyond it a spline's figures would overflow
+
+
+class TrajectoryRefused(ControlError):
+    """A trajectory that can't be followed. `code` is FollowJointTrajectory's error code."""
+
+    def __init__(self, code: int, text: str) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+class TrajectoryPoint(NamedTuple):
+    """trajectory_msgs/JointTrajectoryPoint: `time` is time_from_start [ns]; values in order of joints."""
+
+    time: int
+    positions: Sequence[float]
+    velocities: Sequence[float] = ()
+    accelerations: Sequence[float] = ()
+
+    def waypoint(self, index: int) -> Waypoint:
+        """Returns the point of the joint with that place in the trajectory."""
+        return Waypoint(
+            self.positions[index],
+            self.velocities[index] if self.velocities else None,
+            self.accelerations[index] if self.accelerations else None,
+        )
+
+
+class Trajectory(NamedTuple):
+    """trajectory_msgs/JointTrajectory; it begins at `stamp` [ns], or with the next tick if that is 0."""
+
+    names: Sequence[str]
+    points: Sequence[TrajectoryPoint]
+    stamp: int = 0
+
+
+def check_joints(names: Sequence[str], joints: Sequence[str], partial: bool) -> None:
+    """Returns if `names` are `joints` in any order, or with `partial` some of them.
+
+    Raises:
+        TrajectoryRefused: if they aren't.
+    """
+    unknown = [name for name in names if name not in joints]
+    missing = [joint for joint in joints if joint not in names]
+    fault = ""
+    if unknown:
+        fault = f"the controller has no joint {_shortened(unknown)}; it has {list(joints)}"
+    elif len(set(names)) < len(names):
+        fault = f"a joint is named twice: {_shortened(names)}"
+    elif not names:
+        fault = "it names no joint"
+    elif missing and not partial:
+        fault = f"it lacks {missing}, and allow_partial_joints_goal is not set"
+    if fault:
+        raise TrajectoryRefused(INVALID_JOINTS, f"The trajectory's joints don't match: {fault}")
+
+
+def _shortened(names: Sequence[str]) -> str:
+    """A list of names for a text that goes into the log and to the client."""
+    rest = len(names) - MOST_NAMED
+    return str(list(names[:MOST_NAMED])) + (f" and {rest} more" if rest > 0 else "")
+
+
+def check_points(trajectory: Trajectory) -> None:
+    """Returns if all points are whole, finite, and later than the one before.
+
+    Raises:
+        TrajectoryRefused: if one isn't.
+    """
+    before = -1
+    for number, point in enumerate(trajectory.points):
+        fault = _fault(point, len(trajectory.names))
+        if not fault and point.time <= before:
+            fault = (
+                f"time_from_start is {point.time / NANOSECONDS} s: it must be more than "
+                f"{'the one before' if number else 'or equal to 0'}"
+            )
+        if fault:
+            raise TrajectoryRefused(INVALID_GOAL, f"Point {number} of the trajectory: {fault}")
+        before = point.time
+
+
+def dropped_points(trajectory: Trajectory, elapsed: int) -> tuple[int, str]:
+    """Returns how many points come too late, `elapsed` [ns] after the trajectory begins, and a warning.
+
+    Raises:
+        TrajectoryRefused: if all of them do.
+    """
+    points = trajectory.points
+    dropped = sum(point.time <= elapsed for point in points)
+    if dropped == len(points):
+        late = (elapsed - points[-1].time) / NANOSECONDS
+        raise TrajectoryRefused(
+            INVALID_GOAL,
+            f"All {dropped} points of the trajectory lie in the past, the last one by {late:f} s",
+        )
+    # Most clients begin with a point "now", so it is no news that it is over.
+    if not dropped or (dropped == 1 and not trajectory.stamp and not points[0].time):
+        return dropped, ""
+    return dropped, f"The first {dropped} of {len(points)} points lie in the past: left out"
+
+
+def _fault(point: TrajectoryPoint, joints: int) -> str:
+    """Returns what is wrong with the point, or nothing."""
+    if not point.positions:
+        return "it has no positions"
+    for what, values in zip(point._fields[1:], point[1:], strict=True):
+        if values and len(values) != joints:
+            return f"it has {len(values)} {what} for {joints} joints"
+        bad = [value for value in values if not (math.isfinite(value) and abs(value) <= LARGEST)]
+        if bad:
+            return f"its {what} must be finite and within {LARGEST:g}: {bad[0]}"
+    return ""
+
+
+class Tolerance(NamedTuple):
+    """control_msgs/JointTolerance of position [rad, m] and velocity [1/s]; 0 or less: any error will do.
+
+    Accelerations aren't measured, so none is ever off.
+    """
+
+    position: float = 0.0
+    velocity: float = 0.0
+
+    def violation(self, position_error: float, velocity_error: float) -> str:
+        """Returns what is exceeded, or nothing."""
+        if 0.0 < self.position < abs(position_error):
+            return f"position, tolerance {self.position:g}"
+        if 0.0 < self.velocity < abs(velocity_error):
+            return f"velocity {velocity_error:f}, tolerance {self.velocity:g}"
+        return ""
+
+    def changed(self, wish: "Tolerance | None") -> "Tolerance":
+        """Returns the tolerance with a goal's wishes: more than 0 overrides, less disables, 0 keeps."""
+        if wish is None:
+            return self
+        return Tolerance(*(w if w else own for own, w in zip(self, wish, strict=True)))
+
+
+class Constraints(NamedTuple):
+    """The parameters `constraints`: a tolerance for each joint, and how late [ns] the end may come."""
+
+    path: tuple[Tolerance, ...]
+    goal: tuple[Tolerance, ...]
+    goal_time: int = 0
+
+
+SUCCEEDED, ABORTED, CANCELED = "succeeded", "aborted", "canceled"
+
+
+class Outcome(NamedTuple):
+    """How a goal ended; `code` is FollowJointTrajectory's error code."""
+
+    kind: str
+    code: int = SUCCESSFUL
+    text: str = ""
+
+
+class TrajectorySample(NamedTuple):
+    """control_msgs/JointTrajectoryControllerState; values in the order of `names`. [rad, m, 1/s, 1/s²]"""
+
+    stamp: int  # [ns]
+    names: tuple[str, ...]
+    desired: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+    actual: tuple[tuple[float, ...], tuple[float, ...]]
+    error: tuple[tuple[float, ...], tuple[float, ...]]
+
+
+class GoalListener(Protocol):
+    """Hears of a goal from within a control tick, so it must not wait for anything."""
+
+    def feedback(self, sample: TrajectorySample) -> None:
+        """Where the joints are; at action_monitor_rate."""
+
+    def finished(self, outcome: Outcome) -> None:
+        """The end; nothing comes after it."""
+
+
+class GoalRequest(NamedTuple):
+    """A goal as the client sent it; tolerances by joint, `goal_time` [ns]."""
+
+    trajectory: Trajectory
+    path: Mapping[str, Tolerance] = {}
+    goal: Mapping[str, Tolerance] = {}
+    goal_time: int = 0
+
+
+class MonitoredJoint(NamedTuple):
+    """A joint of a goal, and its tolerances on the way and at the end."""
+
+    axis: Axis
+    path: Tolerance
+    goal: Tolerance
+
+
+class Goal:
+    """An accepted goal. `key` identifies it; `outcome` is a success that wasn't told yet."""
+
+    def __init__(
+        self,
+        key: str,
+        listener: GoalListener,
+        monitored: list[MonitoredJoint],
+        start: int,
+        late: int,
+    ) -> None:
+        """It begins at uptime `start` [ns], and may end `late` [ns] after its last point."""
+        self.key = key
+        self.listener = listener
+        self.outcome: Outcome | None = None
+        self._monitored = monitored
+        self._start = start
+        self._late = late
+
+    def check(self, uptime: int) -> Outcome | None:
+        """Returns the outcome, None while the joints are on their way."""
+        reached = True
+        for axis, path, goal in self._monitored:
+            if uptime < axis.spline.end:
+                reached = False
+                fault = (
+                    path.violation(axis.position_error, axis.velocity_error)
+                    if uptime >= self._start
+                    else ""
+                )
+                if fault:
+                    return _aborted(PATH_TOLERANCE_VIOLATED, axis, "path", fault)
+            elif fault := goal.violation(axis.position_error, axis.velocity_error):
+                reached = False
+                if uptime >= axis.spline.end + self._late:
+                    return _aborted(GOAL_TOLERANCE_VIOLATED, axis, "goal", fault)
+        return Outcome(SUCCEEDED) if reached else None
+
+
+def check_tolerances(request: GoalRequest) -> None:
+    """Returns if all tolerances are numbers: no error would ever exceed what is none.
+
+    Raises:
+        TrajectoryRefused: if one isn't.
+    """
+    for joint, tolerance in (*request.path.items(), *request.goal.items()):
+        if any(math.isnan(value) for value in tolerance):
+            raise TrajectoryRefused(INVALID_GOAL, f"A tolerance of joint '{joint}' is not a number")
+
+
+def monitored_joints(
+    request: GoalRequest, axes: Sequence[Axis], constraints: Constraints
+) -> tuple[list[MonitoredJoint], int]:
+    """Returns the goal's joints with their tolerances, and how late [ns] they may come."""
+    wanted = request.trajectory.names
+    monitored = [
+        MonitoredJoint(
+            axis,
+            path.changed(request.path.get(axis.joint.name)),
+            goal.changed(request.goal.get(axis.joint.name)),
+        )
+        for axis, path, goal in zip(axes, constraints.path, constraints.goal, strict=True)
+        if axis.joint.name in wanted
+    ]
+    late = max(0, request.goal_time) if request.goal_time else constraints.goal_time
+    return monitored, late
+
+
+def _aborted(code: int, axis: Axis, where: str, fault: str) -> Outcome:
+    return Outcome(
+        ABORTED, code, f"{axis.joint.name} {where} error {axis.position_error:f} ({fault})"
+    )

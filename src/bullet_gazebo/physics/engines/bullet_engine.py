@@ -1,0 +1,250 @@
+"""PyBullet behind the engine interface."""
+
+import contextlib
+import locale
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from bullet_gazebo.heap import give_back
+from bullet_gazebo.physics.description import DescriptionError, ModelDescription
+from bullet_gazebo.physics.engine import Body, Contact, Engine, Side
+from bullet_gazebo.physics.engine_form import at_joints, parents_first
+from bullet_gazebo.physics.engines.bullet_body import (
+    BASE,
+    BulletBody,
+    collides_with_itself,
+    contacts,
+    is_plane,
+)
+from bullet_gazebo.physics.engines.bullet_files import write_urdf
+from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector, scale
+from bullet_gazebo.scratch import scratch_folder
+
+MOST_ITERATIONS = 1000  # of the solver in a step; more would only hold the world
+PLANE = 1200  # [bytes] of a file, had it been loaded from one
+
+
+@dataclass
+class BulletSettings:
+    """Gravity [m/s²], length of a step [s], iterations of the solver; at first PyBullet's own."""
+
+    gravity: Vector = ZERO
+    time_step: float = 1.0 / 240.0
+    iterations: int = 50
+
+
+class BulletClient:
+    """A connection to PyBullet, in this process, without a window.
+
+    `live` and `waste` are the bytes of files that the bodies were loaded from, and those that were removed.
+    """
+
+    def __init__(self, settings: BulletSettings) -> None:
+        self._client = pybullet.connect(pybullet.DIRECT)
+        # The order of contact pairs decides the solver's result: keep it the same in every run. And each
+        # body has files of its own, so it is of no use to keep them.
+        pybullet.setPhysicsEngineParameter(
+            deterministicOverlappingPairs=1, enableFileCaching=0, physicsClientId=self._client
+        )
+        self._step = partial(pybullet.stepSimulation, self._client)
+        self._gravity: Vector = ZERO
+        self._time_step = 0.0
+        self._bodies: dict[int, BulletBody] = {}
+        self._sides: dict[tuple[int, int], Side] = {}  # by body and link
+        self._weightless: set[tuple[int, int]] = set()  # body and link, where gravity doesn't act
+        self._sizes: dict[int, int] = {}  # [bytes] by body
+        self.waste = 0
+        self.apply(settings)
+
+    @property
+    def live(self) -> int:
+        return sum(self._sizes.values())
+
+    def apply(self, settings: BulletSettings) -> None:
+        """Hands the settings to the engine."""
+        self._gravity, self._time_step = settings.gravity, settings.time_step
+        iterations = max(1, min(settings.iterations, MOST_ITERATIONS))
+        pybullet.setGravity(*settings.gravity, physicsClientId=self._client)
+        pybullet.setTimeStep(settings.time_step, physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(
+            numSolverIterations=iterations, physicsClientId=self._client
+        )
+        for body in self._bodies.values():
+            body.set_time_step(settings.time_step)
+
+    def load(self, description: ModelDescription, pose: Pose) -> BulletBody:
+        """See `Engine.load`."""
+        if is_plane(description):
+            return self._load_plane(description, pose)
+        engine_form, offsets = at_joints(description)
+        flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_MAINTAIN_LINK_ORDER
+        if collides_with_itself(description):
+            flags |= (
+                pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
+            )
+        try:
+            with scratch_folder() as folder:
+                path = folder / "model.urdf"
+                text = write_urdf(parents_first(engine_form), folder)
+                path.write_text(text, encoding="utf-8")
+                size = _size(folder)
+                with _decimal_points():
+                    body = pybullet.loadURDF(
+                        str(path), pose.position, pose.orientation, useFixedBase=description.fixed_base,
+                        flags=flags, physicsClientId=self._client,
+                    )  # fmt: skip
+        except pybullet.error as error:
+            self.waste += size
+            raise DescriptionError(f"the physics engine can't load the model: {error}") from error
+        except OSError as error:  # a full disk
+            raise DescriptionError(
+                f"the physics engine's files can't be written: {error.strerror or error}"
+            ) from error
+        self._sizes[body] = size
+        try:
+            made = BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
+        except DescriptionError:
+            self.remove(body)
+            raise
+        return self._keep(made)
+
+    def _load_plane(self, description: ModelDescription, pose: Pose) -> BulletBody:
+        shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
+        plane = pose.compose(description.links[description.root].collisions[0].pose)
+        body = pybullet.createMultiBody(
+            0.0, shape, -1, plane.position, plane.orientation, physicsClientId=self._client
+        )
+        self._sizes[body] = PLANE
+        return self._keep(BulletBody(self._client, body, description, pose, self._weightless, {}))
+
+    def _keep(self, body: BulletBody) -> BulletBody:
+        body.set_time_step(self._time_step)
+        self._bodies[body.id] = body
+        for index, touching in body.touching.items():
+            self._sides[body.id, index] = Side(body, *touching)
+        return body
+
+    def remove(self, body: int) -> None:
+        """Takes a body out of the world."""
+        pybullet.removeBody(body, physicsClientId=self._client)
+        self._weightless -= {key for key in self._weightless if key[0] == body}
+        self.waste += self._sizes.pop(body)
+        self._bodies.pop(body, None)
+        self._sides = {key: side for key, side in self._sides.items() if key[0] != body}
+
+    def step(self) -> None:
+        """Integrates by one time step."""
+        if self._weightless:
+            self._hold_up()
+        self._step()
+
+    def contacts(self) -> list[Contact]:
+        """See `Engine.contacts`."""
+        return contacts(self._client, self._sides)
+
+    def forget_contacts(self) -> None:
+        """See `Engine.forget_contacts`."""
+        for body in self._bodies.values():
+            body.forget_contacts()
+
+    def _hold_up(self) -> None:
+        """PyBullet's gravity acts on everything: a weightless link is held by a force against it."""
+        for body, link in self._weightless:
+            mass = pybullet.getDynamicsInfo(body, link, self._client)[0]
+            if link == BASE:
+                com = pybullet.getBasePositionAndOrientation(body, self._client)[0]
+            else:
+                com = pybullet.getLinkState(body, link, 0, 1, self._client)[0]
+            pybullet.applyExternalForce(
+                body, link, scale(self._gravity, -mass), com, pybullet.WORLD_FRAME, self._client
+            )
+
+    def close(self) -> None:
+        """Frees all of it."""
+        pybullet.disconnect(self._client)
+
+
+@contextlib.contextmanager
+def _decimal_points() -> Iterator[None]:
+    """Has the C library read 0.5 as one half. Where Qt or a user's code has chosen a language that writes
+    0,5 it reads 0."""
+    before = locale.setlocale(locale.LC_NUMERIC)
+    locale.setlocale(locale.LC_NUMERIC, "C")
+    try:
+        yield
+    finally:
+        locale.setlocale(locale.LC_NUMERIC, before)
+
+
+def _size(folder: Path) -> int:
+    """Bytes that the engine reads: what was written into `folder`."""
+    return sum(path.stat().st_size for path in folder.iterdir())
+
+
+MOST_WASTE = 1_000_000  # [bytes] of files that removed bodies were loaded from: 5 MB of memory
+
+
+class BulletEngine(Engine):
+    """PyBullet worlds, one after the other: a new one frees what removed bodies have left in the old one."""
+
+    def __init__(self) -> None:
+        self._settings = BulletSettings()
+        self._client = BulletClient(self._settings)
+        self._most_waste = MOST_WASTE
+
+    def load(self, description: ModelDescription, pose: Pose) -> BulletBody:
+        return self._client.load(description, pose)
+
+    def remove(self, body: Body) -> None:
+        assert isinstance(body, BulletBody)
+        self._client.remove(body.id)
+
+    def renewed(self, bodies: Sequence[tuple[ModelDescription, Body]]) -> list[Body]:
+        if self._client.waste <= max(self._most_waste, self._client.live):
+            return super().renewed(bodies)
+        fresh = BulletClient(self._settings)
+        try:
+            moved = [_moved(description, body, fresh) for description, body in bodies]
+        except DescriptionError:  # no room for their files: the old world goes on
+            fresh.close()
+            self._most_waste = 2 * self._client.waste
+            return super().renewed(bodies)
+        self._client.close()
+        give_back()
+        self._client, self._most_waste = fresh, MOST_WASTE
+        return moved
+
+    def set_gravity(self, gravity: Vector) -> None:
+        self._settings.gravity = gravity
+        self._client.apply(self._settings)
+
+    def set_time_step(self, dt: float) -> None:
+        self._settings.time_step = dt
+        self._client.apply(self._settings)
+
+    def set_iterations(self, count: int) -> None:
+        self._settings.iterations = count
+        self._client.apply(self._settings)
+
+    def step(self) -> None:
+        self._client.step()
+
+    def forget_contacts(self) -> None:
+        self._client.forget_contacts()
+
+    def contacts(self) -> list[Contact]:
+        return self._client.contacts()
+
+    def close(self) -> None:
+        self._client.close()
+
+
+def _moved(description: ModelDescription, body: Body, client: BulletClient) -> Body:
+    """Returns `body` loaded anew, in the same state."""
+    assert isinstance(body, BulletBody)
+    fresh = client.load(description, body.link_state(description.root)[0])
+    fresh.go_on_from(body)
+    return fresh

@@ -1,0 +1,155 @@
+"""Writes a ModelDescription as the URDF that the engine reads: lumped, without Gazebo's extensions."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+
+from bullet_gazebo.physics.description import Inertia, Joint, Link, Mesh, ModelDescription, Shape
+from bullet_gazebo.physics.pose import Pose, to_rpy
+
+SIDES = 128  # of what stands for a cylinder
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of STL
+
+
+def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
+    """Returns the name of a file in `folder`: the triangles if they are to be `concave`, else the hulls.
+
+    PyBullet sorts the points of an OBJ file's `objects`, and takes those of an STL file as they come. Which
+    of two equal ones touches first decides on the last bits, so what was an OBJ file becomes one again.
+    """
+    path = folder / f"{mesh.digest}.{'stl' if concave or not objects else 'obj'}"
+    if path.exists():
+        return str(path)
+    if concave:
+        path.write_bytes(_stl(mesh.vertices[mesh.faces]))
+    elif objects:
+        path.write_text(_obj(mesh), encoding="ascii")
+    else:
+        points = np.concatenate(mesh.hulls)
+        path.write_bytes(_stl(points[np.arange(-(-len(points) // 3) * 3) % len(points)]))
+    return str(path)
+
+
+def drum(folder: Path) -> Path:
+    """Returns a file in `folder`: a cylinder of radius 1 and length 1 about z. It rests on a flat side."""
+    path = folder / "drum.obj"
+    if not path.exists():
+        angles = [2.0 * math.pi * (side + 0.5) / SIDES for side in range(SIDES)]
+        rims = [f"v {math.cos(a)!r} {math.sin(a)!r} {z}" for z in (-0.5, 0.5) for a in angles]
+        sides = [(i, i % SIDES + 1) for i in range(1, SIDES + 1)]
+        faces = [f"f {i} {j} {j + SIDES}\nf {i} {j + SIDES} {i + SIDES}" for i, j in sides]
+        path.write_text("\n".join([*rims, *faces, ""]))
+    return path
+
+
+def _stl(corners: np.ndarray) -> bytes:
+    """Facets in binary STL, which the engine reads fastest; normals are left to it."""
+    facets = np.zeros(corners.size // 9, FACET)
+    facets["corners"] = corners.reshape(-1, 3, 3)
+    return bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
+
+
+def _obj(mesh: Mesh) -> str:
+    """An object for each hull: the engine makes a convex body of each. Faces only list the points."""
+    lines, start = [], 1
+    for number, points in enumerate(mesh.hulls):
+        lines.append(f"o {number}")
+        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
+        corners = [f"{start + i % len(points)}" for i in range(len(points) + 2)]
+        lines += [f"f {' '.join(corners[i : i + 3])}" for i in range(len(points))]
+        start += len(points)
+    return "\n".join([*lines, ""])
+
+
+MARGIN = 0.001  # [m]; PyBullet's, around convex hulls
+
+
+def write_urdf(model: ModelDescription, folder: Path | None = None) -> str:
+    """Returns URDF text with the numbers of `model` to the last digit.
+
+    Visuals are left out: nothing is drawn. Meshes are written into `folder`, if one is given: the engine
+    never opens a user's file, which it would crash on or take from its memory of files.
+    """
+    robot = Element("robot", name="model")
+    for link in model.links.values():
+        _write_link(robot, link, model.static, folder)
+    for joint in model.joints.values():
+        _write_joint(robot, joint)
+    indent(robot)  # the engine reads lines of up to 8 KiB and breaks longer ones anywhere
+    return tostring(robot, encoding="unicode")
+
+
+def _write_link(robot: Element, link: Link, static: bool, folder: Path | None) -> None:
+    element = SubElement(robot, "link", name=link.name)
+    # Without an inertial the engine would assume 1 kg; only the immovable link `world` has none.
+    _write_inertia(element, link.inertia or Inertia(mass=0.0))
+    for given in link.collisions:
+        shape = _finer(given, folder)
+        written = SubElement(element, "collision")
+        if static and shape.kind == "mesh":
+            written.set("concave", "yes")  # what moves collides by its convex hull
+        if shape.solid is not None and folder is not None:
+            objects = Path(shape.mesh).suffix.lower() == ".obj"
+            written_mesh = write_mesh(shape.solid, folder, concave=static, objects=objects)
+            shape = replace(shape, mesh=written_mesh)
+        _write_shape(written, shape)
+
+
+def _finer(shape: Shape, folder: Path | None) -> Shape:
+    """The engine's own cylinder has 32 sides: a wheel rocks on them, and each one brakes it.
+
+    Around a mesh the engine keeps a margin, by which a wheel would roll too far.
+    """
+    if shape.kind != "cylinder" or folder is None:
+        return shape
+    radius, length = max(shape.size[0] - MARGIN, 0.5 * shape.size[0]), shape.size[1]
+    length = max(length - 2.0 * MARGIN, 0.5 * length)
+    return replace(shape, kind="mesh", size=(radius, radius, length), mesh=str(drum(folder)))
+
+
+def _write_inertia(link: Element, inertia: Inertia) -> None:
+    inertial = SubElement(link, "inertial")
+    _write_origin(inertial, inertia.com)
+    SubElement(inertial, "mass", value=repr(inertia.mass))
+    tensor = {
+        key: repr(getattr(inertia, key)) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    }
+    SubElement(inertial, "inertia", tensor)
+
+
+def _write_shape(element: Element, shape: Shape) -> None:
+    _write_origin(element, shape.pose)
+    geometry = SubElement(element, "geometry")
+    if shape.kind == "box":
+        SubElement(geometry, "box", size=_words(shape.size))
+    elif shape.kind == "cylinder":
+        SubElement(geometry, "cylinder", radius=repr(shape.size[0]), length=repr(shape.size[1]))
+    elif shape.kind == "sphere":
+        SubElement(geometry, "sphere", radius=repr(shape.size[0]))
+    elif shape.kind == "plane":
+        SubElement(geometry, "plane", normal="0 0 1")
+    else:
+        SubElement(geometry, "mesh", filename=shape.mesh, scale=_words(shape.size))
+
+
+def _write_joint(robot: Element, joint: Joint) -> None:
+    element = SubElement(robot, "joint", name=joint.name, type=joint.kind)
+    _write_origin(element, joint.pose)
+    SubElement(element, "parent", link=joint.parent)
+    SubElement(element, "child", link=joint.child)
+    SubElement(element, "axis", xyz=_words(joint.axis))
+    limit = {"effort": repr(joint.effort), "velocity": repr(joint.velocity)}
+    if joint.bounded:
+        limit |= {"lower": repr(joint.lower), "upper": repr(joint.upper)}
+    SubElement(element, "limit", limit)
+
+
+def _write_origin(element: Element, pose: Pose) -> None:
+    SubElement(element, "origin", xyz=_words(pose.position), rpy=_words(to_rpy(pose.orientation)))
+
+
+def _words(numbers: tuple[float, ...]) -> str:
+    return " ".join(repr(float(number)) for number in numbers)

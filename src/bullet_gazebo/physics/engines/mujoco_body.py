@@ -1,0 +1,325 @@
+"""A model inside MuJoCo."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import hypot
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from bullet_gazebo.physics.description import DescriptionError, Inertia, Joint, ModelDescription
+from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Body, Contact, Side, Twist
+from bullet_gazebo.physics.engines.mujoco_model import Elements, priority, wxyz, xyzw
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, conjugate, rotate, scale
+
+FREE = 6  # degrees of freedom of a body without joints
+FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
+
+
+class BodyArrays(NamedTuple):
+    """State of one body, and what acts on it during the next step; each an array of MuJoCo's."""
+
+    positions: np.ndarray
+    velocities: np.ndarray
+    efforts: np.ndarray
+    wrenches: np.ndarray
+
+
+@dataclass
+class MujocoState:
+    """Shared by the engine and its bodies."""
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    stale: bool = True  # poses and twists are those of another state
+    loaded: bool = False  # efforts or wrenches wait for the next step
+    speeds: dict[int, float] = field(default_factory=dict)  # that motors want, by degree of freedom
+
+    def __post_init__(self) -> None:
+        self._watch()
+
+    def replace(self, model: mujoco.MjModel) -> None:
+        """Goes on with another model; its bodies have to be bound to it."""
+        self.model, self.data = model, mujoco.MjData(model)
+        self._watch()
+        self.stale, self.loaded = True, False
+        self.speeds.clear()
+
+    def step(self) -> None:
+        """Integrates by one time step, after which nothing acts any more."""
+        np.copyto(self._before, self._positions)
+        if self.speeds:
+            mujoco.mj_step1(self.model, self.data)
+            self._drive()
+            mujoco.mj_step2(self.model, self.data)
+        else:
+            mujoco.mj_step(self.model, self.data)
+        self.stale = True
+        if not hypot(*self._speeds()) < self._fast:  # also if one of them is no number
+            self._slow_down()
+        if self.loaded:
+            self.data.qfrc_applied[:] = 0.0
+            self.data.xfrc_applied[:] = 0.0
+            self.loaded = False
+
+    def set_time_step(self, dt: float) -> None:
+        """Sets the length of a step [s]."""
+        model = self.model
+        model.opt.timestep = dt
+        alone = np.bincount(model.dof_treeid)[model.dof_treeid] == FREE
+        free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
+        self._fastest = np.where(alone & free, FASTEST, FURTHEST / dt)
+        self._fast = FURTHEST / dt
+
+    def _watch(self) -> None:
+        # Each of MuJoCo's attributes is an array object made anew.
+        self._positions, self._speeds = self.data.qpos, self.data.qvel.tolist
+        self._before = self._positions.copy()
+        self.set_time_step(self.model.opt.timestep)
+
+    def _slow_down(self) -> None:
+        """Cuts what is too fast, and takes the positions' step anew. What is no number counts as rest: it
+        would spread over the whole world."""
+        model, data, fastest = self.model, self.data, self._fastest
+        if (np.abs(data.qvel) <= fastest).all():
+            return  # there are many, and none of them is too fast
+        data.qvel[np.isnan(data.qvel)] = 0.0
+        np.clip(data.qvel, -fastest, fastest, out=data.qvel)
+        np.copyto(data.qpos, self._before)
+        mujoco.mj_integratePos(model, data.qpos, data.qvel, model.opt.timestep)
+
+    def _drive(self) -> None:
+        """Dry friction brakes towards speed 0; a motor is dry friction towards another speed."""
+        data = self.data
+        for row in np.flatnonzero(data.efc_type == FRICTION):
+            speed = self.speeds.get(int(data.efc_id[row]))
+            if speed:
+                data.efc_aref[row] += data.efc_KBIP[row, 1] * speed
+
+    def link(self, index: int) -> tuple[Pose, Twist]:
+        """Returns pose and twist of the frame of body `index`, in the world."""
+        model, data = self.model, self.data
+        if self.stale:
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_comVel(model, data)
+            self.stale = False
+        speed = np.empty(6)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, index, speed, 0)
+        x, y, z = data.xpos[index].tolist()
+        ax, ay, az, vx, vy, vz = speed.tolist()
+        return Pose((x, y, z), xyzw(data.xquat[index])), ((vx, vy, vz), (ax, ay, az))
+
+    def contacts(self, sides: Mapping[int, Side]) -> list[Contact]:
+        """Returns where bodies touched in the last step; not where they only are near.
+
+        Args:
+            sides: what the geoms are, by number.
+        """
+        found, wrench = [], np.empty(6)
+        for index in range(self.data.ncon):
+            mujoco.mj_contactForce(self.model, self.data, index, wrench)
+            force, along, across, *_ = wrench.tolist()
+            if force > 0.0:
+                contact = self.data.contact[index]
+                x, y, z = contact.pos.tolist()
+                axes = contact.frame.tolist()  # of the contact, row by row
+                normal, one, other = _vector(axes[:3]), _vector(axes[3:6]), _vector(axes[6:])
+                friction = add(scale(one, along), scale(other, across))
+                # The normal points towards the second geom, which is our first one then.
+                second, first = (sides[geom] for geom in contact.geom.tolist())
+                depth = -float(contact.dist)
+                found.append(
+                    Contact((x, y, z), scale(normal, force), friction, normal, depth, first, second)
+                )
+        return found
+
+
+def _vector(numbers: Sequence[float]) -> Vector:
+    x, y, z = numbers
+    return (x, y, z)
+
+
+FREE_POSITIONS, FREE_VELOCITIES = 7, 6  # of a free base
+
+
+@dataclass
+class JointSettings:
+    """What can be changed of a joint: [N m s/rad, N s/m], [rad, m], [rad/s, m/s], [N m, N]."""
+
+    damping: float
+    lower: float
+    upper: float
+    speed: float
+    effort: float
+
+    @classmethod
+    def of(cls, joint: Joint) -> "JointSettings":
+        lower, upper = (joint.lower, joint.upper) if joint.bounded else (1.0, -1.0)
+        return cls(joint.damping, lower, upper, 0.0, joint.friction)
+
+
+class MujocoBody(Body):
+    """The bodies and joints of one model; `bind` finds them again after the world was compiled anew."""
+
+    implicit_damping = True
+
+    def __init__(
+        self,
+        state: MujocoState,
+        description: ModelDescription,
+        pose: Pose,
+        compile_anew: Callable[[], None],
+    ) -> None:
+        """`compile_anew` makes the world's model from its bodies' present settings."""
+        self.description = description
+        self.pose = pose  # of the root link; of one that is free, where it was loaded
+        self.link_names = tuple(description.links)
+        joints = [] if description.static else description.movable_joints
+        self.joint_names = tuple(joint.name for joint in joints)
+        self.inertias = {name: link.inertia for name, link in description.links.items()}
+        self._gravity = {name: link.gravity for name, link in description.links.items()}
+        self._frictions: dict[str, float] = {}  # factors, by link
+        self._joints = [JointSettings.of(joint) for joint in joints]
+        self._state = state
+        self._compile_anew = compile_anew
+
+    def bind(self, elements: Elements) -> None:
+        """Takes its places in a newly compiled model, and puts its settings into it."""
+        model, data = self._state.model, self._state.data
+        self._ids = {name: body.id for name, body in elements.bodies.items()}
+        self.touching = dict(self._geoms())
+        self._indices = [elements.joints[name].id for name in self.joint_names]
+        self._q = model.jnt_qposadr[self._indices].tolist()
+        self._v = model.jnt_dofadr[self._indices].tolist()
+        self._free = None
+        if elements.free is not None:
+            index = elements.free.id
+            self._free = int(model.jnt_qposadr[index]), int(model.jnt_dofadr[index])
+        self._qpos, self._qvel, self._qfrc = data.qpos, data.qvel, data.qfrc_applied
+        for link, moments in elements.moments.items():
+            model.body_inertia[self._ids[link]] = moments
+        for name, on in self._gravity.items():
+            self._weigh(name, on)
+        for link, factor in self._frictions.items():
+            self.set_friction(link, factor)
+        for index, joint in enumerate(self._joints):
+            self.set_damping(index, joint.damping)
+            self.set_limits(index, joint.lower, joint.upper)
+            self.set_motor(index, joint.speed, joint.effort)
+
+    def _geoms(self) -> Iterator[tuple[int, tuple[str, tuple[str, ...]]]]:
+        """MuJoCo's shapes by their number: those of a link follow one another, in their order."""
+        for link, index in self._ids.items():
+            first = int(self._state.model.body_geomadr[index])
+            for place, shape in enumerate(self.description.links[link].collisions):
+                yield first + place, (link, (shape.name,))
+
+    def motion(self) -> BodyArrays:
+        """Returns a copy of its state, joint by joint and base last."""
+        q, v = self._places()
+        wrenches = self._state.data.xfrc_applied[list(self._ids.values())]
+        return BodyArrays(self._qpos[q], self._qvel[v], self._qfrc[v], wrenches)
+
+    def move(self, motion: BodyArrays) -> None:
+        """Takes over a state of its own from before the world was compiled anew."""
+        q, v = self._places()
+        self._qpos[q], self._qvel[v] = motion.positions, motion.velocities
+        self._qfrc[v] = motion.efforts
+        self._state.data.xfrc_applied[list(self._ids.values())] = motion.wrenches
+        self._state.loaded = self._state.stale = True
+
+    def _places(self) -> tuple[list[int], list[int]]:
+        if self._free is None:
+            return self._q, self._v
+        q, v = self._free
+        return [*self._q, *range(q, q + FREE_POSITIONS)], [*self._v, *range(v, v + FREE_VELOCITIES)]
+
+    def joint_states(self) -> Sequence[Sequence[float]]:
+        return list(zip(self._qpos[self._q].tolist(), self._qvel[self._v].tolist(), strict=True))
+
+    def apply_efforts(self, efforts: Sequence[float]) -> None:
+        for place, effort in zip(self._v, efforts, strict=True):
+            self._qfrc[place] += effort
+        self._state.loaded = True
+
+    def add_effort(self, index: int, effort: float) -> None:
+        self._qfrc[self._v[index]] += effort
+        self._state.loaded = True
+
+    def add_wrench(self, link: str, force: Vector, torque: Vector) -> None:
+        self._state.data.xfrc_applied[self._ids[link]] += np.array((*force, *torque))
+        self._state.loaded = True
+
+    def set_inertia(self, link: str, old: Inertia | None, new: Inertia) -> bool:
+        before = self.inertias[link]
+        self.inertias[link] = new
+        try:
+            self._compile_anew()
+        except DescriptionError:
+            self.inertias[link] = before
+            return False
+        return True
+
+    def set_damping(self, index: int, damping: float) -> None:
+        self._joints[index].damping = damping
+        self._state.model.dof_damping[self._v[index]] = damping
+
+    def set_friction(self, link: str, factor: float) -> None:
+        self._frictions[link] = factor
+        model, first = self._state.model, int(self._state.model.body_geomadr[self._ids[link]])
+        for place, shape in enumerate(self.description.links[link].collisions):
+            model.geom_friction[first + place, 0] = factor * shape.mu
+            model.geom_priority[first + place] = priority(factor * shape.mu)
+
+    def set_limits(self, index: int, lower: float, upper: float) -> None:
+        joint, model = self._joints[index], self._state.model
+        joint.lower, joint.upper = lower, upper
+        model.jnt_limited[self._indices[index]] = lower <= upper
+        model.jnt_range[self._indices[index]] = lower, upper
+
+    def set_motor(self, index: int, velocity: float, effort: float) -> None:
+        joint, place = self._joints[index], self._v[index]
+        joint.speed, joint.effort = velocity, effort
+        self._state.model.dof_frictionloss[place] = effort
+        if velocity and effort:
+            self._state.speeds[place] = velocity
+        else:
+            self._state.speeds.pop(place, None)
+
+    def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
+        self.moved = True
+        self._qpos[self._q[index]] = position
+        self._qvel[self._v[index]] = velocity
+        self._state.stale = True
+
+    def reset_base(self, pose: Pose, twist: Twist = (ZERO, ZERO)) -> None:
+        self._state.stale = self.moved = True
+        orientation = wxyz(pose.orientation)
+        if self._free is None:
+            self.pose = pose
+            root = self._ids[self.description.root]
+            self._state.model.body_pos[root] = pose.position
+            self._state.model.body_quat[root] = orientation
+            return
+        q, v = self._free
+        self._qpos[q : q + FREE_POSITIONS] = (*pose.position, *orientation)
+        turning = rotate(conjugate(pose.orientation), twist[1])  # MuJoCo has it in the body's axes
+        self._qvel[v : v + FREE_VELOCITIES] = (*twist[0], *turning)
+
+    def link_state(self, name: str) -> tuple[Pose, Twist]:
+        return self._state.link(self._ids[name])
+
+    def set_link_gravity(self, name: str, on: bool) -> None:
+        self._gravity[name] = on
+        self._weigh(name, on)
+
+    def _weigh(self, name: str, on: bool) -> None:
+        model = self._state.model
+        model.body_gravcomp[self._ids[name]] = 0.0 if on else 1.0
+        if not on:
+            model.flg_gravcomp = True
+
+    def link_gravity(self, name: str) -> bool:
+        return self._gravity[name]

@@ -1,0 +1,130 @@
+"""MuJoCo behind the engine interface: one model of the whole world, compiled anew when it changes."""
+
+import logging
+from itertools import count
+
+import mujoco
+
+from bullet_gazebo.physics.description import ModelDescription
+from bullet_gazebo.physics.engine import Body, Contact, Engine, Side
+from bullet_gazebo.physics.engine_form import check_bounds
+from bullet_gazebo.physics.engines.mujoco_body import MujocoBody, MujocoState
+from bullet_gazebo.physics.engines.mujoco_model import Elements, ModelWriter, compile_spec
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector
+
+MOST_ITERATIONS = 1000  # of the solver in a step; more would only hold the world
+DEFAULT_STEP = 0.001  # [s]
+STIFFEST = 2.0  # steps: MuJoCo's shortest time constant of a constraint
+# Constraints give way to a ten-thousandth of what acts against them, the least that MuJoCo knows.
+IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+IMPRATIO = 10.0  # how much stiffer friction is than the contact: what rests doesn't creep
+
+logger = logging.getLogger(__name__)
+
+
+class MujocoEngine(Engine):
+    """One MuJoCo world. It is integrated by semi-implicit Euler, joint damping implicitly."""
+
+    def __init__(self, runge_kutta: bool = False) -> None:
+        """`runge_kutta` integrates by RK4: for comparisons, without motors that have a speed."""
+        # By default MuJoCo writes warnings into a file in the current folder.
+        mujoco.set_mju_user_warning(logger.warning)
+        self._runge_kutta = runge_kutta
+        self._gravity: Vector = ZERO
+        self._time_step = DEFAULT_STEP
+        self._iterations = 50
+        self._bodies: dict[str, MujocoBody] = {}
+        self._sides: dict[int, Side] = {}  # by number of the geom
+        self._keys = count()
+        model = compile_spec(mujoco.MjSpec())
+        self._state = MujocoState(model, mujoco.MjData(model))
+        self._configure()
+
+    def load(self, description: ModelDescription, pose: Pose) -> MujocoBody:
+        check_bounds(description)
+        body = MujocoBody(self._state, description, pose, self._compile)
+        self._compile({f"{next(self._keys)}": body})
+        return body
+
+    def remove(self, body: Body) -> None:
+        self._bodies = {key: each for key, each in self._bodies.items() if each is not body}
+        self._compile()
+
+    def set_gravity(self, gravity: Vector) -> None:
+        self._gravity = gravity
+        self._state.model.opt.gravity[:] = gravity
+
+    def set_time_step(self, dt: float) -> None:
+        self._time_step = dt
+        self._configure()
+
+    def set_iterations(self, count: int) -> None:
+        self._iterations = max(1, min(count, MOST_ITERATIONS))
+        self._state.model.opt.iterations = self._iterations
+
+    def step(self) -> None:
+        self._state.step()
+
+    def contacts(self) -> list[Contact]:
+        return self._state.contacts(self._sides)
+
+    def close(self) -> None:
+        self._bodies.clear()
+        self._state.replace(compile_spec(mujoco.MjSpec()))
+
+    def _compile(self, fresh: dict[str, MujocoBody] | None = None) -> None:
+        """Makes the model of the bodies and of `fresh` ones; what moves, goes on.
+
+        Raises:
+            DescriptionError: if MuJoCo can't take it; the world is as it was then.
+        """
+        bodies = self._bodies | (fresh or {})
+        spec = mujoco.MjSpec()
+        spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+        spec.compiler.degree = False
+        written = {
+            key: ModelWriter(spec, key, body.description, body.inertias).write(body.pose)
+            for key, body in bodies.items()
+        }
+        model = compile_spec(spec)
+        motions = {key: body.motion() for key, body in self._bodies.items()}
+        self._state.replace(model)
+        self._bodies = bodies
+        self._bind(written)
+        for key, motion in motions.items():
+            bodies[key].move(motion)
+
+    def _bind(self, written: dict[str, Elements]) -> None:
+        for key, elements in written.items():
+            self._bodies[key].bind(elements)
+        self._sides = {
+            geom: Side(body, *touching)
+            for body in self._bodies.values()
+            for geom, touching in body.touching.items()
+        }
+        if any(elements.moments for elements in written.values()):
+            mujoco.mj_setConst(self._state.model, mujoco.MjData(self._state.model))
+        self._configure()
+
+    def _configure(self) -> None:
+        model, option = self._state.model, self._state.model.opt
+        self._state.set_time_step(self._time_step)
+        option.gravity[:] = self._gravity
+        option.iterations = self._iterations
+        integrators = mujoco.mjtIntegrator
+        option.integrator = (
+            integrators.mjINT_RK4 if self._runge_kutta else integrators.mjINT_IMPLICITFAST
+        )
+        option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        option.impratio = IMPRATIO
+        # MuJoCo 4.0.0's sparse factorisation gives wrong accelerations (mujoco#3767).
+        option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        option.enableflags |= mujoco.mjtEnableBit.mjENBL_DIAGEXACT
+        # Without warm starts a state has one future, whatever was before. A reset is nobody's wish.
+        option.disableflags |= (
+            mujoco.mjtDisableBit.mjDSBL_WARMSTART | mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        )
+        for reference in (model.jnt_solref, model.dof_solref, model.geom_solref):
+            reference[:] = (STIFFEST * self._time_step, 1.0)
+        for impedance in (model.jnt_solimp, model.dof_solimp, model.geom_solimp):
+            impedance[:] = IMPEDANCE

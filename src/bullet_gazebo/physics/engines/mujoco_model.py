@@ -1,0 +1,199 @@
+"""Writes a ModelDescription into MuJoCo's model of the whole world."""
+
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import mujoco
+import numpy as np
+
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    Inertia,
+    Joint,
+    ModelDescription,
+    Shape,
+)
+from bullet_gazebo.physics.dynamics import tensor_in
+from bullet_gazebo.physics.pose import IDENTITY, Pose, Quaternion, Vector, rotate
+
+GEOMS = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "plane": mujoco.mjtGeom.mjGEOM_PLANE,
+    "mesh": mujoco.mjtGeom.mjGEOM_MESH,
+}
+MU_STEPS, MOST_PRIORITY = 1e6, 2**30  # friction in whole steps of 1e-6
+FASTENED = Inertia(mass=1.0, ixx=1.0, iyy=1.0, izz=1.0)  # of links that nothing can move
+
+
+@dataclass
+class Elements:
+    """What a model has become: bodies by link, joints by name, and its free joint, if it has one."""
+
+    bodies: dict[str, mujoco.MjsBody] = field(default_factory=dict)
+    joints: dict[str, mujoco.MjsJoint] = field(default_factory=dict)
+    moments: dict[str, Vector] = field(default_factory=dict)  # that no real body has, by link
+    free: mujoco.MjsJoint | None = None
+
+
+class ModelWriter:
+    """Writes one model. Names begin with `key`, so that they are unique in the world."""
+
+    def __init__(
+        self,
+        spec: mujoco.MjSpec,
+        key: str,
+        model: ModelDescription,
+        inertias: Mapping[str, Inertia | None],
+    ) -> None:
+        """`inertias`, by link, go before those of the description."""
+        self._spec = spec
+        self._key = key
+        self._model = model
+        self._inertias = inertias
+        self._elements = Elements()
+
+    def write(self, pose: Pose) -> Elements:
+        """Adds the model with its root link's frame at `pose`.
+
+        Raises:
+            DescriptionError: for a mesh that can't be read.
+        """
+        model = self._model
+        base = self._add_link(self._spec.worldbody, model.root, pose)
+        if not model.fixed_base:
+            self._elements.free = base.add_freejoint()
+        below = defaultdict(list)
+        for joint in model.joints.values():
+            below[joint.parent].append(joint)
+        for link, where in model.islands.items():
+            self._add_link(base, link, where)
+        order = [model.root, *model.islands]
+        for parent in order:
+            for joint in below[parent]:
+                self._add_joint(self._elements.bodies[parent], joint)
+                order.append(joint.child)  # the list grows while it is walked
+        if not model.static:
+            self._keep_apart()
+        return self._elements
+
+    def _add_link(self, parent: mujoco.MjsBody, link: str, pose: Pose) -> mujoco.MjsBody:
+        body = parent.add_body(
+            name=f"{self._key}:{link}", pos=pose.position, quat=wxyz(pose.orientation),
+            explicitinertial=True,
+        )  # fmt: skip
+        inertia = self._inertias[link]
+        if inertia is None or self._model.static:
+            inertia = FASTENED
+        axes, moments = principal(inertia)
+        body.mass, body.ipos, body.iquat = inertia.mass, inertia.com.position, wxyz(axes)
+        body.inertia = moments
+        if not is_real(moments):  # MuJoCo refuses them, ODE takes them: they are put in later
+            body.inertia = (max(moments),) * 3
+            self._elements.moments[link] = moments
+        for shape in self._model.links[link].collisions:
+            self._add_shape(body, shape)
+        self._elements.bodies[link] = body
+        return body
+
+    def _add_joint(self, parent: mujoco.MjsBody, joint: Joint) -> None:
+        body = self._add_link(parent, joint.child, joint.pose)
+        if not joint.movable or self._model.static:
+            return  # a body without a joint is fixed to its parent
+        slide = joint.kind == "prismatic"
+        self._elements.joints[joint.name] = body.add_joint(
+            name=f"{self._key}:{joint.name}",
+            type=mujoco.mjtJoint.mjJNT_SLIDE if slide else mujoco.mjtJoint.mjJNT_HINGE,
+            pos=joint.anchor.position,
+            axis=rotate(joint.anchor.orientation, joint.axis),
+            limited=mujoco.mjtLimited.mjLIMITED_FALSE,  # the body sets stops itself, also impossible ones
+        )
+
+    def _add_shape(self, body: mujoco.MjsBody, shape: Shape) -> None:
+        geom = body.add_geom(
+            type=GEOMS[shape.kind], pos=shape.pose.position, quat=wxyz(shape.pose.orientation),
+            condim=3,
+        )  # fmt: skip
+        geom.friction[0] = shape.mu
+        geom.priority = priority(shape.mu)
+        if shape.kind == "mesh":
+            geom.meshname = self._add_mesh(shape)
+        elif shape.kind == "box":
+            geom.size = [length / 2.0 for length in shape.size]
+        elif shape.kind == "cylinder":
+            geom.size = [shape.size[0], shape.size[1] / 2.0, 0.0]
+        elif shape.kind == "sphere":
+            geom.size = [shape.size[0], 0.0, 0.0]
+        else:
+            geom.size = [0.0, 0.0, 1.0]  # without end
+
+    def _add_mesh(self, shape: Shape) -> str:
+        """Adds the points of a mesh, once for each scale; returns their name."""
+        assert shape.solid is not None  # collisions are read
+        name = f"{shape.mesh}:{shape.solid.digest}:{shape.size}"  # refusals show it
+        if self._spec.mesh(name) is None:
+            points = np.unique(np.concatenate(shape.solid.hulls), axis=0) * np.array(shape.size)
+            self._spec.add_mesh(
+                name=name, uservert=points.ravel().tolist(),
+                inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
+            )  # fmt: skip
+        return name
+
+    def _keep_apart(self) -> None:
+        """Two links of a model meet if either of them wants it, and no joint connects them (SDF's rule)."""
+        model = self._model
+        joined = {frozenset((joint.parent, joint.child)) for joint in model.joints.values()}
+        solid = [link for link in model.links.values() if link.collisions]
+        for a, b in combinations(solid, 2):
+            meet = (a.self_collide or b.self_collide) and frozenset((a.name, b.name)) not in joined
+            if not meet:
+                self._spec.add_exclude(
+                    bodyname1=f"{self._key}:{a.name}", bodyname2=f"{self._key}:{b.name}"
+                )
+
+
+def principal(inertia: Inertia) -> tuple[Quaternion, Vector]:
+    """Returns the principal axes, seen from the link, and the moments [kg m²] about them."""
+    if inertia.ixy == inertia.ixz == inertia.iyz == 0.0:
+        return inertia.com.orientation, (inertia.ixx, inertia.iyy, inertia.izz)
+    moments, axes = np.linalg.eigh(tensor_in(inertia, IDENTITY))
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # right-handed
+    quat = np.empty(4)
+    mujoco.mju_mat2Quat(quat, axes.ravel())
+    return xyzw(quat), (float(moments[0]), float(moments[1]), float(moments[2]))
+
+
+def is_real(moments: Vector) -> bool:
+    """Returns whether a body can have these moments: none is above the sum of the others."""
+    return max(moments) <= sum(moments) - max(moments)
+
+
+def wxyz(q: Quaternion) -> Quaternion:
+    """MuJoCo's order of a quaternion."""
+    return (q[3], q[0], q[1], q[2])
+
+
+def xyzw(q: np.ndarray) -> Quaternion:
+    """Our order of a quaternion."""
+    return (float(q[1]), float(q[2]), float(q[3]), float(q[0]))
+
+
+def priority(mu: float) -> int:
+    """Of two coefficients of friction ODE takes the smaller one, and MuJoCo that of the higher priority."""
+    return -int(min(mu * MU_STEPS, MOST_PRIORITY))
+
+
+def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Returns the model.
+
+    Raises:
+        DescriptionError: if MuJoCo refuses it, in its words.
+    """
+    try:
+        return spec.compile()
+    except ValueError as error:
+        text = " ".join(str(error).split())
+        raise DescriptionError(f"the physics engine can't load the model: {text}") from error

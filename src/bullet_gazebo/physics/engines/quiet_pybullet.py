@@ -1,0 +1,50 @@
+"""PyBullet's module, which is imported here and nowhere else.
+
+It greets every process with a line about when it was built, written from C to the C library's `stderr`,
+where Python can't filter it.
+"""
+
+import contextlib
+import ctypes
+import os
+from collections.abc import Iterator
+
+__all__ = ["pybullet"]
+
+STDERR = 2  # its file descriptor, whatever sys.stderr is
+GREETING = b"pybullet build time:"
+
+
+@contextlib.contextmanager
+def _without_greeting() -> Iterator[None]:
+    """Leaves out the line.
+
+    Only what C writes to its stream `stderr` is held, in memory. The file descriptor stays as it is, so that
+    nobody else's output is touched: another thread may be within a write at any moment.
+    """
+    library = ctypes.CDLL(None)
+    try:
+        stream = ctypes.c_void_p.in_dll(library, "stderr")
+    except ValueError:  # a C library of another kind: the line is harmless
+        yield
+        return
+    library.open_memstream.restype = ctypes.c_void_p
+    text, size = ctypes.c_void_p(), ctypes.c_size_t()
+    held = library.open_memstream(ctypes.byref(text), ctypes.byref(size))
+    before, stream.value = stream.value, held
+    try:
+        yield
+    finally:
+        stream.value = before
+        library.fflush(
+            ctypes.c_void_p(held)
+        )  # and never closed: another thread may have begun to use it
+        lines = ctypes.string_at(text, size.value).splitlines(keepends=True)
+        kept = b"".join(line for line in lines if not line.startswith(GREETING))
+        if kept:
+            with contextlib.suppress(OSError):  # it is closed
+                os.write(STDERR, kept)
+
+
+with _without_greeting():
+    import pybullet

@@ -1,0 +1,107 @@
+"""Reading XML model files: numbers and names, with the place that they stand at."""
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from xml.etree.ElementTree import Element
+
+from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
+from files.content import FileError, TooLarge
+from files.xml_text import parse
+
+SHOWN = 80  # characters of a faulty value that a message repeats
+
+
+def parse_xml(text: str | bytes, count: Callable[[int], None] | None = None) -> Element:
+    """Returns the root element of a text, or of what a file holds; `count` is told of the elements.
+
+    Raises:
+        DescriptionError: if it isn't well-formed, or has a document type.
+        LimitExceeded: if it is too large.
+    """
+    try:
+        return parse(text) if count is None else parse(text, count)
+    except TooLarge as error:
+        raise LimitExceeded(str(error)) from error
+    except FileError as error:
+        raise DescriptionError(str(error)) from error
+
+
+@contextmanager
+def place(where: str) -> Iterator[None]:
+    """Puts `where` before the text of a DescriptionError that is raised inside."""
+    try:
+        yield
+    except DescriptionError as error:
+        raise type(error)(f"{where}: {error}") from error
+
+
+@contextmanager
+def files_named_by_a_model(where: str) -> Iterator[None]:
+    """Makes what the system says to a strange file name, one too long for it, a DescriptionError."""
+    try:
+        yield
+    except DescriptionError:
+        raise
+    except (OSError, ValueError) as error:
+        raise DescriptionError(f"{where}: {shown(str(error))}") from error
+
+
+def finite(text: str, where: str) -> float:
+    """Returns the number in `text`.
+
+    Raises:
+        DescriptionError: if it is none; the text begins with `where`.
+    """
+    try:
+        value = float(text)
+    except ValueError as error:
+        raise DescriptionError(f"{where}: '{shown(text)}' is not a number") from error
+    if not math.isfinite(value):
+        raise DescriptionError(f"{where}: '{shown(text)}' is not finite")
+    return value
+
+
+def numbers(text: str | None, where: str, count: int) -> tuple[float, ...]:
+    """Returns `count` numbers separated by blanks. `where` names them in the error's text."""
+    words = (text or "").split(None, count)  # of a text of millions no more than are wanted
+    if len(words) != count:
+        raise DescriptionError(f"{where} must hold {count} numbers, not '{shown(text or '')}'")
+    return tuple(finite(word, where) for word in words)
+
+
+def truth(text: str | None, default: bool = False) -> bool:
+    """Returns the truth value of an element's text; `default` if it is empty."""
+    word = (text or "").strip().lower()
+    return word in ("true", "1") if word else default
+
+
+def named(element: Element, what: str) -> str:
+    """Returns the attribute `name`.
+
+    Raises:
+        DescriptionError: if it is missing, or too long for the engine, which knows links and joints by it.
+    """
+    name = element.get("name", "")
+    if not name:
+        raise DescriptionError(f"a <{what}> has no name")
+    if what in ("link", "joint") and len(name.encode("utf-8", "replace")) > 1000:  # cut at 1023
+        raise DescriptionError(f"{what} '{shown(name)}': the name is longer than 1000 bytes")
+    return name
+
+
+def shown(text: str) -> str:
+    """Returns `text` as one line, cut to a length that suits a message."""
+    line = " ".join(text[: 4 * SHOWN].split())
+    return line if len(line) <= SHOWN else f"{line[:SHOWN]}…"
+
+
+def positive(sizes: tuple[float, ...], where: str) -> tuple[float, ...]:
+    """Returns `sizes` [m].
+
+    Raises:
+        DescriptionError: if one of them is not above zero.
+    """
+    if min(sizes) <= 0.0:
+        raise DescriptionError(f"{where}: sizes must be above 0, not {sizes}")
+    return sizes

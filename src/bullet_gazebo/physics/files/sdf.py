@@ -1,0 +1,435 @@
+"""Reads SDF models, version 1.4 to 1.7 (sdformat.org), into a ModelDescription.
+
+Links keep their frames; joints become parent-relative. Nested and included models melt into the outer
+one, their links and joints named `nested::name`. In a static model links may stand by themselves.
+"""
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    Joint,
+    LimitExceeded,
+    Link,
+    ModelDescription,
+    Plugin,
+)
+from bullet_gazebo.physics.files import elements
+from bullet_gazebo.physics.files.elements import (
+    files_named_by_a_model,
+    named,
+    numbers,
+    place,
+    shown,
+    truth,
+)
+from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
+from bullet_gazebo.physics.files.sdf_links import (
+    MODEL,
+    Frames,
+    ShapeReader,
+    read_inertia,
+    read_pose,
+    value,
+)
+from bullet_gazebo.physics.files.urdf import name_sensor, read_plugin
+from bullet_gazebo.physics.lumping import (
+    check_count,
+    detach_from_world,
+    find_roots,
+    mend_moments,
+    unique,
+)
+from bullet_gazebo.physics.pose import Pose, Vector, conjugate, rotate
+
+OVERRIDES = ("pose", "static")
+BUILT_IN = "model://"
+NEWEST_FILE = (1, 7)
+FILE_VERSION = re.compile(r"(\d{1,9})\.(\d{1,9})", re.ASCII)
+
+
+@dataclass(frozen=True)
+class FileContext:
+    """Where an element of a model file comes from: what its URIs and its version mean."""
+
+    resources: Resources
+    reading: Reading
+    version: tuple[int, int]
+    folder: Path | None = None
+
+
+def open_include(include: Element, context: FileContext) -> tuple[Element, FileContext]:
+    """Returns the model or light that `include` names, with the include's name, pose and static flag.
+
+    Raises:
+        DescriptionError: if it isn't found or can't be read.
+    """
+    uri = (include.findtext("uri") or "").strip()
+    with place(f"<include> of '{shown(uri)}'"):
+        if not uri:
+            raise DescriptionError("<uri> is missing")
+        entity, inner = _open(uri, context)
+        return _overridden(entity, include), inner
+
+
+def included_name(include: Element) -> str:
+    """Returns the plain name behind the URI: `sun` of `model://sun`."""
+    uri = (include.findtext("uri") or "").strip()
+    return uri.removeprefix(BUILT_IN).strip("/") if uri.startswith(BUILT_IN) else ""
+
+
+def _open(uri: str, context: FileContext) -> tuple[Element, FileContext]:
+    with files_named_by_a_model(f"'{shown(uri)}'"):
+        found = context.resources.find(uri, context.folder)
+        path = _model_file(found, context.reading) if found.is_dir() else found
+    root = context.reading.open(path)
+    with place(str(path)):
+        if root.tag not in ("sdf", "gazebo"):
+            raise DescriptionError(f"the root element is <{shown(root.tag)}>, not <sdf>")
+        for element in root:
+            if element.tag in ("model", "light"):
+                version = _version(root.get("version", "1.4")) or (1, 4)
+                return element, replace(context, version=version, folder=path.parent)
+        raise DescriptionError("there is no <model>")
+
+
+def _overridden(entity: Element, include: Element) -> Element:
+    """A copy of the model's top element; what lies deeper is shared, and nobody changes it."""
+    given = [child for child in include if child.tag in OVERRIDES]
+    tags = {child.tag for child in given}
+    copy = Element(entity.tag, entity.attrib)
+    name = (include.findtext("name") or "").strip()
+    if name:
+        copy.set("name", name)
+    copy.extend(child for child in entity if child.tag not in tags)
+    copy.extend(given)
+    copy.extend(include.findall("plugin"))
+    return copy
+
+
+def _model_file(folder: Path, reading: Reading) -> Path:
+    """The newest file that model.config offers for a version that is read here; else model.sdf."""
+    config = folder / "model.config"
+    if not config.is_file():
+        return folder / "model.sdf"
+    root = reading.open(config)
+    with place(str(config)):
+        files = [
+            (_version(element.get("version", "")) or (1, 0), (element.text or "").strip())
+            for element in root.findall("sdf")
+        ]
+        if not files:
+            raise DescriptionError("it names no <sdf> file")
+        readable = [file for file in files if file[0] <= NEWEST_FILE] or files
+        return folder / max(readable)[1]
+
+
+def _version(text: str) -> tuple[int, int] | None:
+    match = FILE_VERSION.fullmatch(text.strip())
+    return None if match is None else (int(match.group(1)), int(match.group(2)))
+
+
+def renamed(entity: Element, name: str) -> Element:
+    """Returns `entity` under another name."""
+    copy = Element(entity.tag, {**entity.attrib, "name": name})
+    copy.extend(entity)
+    return copy
+
+
+KINDS = ("revolute", "continuous", "prismatic", "fixed")
+NO_LIMIT = 1e16  # [rad, m, N m, N, rad/s, m/s]; SDF's own figure for "none"
+WORLD = "world"
+JOINT_FRAME_SINCE = (1, 5)  # before that, axes were given in the model's frame
+
+
+@dataclass(frozen=True)
+class JointReader:
+    """Reads joints of a model whose frames are known."""
+
+    frames: Frames
+    version: tuple[int, int]
+    warnings: list[str]
+
+    def read(self, element: Element) -> Joint:
+        """Reads one joint.
+
+        Raises:
+            DescriptionError: if it is broken, or of a kind that the engine hasn't.
+        """
+        name = named(element, "joint")
+        where = f"joint '{name}'"
+        kind = element.get("type", "")
+        if kind not in KINDS:
+            raise DescriptionError(
+                f"{where}: type '{shown(kind)}' is not simulated; {', '.join(KINDS)} are"
+            )
+        joint = Joint(name, kind, ends(element, "parent"), ends(element, "child"), kept=True)
+        if joint.child == WORLD:
+            raise DescriptionError(f"{where}: the world can be a joint's parent, not its child")
+        self._set_frames(joint, element, where)
+        if joint.movable:
+            self._set_axis(joint, element, where)
+        return joint
+
+    def _set_frames(self, joint: Joint, element: Element, where: str) -> None:
+        parent, child = self._link(joint.parent, where), self._link(joint.child, where)
+        joint.pose = child.relative_to(parent)
+        pose, relative_to = read_pose(element, where)
+        if joint.movable and (pose != Pose() or relative_to not in ("", joint.child)):
+            joint.anchor = self.frames.resolve(joint.name).relative_to(child)
+
+    def _link(self, name: str, where: str) -> Pose:
+        try:
+            return Pose() if name == WORLD else self.frames.resolve(name)
+        except DescriptionError as error:
+            raise DescriptionError(f"{where}: link '{shown(name)}': {error}") from error
+
+    def _set_axis(self, joint: Joint, element: Element, where: str) -> None:
+        axis = element.find("axis")
+        where = f"{where}, axis"
+        joint.axis = self._direction(joint, axis, where)
+        lower = value(axis, "limit/lower", where, -NO_LIMIT)
+        upper = value(axis, "limit/upper", where, NO_LIMIT)
+        if joint.kind == "revolute" and (lower <= -1e15 and upper >= 1e15):
+            joint.kind = "continuous"
+        if joint.bounded:
+            if lower > upper:
+                raise DescriptionError(f"{where}, limit: lower {lower} is above upper {upper}")
+            joint.lower, joint.upper = lower, upper
+        effort, speed = (value(axis, f"limit/{key}", where, -1.0) for key in ("effort", "velocity"))
+        joint.effort = effort if effort >= 0.0 else NO_LIMIT
+        joint.velocity = speed if speed >= 0.0 else NO_LIMIT
+        joint.damping = value(axis, "dynamics/damping", where, 0.0)
+        joint.friction = value(axis, "dynamics/friction", where, 0.0)
+        if min(joint.damping, joint.friction) < 0.0:
+            raise DescriptionError(f"{where}, dynamics: damping and friction can't be negative")
+        if value(axis, "dynamics/spring_stiffness", where, 0.0) != 0.0:
+            self.warnings.append(f"{where}: the spring is left out")
+
+    def _direction(self, joint: Joint, axis: Element | None, where: str) -> Vector:
+        """The axis in the joint's frame, of length 1."""
+        xyz = None if axis is None else axis.find("xyz")
+        text = "0 0 1" if xyz is None else xyz.text
+        x, y, z = numbers(text, f"{where}: <xyz>", 3)
+        length = math.sqrt(x * x + y * y + z * z)
+        if not 0.0 < length < math.inf:
+            raise DescriptionError(f"{where}: the axis has length {length:g}")
+        direction = (x / length, y / length, z / length)
+        frame = "" if xyz is None else xyz.get("expressed_in", "")
+        if axis is not None and truth(
+            axis.findtext("use_parent_model_frame"), default=self.version < JOINT_FRAME_SINCE
+        ):
+            frame = frame or MODEL
+        if not frame or frame == joint.name:
+            return direction
+        own = self._link(joint.child, where).compose(joint.anchor)
+        outer = rotate(self.frames.resolve(frame).orientation, direction)
+        return rotate(conjugate(own.orientation), outer)
+
+
+def ends(joint: Element, role: str) -> str:
+    """Returns the name of the link at one end of a joint."""
+    name = (joint.findtext(role) or "").strip()
+    if not name:
+        raise DescriptionError(f"joint '{shown(joint.get('name', ''))}': <{role}> is missing")
+    return name
+
+
+MAX_NESTING = 10
+VERSION = re.compile(r"1\.(\d{1,9})(\.\d+)?", re.ASCII)
+NEWEST = (1, 7)
+
+
+@dataclass
+class _Parts:
+    """What a model and the models in it consist of, in the outer model's frame."""
+
+    links: list[Link] = field(default_factory=list)
+    poses: dict[str, Pose] = field(default_factory=dict)
+    joints: list[Joint] = field(default_factory=list)
+    plugins: list[Plugin] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+
+def parse_sdf(
+    text: str | bytes, source: str = "SDF", resources: Resources | None = None
+) -> ModelDescription:
+    """Returns the first model of an SDF text, in the file's pose if it gives one (`initial_pose`).
+
+    Raises:
+        DescriptionError: if it can't be simulated: `source`, the place and the fault, in one line.
+    """
+    with elements.place(source):
+        reading = Reading()
+        root = reading.parse(text)
+        context = FileContext(resources or Resources(), reading, sdf_version(root))
+        model = first_entity(root)
+        if model.tag == "include":
+            model, context = open_include(model, context)
+        return read_model(model, context)
+
+
+def sdf_version(root: Element) -> tuple[int, int]:
+    """Returns the version of an `<sdf>` or `<gazebo>` root.
+
+    Raises:
+        DescriptionError: if it is another root, or another version.
+    """
+    if root.tag not in ("sdf", "gazebo"):
+        raise DescriptionError(f"the root element is <{shown(root.tag)}>, not <sdf>")
+    match = VERSION.fullmatch(root.get("version", "1.4").strip())
+    if match is None:
+        raise DescriptionError(
+            f"<sdf version>: '{shown(root.get('version', ''))}' is no version 1.x"
+        )
+    return 1, int(match.group(1))
+
+
+def first_entity(root: Element) -> Element:
+    """Returns the first model, `<include>` or light under the root, or else in its world."""
+    if len(root) and root[0].tag == "light":
+        return root[0]
+    for parent in (root, *root.findall("world")):
+        for element in parent:
+            if element.tag in ("model", "include"):
+                return element
+    raise DescriptionError("there is no <model>")
+
+
+def read_model(element: Element, context: FileContext) -> ModelDescription:
+    """Returns the model of a `<model>` element.
+
+    Raises:
+        DescriptionError: if it can't be simulated.
+    """
+    name = named(element, "model")
+    with elements.place(f"model '{shown(name)}'"):
+        static = truth(element.findtext("static"))
+        parts = _read_parts(element, context, static, MAX_NESTING)
+        if context.version > NEWEST:
+            parts.warnings.append("written for a newer SDF than 1.7: what is new in it is ignored")
+        model = _assemble(name, parts, static)
+        model.initial_pose = read_pose(element, "model")[0]
+        return model
+
+
+def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
+    poses = {WORLD: Pose(), **parts.poses}
+    if static:
+        parts.joints = [joint for joint in parts.joints if joint.parent != WORLD]
+    elif any(joint.parent == WORLD for joint in parts.joints):
+        parts.links.insert(0, Link(WORLD))
+    links, joints = unique(parts.links, "link"), unique(parts.joints, "joint")
+    roots = find_roots(links, joints)
+    if len(roots) > 1 and not static:
+        raise DescriptionError(
+            f"links {roots[:10]} are not joined to each other; make them models of their own, "
+            "or the model static"
+        )
+    model = ModelDescription(name, links, joints, roots[0], poses[roots[0]])
+    model.islands = {root: poses[root].relative_to(poses[roots[0]]) for root in roots[1:]}
+    model.plugins, model.warnings, model.left_out = parts.plugins, parts.warnings, parts.left_out
+    model.static = static
+    detach_from_world(model)
+    mend_moments(model)
+    return model
+
+
+def _read_parts(model: Element, context: FileContext, static: bool, depth: int) -> _Parts:
+    """`depth` models may still be nested in this one."""
+    if depth == 0:
+        raise LimitExceeded(f"models are nested more than {MAX_NESTING} deep (MAX_NESTING)")
+    context.reading.model()
+    parts, frames = _Parts(), Frames()
+    nested = list(_nested(model, context, static, depth))
+    _name_frames(model, frames)
+    for name, element, inner in nested:
+        frames.add(name, *read_pose(element, f"model '{name}'"))
+        for link, pose in inner.poses.items():
+            frames.add(f"{name}::{link}", pose, name)
+    collide = truth(model.findtext("self_collide"))
+    links = model.findall("link")
+    check_count(len(links))
+    for element in links:
+        context.reading.check()
+        read = _read_link(element, context, frames, parts, static)
+        read.self_collide = truth(element.findtext("self_collide"), default=collide)
+        parts.links.append(read)
+    for name, _, inner in nested:
+        _take_over(parts, inner, name)
+    parts.poses = {link.name: frames.resolve(link.name) for link in parts.links}
+    joints = JointReader(frames, context.version, parts.warnings)
+    parts.joints += [joints.read(element) for element in model.findall("joint")]
+    parts.plugins += [read_plugin(element) for element in model.findall("plugin")]
+    return parts
+
+
+def _nested(
+    model: Element, context: FileContext, static: bool, depth: int
+) -> Iterator[tuple[str, Element, _Parts]]:
+    for element in model:
+        if element.tag not in ("model", "include"):
+            continue
+        inner, inner_context, origin = element, context, ""
+        if element.tag == "include":
+            inner, inner_context = open_include(element, context)
+            origin = f" (<include> of '{shown((element.findtext('uri') or '').strip())}')"
+        name = named(inner, "model")
+        with elements.place(f"model '{shown(name)}'{origin}"):
+            yield name, inner, _read_parts(inner, inner_context, static, depth - 1)
+
+
+def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
+    for link in inner.links:
+        link.name = f"{prefix}::{link.name}"
+    for joint in inner.joints:
+        joint.name, joint.child = f"{prefix}::{joint.name}", f"{prefix}::{joint.child}"
+        joint.parent = joint.parent if joint.parent == WORLD else f"{prefix}::{joint.parent}"
+        # The nested model's own frame was the world to it; a joint to the world has to know better.
+        if joint.parent == WORLD:
+            raise DescriptionError(
+                f"joint '{joint.name}': a nested model can't be joined to the world"
+            )
+    parts.links += inner.links
+    check_count(len(parts.links))
+    parts.joints += inner.joints
+    parts.plugins += inner.plugins
+    parts.warnings += inner.warnings
+    parts.left_out += inner.left_out
+
+
+def _name_frames(model: Element, frames: Frames) -> None:
+    for element in model.findall("link"):
+        name = named(element, "link")
+        frames.add(name, *read_pose(element, f"link '{name}'"))
+    for element in model.findall("joint"):
+        name = named(element, "joint")
+        pose, relative_to = read_pose(element, f"joint '{name}'")
+        frames.add(name, pose, relative_to or ends(element, "child"))
+    for element in model.findall("frame"):
+        name = named(element, "frame")
+        pose, relative_to = read_pose(element, f"frame '{name}'")
+        frames.add(name, pose, relative_to or element.get("attached_to", ""))
+
+
+def _read_link(
+    element: Element, context: FileContext, frames: Frames, parts: _Parts, static: bool
+) -> Link:
+    name = named(element, "link")
+    where = f"link '{name}'"
+    meshes = MeshFinder(context.resources, context.reading.mesh, context.folder, parts.warnings)
+    shapes = ShapeReader(meshes, frames, context.reading, parts.warnings)
+    link = Link(name, read_inertia(element, where, static))
+    link.collisions = list(shapes.read(element, "collision", where))
+    link.visuals = list(shapes.read(element, "visual", where))
+    if not static and any(shape.kind == "plane" for shape in link.collisions):
+        raise DescriptionError(f"{where}: a plane can only be part of a static model")
+    link.gravity = truth(element.findtext("gravity"), default=True)
+    parts.left_out += [name_sensor(sensor, where) for sensor in element.findall("sensor")]
+    return link

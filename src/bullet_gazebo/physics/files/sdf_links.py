@@ -1,0 +1,199 @@
+"""Inertia and shapes of an SDF link (sdformat.org, specification 1.4 to 1.7)."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from xml.etree.ElementTree import Element
+
+from bullet_gazebo.physics.description import Color, DescriptionError, Inertia, LimitExceeded, Shape
+from bullet_gazebo.physics.files.elements import (
+    files_named_by_a_model,
+    finite,
+    numbers,
+    positive,
+    shown,
+)
+from bullet_gazebo.physics.files.mesh_formats import Submesh
+from bullet_gazebo.physics.files.reading import MeshFile, MeshFinder, Reading
+from bullet_gazebo.physics.pose import Pose, Quaternion, cross, from_rpy, normalized
+
+MODEL = "__model__"
+
+
+def read_pose(parent: Element, where: str) -> tuple[Pose, str]:
+    """Returns the `<pose>` of `parent` and the frame that it names ('' for the usual one)."""
+    element = parent.find("pose")
+    if element is None or not (element.text or "").strip():
+        return Pose(), "" if element is None else element.get("relative_to", "")
+    x, y, z, roll, pitch, yaw = numbers(element.text, f"{where}: <pose>", 6)
+    return Pose((x, y, z), from_rpy(roll, pitch, yaw)), element.get("relative_to", "")
+
+
+class Frames:
+    """The named frames of one model: links, joints, nested models and `<frame>`s."""
+
+    def __init__(self) -> None:
+        self._given: dict[str, tuple[Pose, str]] = {}
+        self._known: dict[str, Pose] = {MODEL: Pose()}
+
+    def add(self, name: str, pose: Pose, relative_to: str) -> None:
+        """Records that frame `name` is at `pose`, seen from `relative_to` (the model's if empty)."""
+        self._given.setdefault(name, (pose, relative_to or MODEL))
+
+    def resolve(self, name: str) -> Pose:
+        """Returns frame `name` seen from the model's.
+
+        Raises:
+            DescriptionError: if unknown or circular.
+        """
+        chain: dict[str, Pose] = {}
+        while name not in self._known:
+            if name in chain:
+                raise DescriptionError(
+                    f"the frames {[shown(each) for each in list(chain)[:5]]} refer to each other in a circle"
+                )
+            if name not in self._given:
+                raise DescriptionError(f"frame '{shown(name)}' does not exist")
+            chain[name], name = self._given[name]
+        pose = self._known[name]
+        for inner, step in reversed(chain.items()):
+            self._known[inner] = pose = pose.compose(step)
+        return pose
+
+
+NO_NAME = "__default__"  # of a submesh: as if it weren't there
+MOMENTS = {"ixx": 1.0, "ixy": 0.0, "ixz": 0.0, "iyy": 1.0, "iyz": 0.0, "izz": 1.0}  # defaults
+
+
+def value(parent: Element | None, path: str, where: str, default: float) -> float:
+    """Returns the number in the child element `path`, or `default` if there is none."""
+    text = None if parent is None else parent.findtext(path)
+    return default if text is None else finite(text.strip(), f"{where}: <{path}>")
+
+
+def read_inertia(link: Element, where: str, static: bool) -> Inertia:
+    """Returns mass [kg] and moments [kg m²]; SDF's default is 1 of each."""
+    where = f"{where}, inertial"
+    inertial = link.find("inertial")
+    mass = value(inertial, "mass", where, 1.0)
+    tensor = {key: value(inertial, f"inertia/{key}", where, d) for key, d in MOMENTS.items()}
+    least = min(mass, tensor["ixx"], tensor["iyy"], tensor["izz"])
+    if least < 0.0 or (mass == 0.0 and not static):
+        raise DescriptionError(f"{where}: the mass must be above 0, and no moment below it")
+    com = Pose() if inertial is None else read_pose(inertial, where)[0]
+    return Inertia(mass=mass, com=com, **tensor)
+
+
+@dataclass
+class ShapeReader:
+    """Reads the collisions or visuals of the links of one model."""
+
+    meshes: MeshFinder
+    frames: Frames
+    reading: Reading
+    warnings: list[str] = field(default_factory=list)
+
+    def read(self, link: Element, tag: str, where: str) -> Iterator[Shape]:
+        """Yields the shapes; a visual that can't be shown is a warning."""
+        for element in link.findall(tag):
+            here = f"{where}, {tag} '{shown(element.get('name', ''))}'"
+            self.reading.check()
+            try:
+                shape = self._shape(element, link.get("name", ""), here)
+            except DescriptionError as error:
+                if tag == "collision" or isinstance(error, LimitExceeded):
+                    raise
+                self.warnings.append(f"{error}; it is left out")
+                continue
+            if shape is not None:
+                yield shape
+
+    def _shape(self, element: Element, link: str, where: str) -> Shape | None:
+        geometry = element.find("geometry")
+        if geometry is None or len(geometry) == 0:
+            raise DescriptionError(f"{where}: <geometry> with a shape is missing")
+        solid, collides = geometry[0], element.tag == "collision"
+        if solid.tag == "empty" or (solid.tag == "plane" and not collides):
+            return None
+        pose, relative_to = read_pose(element, where)
+        if relative_to and relative_to != link:
+            frame = self.frames.resolve(relative_to)
+            pose = frame.compose(pose).relative_to(self.frames.resolve(link))
+        mesh: MeshFile = ("", None)
+        size = _size(solid, where)
+        if solid.tag == "mesh":
+            with files_named_by_a_model(where):
+                uri = solid.findtext("uri") or ""
+                found = self.meshes.find(uri, where, collides, _submesh(solid))
+            if found is None:
+                return None
+            mesh = found
+        elif solid.tag == "plane":
+            pose = pose.compose(Pose(orientation=_onto_normal(solid, where)))
+        else:
+            positive(size, f"{where}, {solid.tag}")
+        shape = Shape(
+            solid.tag,
+            size,
+            pose,
+            mesh[0],
+            _color(element, where),
+            element.get("name", ""),
+            solid=mesh[1],
+        )
+        return replace(shape, mu=_friction(element, where)) if collides else shape
+
+
+def _submesh(mesh: Element) -> Submesh | None:
+    name = (mesh.findtext("submesh/name") or "").strip()
+    if name in ("", NO_NAME):
+        return None
+    return Submesh(name, (mesh.findtext("submesh/center") or "").strip().lower() in ("1", "true"))
+
+
+def _friction(collision: Element, where: str) -> float:
+    mu = value(collision, "surface/friction/ode/mu", where, 1.0)
+    if mu < 0.0:
+        raise DescriptionError(f"{where}: a friction of {mu} is negative")
+    return mu
+
+
+def _size(solid: Element, where: str) -> tuple[float, ...]:
+    where = f"{where}, {shown(solid.tag)}"
+    if solid.tag == "box":
+        return numbers(solid.findtext("size", "1 1 1"), f"{where}: <size>", 3)
+    if solid.tag == "cylinder":
+        return (value(solid, "radius", where, 1.0), value(solid, "length", where, 1.0))
+    if solid.tag == "sphere":
+        return (value(solid, "radius", where, 1.0),)
+    if solid.tag == "mesh":
+        return numbers(solid.findtext("scale", "1 1 1"), f"{where}: <scale>", 3)
+    if solid.tag == "plane":
+        return ()
+    raise DescriptionError(f"{where}: this kind of geometry is not simulated")
+
+
+def _onto_normal(plane: Element, where: str) -> Quaternion:
+    """The shortest rotation that takes z onto the plane's normal."""
+    x, y, z = numbers(plane.findtext("normal", "0 0 1"), f"{where}: <normal>", 3)
+    length = (x * x + y * y + z * z) ** 0.5
+    if not 0.0 < length < math.inf:
+        raise DescriptionError(f"{where}: the plane's normal has length {length:g}")
+    if z < -0.999999 * length:
+        return (1.0, 0.0, 0.0, 0.0)
+    axis = cross((0.0, 0.0, 1.0), (x, y, z))
+    return normalized((*axis, length + z))
+
+
+def _color(element: Element, where: str) -> Color | None:
+    text = element.findtext("material/diffuse")
+    if not (text or "").strip():
+        return None
+    return read_color(text or "", f"{where}: <diffuse>")
+
+
+def read_color(text: str, where: str) -> Color:
+    """Returns red, green, blue and alpha; alpha may be missing."""
+    words = [*text.split(None, 4), "1"][:4]
+    r, g, b, a = numbers(" ".join(words), where, 4)
+    return (r, g, b, a)

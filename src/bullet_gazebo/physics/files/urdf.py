@@ -1,0 +1,429 @@
+"""A whole URDF: its links, joints and extensions, its fixed joints lumped as Gazebo does."""
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+from xml.etree.ElementTree import Element
+
+from bullet_gazebo.physics.description import (
+    Color,
+    DescriptionError,
+    Inertia,
+    Joint,
+    LimitExceeded,
+    Link,
+    ModelDescription,
+    Plugin,
+    Shape,
+)
+from bullet_gazebo.physics.engine_form import check_shapes
+from bullet_gazebo.physics.files import elements
+from bullet_gazebo.physics.files.elements import (
+    files_named_by_a_model,
+    finite,
+    named,
+    numbers,
+    positive,
+    shown,
+)
+from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
+from bullet_gazebo.physics.lumping import check_count, find_roots, lump_fixed_joints, unique
+from bullet_gazebo.physics.pose import Pose, from_rpy
+
+
+def read_origin(element: Element, place: str) -> Pose:
+    """Returns the `<origin>` of `element`; none, or an attribute that is missing, is zero."""
+    origin = element.find("origin")
+    if origin is None:
+        return Pose()
+    x, y, z = read_numbers(origin, "xyz", place, 3) if origin.get("xyz") else (0.0, 0.0, 0.0)
+    rpy = read_numbers(origin, "rpy", place, 3) if origin.get("rpy") else (0.0, 0.0, 0.0)
+    return Pose((x, y, z), from_rpy(*rpy))
+
+
+def read_number(element: Element, key: str, place: str, required: bool = False) -> float:
+    """Returns the number in attribute `key`; 0 if it is missing and not `required`."""
+    text = element.get(key)
+    if text is None:
+        if required:
+            raise DescriptionError(f"{place}: <{element.tag}> needs the attribute '{key}'")
+        return 0.0
+    return finite(text, f"{place}: <{element.tag} {key}>")
+
+
+def read_numbers(element: Element, key: str, place: str, count: int) -> tuple[float, ...]:
+    return numbers(element.get(key), f"{place}: <{element.tag} {key}>", count)
+
+
+KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+UNUSED = {  # what the physics doesn't act on, and urdfdom reads: element, its numbers
+    "mimic": ("multiplier", "offset"),
+    "calibration": ("rising", "falling"),
+    "safety_controller": ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"),
+}
+
+
+def read_joint(element: Element, warnings: list[str]) -> Joint:
+    """Returns the joint of a `<joint>` element.
+
+    Raises:
+        DescriptionError: if it can't be read; the text names place and fault.
+    """
+    name = named(element, "joint")
+    place = f"joint '{name}'"
+    kind = element.get("type", "")
+    if kind not in KINDS:
+        raise DescriptionError(f"{place}: type '{shown(kind)}' is none of {', '.join(KINDS)}")
+    joint = Joint(
+        name=name,
+        kind=kind,
+        parent=_referred_link(element, "parent", place),
+        child=_referred_link(element, "child", place),
+        pose=read_origin(element, place),
+    )
+    _set_axis(joint, element, place)
+    _set_limit(joint, element, place, warnings)
+    _set_dynamics(joint, element, place)
+    _check_unused(element, place)
+    return joint
+
+
+def _set_axis(joint: Joint, element: Element, place: str) -> None:
+    axis = element.find("axis")
+    if axis is None or not joint.movable:
+        return
+    x, y, z = read_numbers(axis, "xyz", place, 3)
+    length = math.sqrt(x * x + y * y + z * z)
+    if not 0.0 < length < math.inf:
+        raise DescriptionError(f"{place}: the axis has length {length:g}")
+    joint.axis = (x / length, y / length, z / length)
+
+
+def _set_limit(joint: Joint, element: Element, place: str, warnings: list[str]) -> None:
+    limit = element.find("limit")
+    if limit is None:
+        if joint.bounded:
+            raise DescriptionError(f"{place}: a {joint.kind} joint needs <limit>")
+        return
+    place = f"{place}, limit"
+    joint.effort = read_number(limit, "effort", place, required=True)
+    joint.velocity = read_number(limit, "velocity", place, required=True)
+    if not joint.bounded:  # a continuous joint ignores lower and upper
+        return
+    lower, upper = read_number(limit, "lower", place), read_number(limit, "upper", place)
+    if lower > upper:
+        warnings.append(f"{place}: lower {lower} is above upper {upper}; the two are swapped")
+    joint.lower, joint.upper = min(lower, upper), max(lower, upper)
+
+
+def _set_dynamics(joint: Joint, element: Element, place: str) -> None:
+    dynamics = element.find("dynamics")
+    if dynamics is not None:
+        joint.damping = read_number(dynamics, "damping", place)
+        joint.friction = read_number(dynamics, "friction", place)
+
+
+def _check_unused(element: Element, place: str) -> None:
+    """A robot that no other program could read is refused here, too."""
+    for tag, keys in UNUSED.items():
+        child = element.find(tag)
+        if child is None:
+            continue
+        if tag == "mimic" and not child.get("joint"):
+            raise DescriptionError(f"{place}: <mimic joint=…> is missing")
+        for key in keys:
+            read_number(child, key, place)
+
+
+def _referred_link(element: Element, role: str, place: str) -> str:
+    child = element.find(role)
+    if child is None or not child.get("link"):
+        raise DescriptionError(f"{place}: <{role} link=…> is missing")
+    return child.get("link", "")
+
+
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+Part = TypeVar("Part")
+
+
+@dataclass
+class LinkReader:
+    """Reads the links of one robot."""
+
+    meshes: MeshFinder
+    reading: Reading
+    warnings: list[str]
+    _materials: dict[str, Color | None] = field(default_factory=dict)
+
+    def learn_materials(self, robot: Element) -> None:
+        """Keeps the colours that visuals refer to by name."""
+        for material in robot.findall("material"):
+            name = material.get("name", "")
+            self._materials[name] = self._or_none(_rgba, material, f"material '{shown(name)}'")
+        for material in robot.iterfind(
+            "link/visual/material"
+        ):  # the first link that gives a colour
+            name = material.get("name", "")
+            if name and name not in self._materials:
+                with suppress(DescriptionError):  # its link's reading tells
+                    color = _rgba(material, name)
+                    if color is not None:
+                        self._materials[name] = color
+
+    def read(self, element: Element) -> Link:
+        """Reads one link.
+
+        Raises:
+            DescriptionError: if it has no name, or a collision's mesh can't be used.
+        """
+        self.reading.check()
+        link = Link(named(element, "link"))
+        place = f"link '{link.name}'"
+        inertial = element.find("inertial")
+        if inertial is not None:
+            link.inertia = self._or_none(_inertia, inertial, f"{place}, inertial")
+            if link.inertia is not None:
+                _check_possible(link.inertia, f"{place}, inertial")
+        link.collisions = list(self._shapes(element, "collision", place))
+        link.visuals = list(self._shapes(element, "visual", place))
+        return link
+
+    def _or_none(
+        self, read: Callable[[Element, str], Part | None], element: Element, place: str
+    ) -> Part | None:
+        """What `read` makes of `element`; None, and a warning, if that can't be read."""
+        try:
+            return read(element, place)
+        except LimitExceeded:
+            raise
+        except DescriptionError as error:
+            self.warnings.append(f"{error}; it is left out")
+            return None
+
+    def _shapes(self, link: Element, tag: str, place: str) -> Iterator[Shape]:
+        place = f"{place}, {tag}"
+        for element in link.findall(tag):
+            self.reading.check()
+            shape = self._or_none(_shape, element, place)
+            if shape is not None and shape.kind == "mesh":
+                shape = self._with_mesh(shape, element, place)
+            if shape is not None:
+                yield replace(shape, rgba=self._color(element, place))
+
+    def _with_mesh(self, shape: Shape, element: Element, place: str) -> Shape | None:
+        """None for a visual whose mesh is missing."""
+        uri, needed = _solid(element, place).get("filename", ""), element.tag == "collision"
+        try:
+            with files_named_by_a_model(place):
+                found = self.meshes.find(uri, place, needed)
+        except DescriptionError as error:
+            if needed:
+                raise
+            self.warnings.append(f"{error}; it is left out")
+            return None
+        return None if found is None else replace(shape, mesh=found[0], solid=found[1])
+
+    def _color(self, element: Element, place: str) -> Color | None:
+        material = element.find("material")
+        if material is None:
+            return None
+        own = self._or_none(_rgba, material, f"{place}, material")
+        return own or self._materials.get(material.get("name", ""))
+
+
+def _inertia(inertial: Element, place: str) -> Inertia:
+    mass, tensor = inertial.find("mass"), inertial.find("inertia")
+    if mass is None:
+        raise DescriptionError(f"{place}: <mass> is missing")
+    if tensor is None:
+        raise DescriptionError(f"{place}: <inertia> is missing")
+    moments = {key: read_number(tensor, key, place) for key in MOMENTS}
+    value = read_number(mass, "value", place, required=True)
+    return Inertia(mass=value, com=read_origin(inertial, place), **moments)
+
+
+def _check_possible(inertia: Inertia, place: str) -> None:
+    """What can be read, and no body has, refuses the robot: Gazebo's engine ends there."""
+    if min(inertia.mass, inertia.ixx, inertia.iyy, inertia.izz) < 0.0:
+        raise DescriptionError(f"{place}: mass and moments of inertia can't be negative")
+
+
+def _shape(element: Element, place: str) -> Shape:
+    """The shape without its mesh file and colour."""
+    solid = _solid(element, place)
+    size = _size(solid, place)
+    if element.tag == "collision":  # of size 0 there is nothing to touch
+        positive(tuple(map(abs, size)) if solid.tag == "mesh" else size, f"{place}, {solid.tag}")
+    name = element.get("name", "")
+    return Shape(solid.tag, size, read_origin(element, place), name=name)
+
+
+def _solid(element: Element, place: str) -> Element:
+    geometry = element.find("geometry")
+    if geometry is None or len(geometry) == 0:
+        raise DescriptionError(f"{place}: <geometry> with a shape is missing")
+    return geometry[0]
+
+
+def _size(solid: Element, place: str) -> tuple[float, ...]:
+    if solid.tag == "box":
+        return read_numbers(solid, "size", place, 3)
+    if solid.tag == "cylinder":
+        return tuple(read_number(solid, key, place, required=True) for key in ("radius", "length"))
+    if solid.tag == "sphere":
+        return (read_number(solid, "radius", place, required=True),)
+    if solid.tag == "mesh":
+        if not solid.get("filename"):
+            raise DescriptionError(f"{place}: <mesh> needs the attribute 'filename'")
+        return read_numbers(solid, "scale", place, 3) if solid.get("scale") else (1.0, 1.0, 1.0)
+    raise DescriptionError(f"{place}: geometry <{shown(solid.tag)}> is not known")
+
+
+def _rgba(material: Element, place: str) -> Color | None:
+    color = material.find("color")
+    if color is None:
+        return None
+    r, g, b, a = read_numbers(color, "rgba", place, 4)
+    return (r, g, b, a)
+
+
+YES = ("true", "yes", "1")
+NO = ("false", "no", "0")
+
+
+def apply_extensions(model: ModelDescription, robot: Element) -> None:
+    """Writes what the `<gazebo>` children of `robot` say into `model`, before its joints are lumped.
+
+    A reference to nothing is a warning, as in Gazebo.
+
+    Raises:
+        DescriptionError: if a value can't be read.
+    """
+    for block in robot.findall("gazebo"):
+        reference = block.get("reference")
+        if not reference:
+            _apply_to_model(model, block)
+        elif reference in model.links:
+            _apply_to_link(model, model.links[reference], block)
+        elif reference in model.joints:
+            _apply_to_joint(model.joints[reference], block)
+        else:
+            model.warnings.append(
+                f"<gazebo reference='{shown(reference)}'> refers to no link or joint"
+            )
+
+
+def read_plugin(element: Element) -> Plugin:
+    return Plugin(element.get("filename", ""), element.get("name", ""), element)
+
+
+def name_sensor(element: Element, owner: str) -> str:
+    """Returns what to call a sensor that is left out."""
+    kind, name = shown(element.get("type", "unknown")), shown(element.get("name", ""))
+    return f"{kind} sensor '{name}' of {owner}"
+
+
+def _apply_to_model(model: ModelDescription, block: Element) -> None:
+    model.plugins += [read_plugin(element) for element in block.findall("plugin")]
+    for element in block:
+        if element.tag == "static":
+            model.static = model.static or _value(element) in YES
+        elif element.tag == "self_collide" and _value(element) in YES:
+            for link in model.links.values():
+                link.self_collide = True
+
+
+def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
+    for element in block:
+        place = f"<gazebo reference='{shown(link.name)}'>, <{element.tag}>"
+        if element.tag == "mu1":
+            mu = _not_negative(_value(element), place)
+            link.collisions = [replace(shape, mu=mu) for shape in link.collisions]
+        elif element.tag == "turnGravityOff":
+            link.gravity = (
+                _value(element) in NO
+            )  # whatever else stands there, or nothing, turns it off
+        elif element.tag == "gravity":
+            link.gravity = _value(element) in ("", *YES)
+        elif element.tag == "selfCollide":
+            link.self_collide = _value(element) in YES
+        elif element.tag == "sensor":
+            model.left_out.append(name_sensor(element, f"link '{shown(link.name)}'"))
+        elif element.tag == "plugin":
+            name = shown(element.get("filename", ""))
+            model.left_out.append(f"plugin {name} of link '{shown(link.name)}'")
+
+
+def _apply_to_joint(joint: Joint, block: Element) -> None:
+    """A fixed joint is kept as it is, or as a hinge that can't turn."""
+    if joint.kind != "fixed":
+        return
+    if _value(block.find("preserveFixedJoint")) in YES:
+        joint.kept = True
+    elif _value(block.find("disableFixedJointLumping")) in YES:
+        joint.kind = "revolute"
+
+
+def _value(element: Element | None) -> str:
+    """The value of an extension, without blanks, in small letters."""
+    if element is None:
+        return ""
+    return (element.get("value", element.text) or "").strip().lower()
+
+
+def _not_negative(text: str, place: str) -> float:
+    value = finite(text, place)
+    if value < 0.0:
+        raise DescriptionError(f"{place}: {value} is negative")
+    return value
+
+
+def parse_urdf(
+    text: str | bytes, source: str = "URDF", resources: Resources | None = None
+) -> ModelDescription:
+    """Returns the model that `text` describes, its fixed joints lumped as Gazebo does.
+
+    `resources` finds mesh files.
+
+    Raises:
+        DescriptionError: if it can't be simulated: `source`, the place and the fault, in one line.
+    """
+    reading = Reading()
+    with elements.place(source):
+        return read_urdf(reading.parse(text), resources or Resources(), reading)
+
+
+def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDescription:
+    """As parse_urdf, from the root element."""
+    if robot.tag != "robot":
+        raise DescriptionError(f"the root element is <{shown(robot.tag)}>, not <robot>")
+    warnings: list[str] = []
+    reader = LinkReader(MeshFinder(resources, reading.mesh, warnings=warnings), reading, warnings)
+    reader.learn_materials(robot)
+    found = robot.findall("link")
+    check_count(len(found))
+    links = unique(map(reader.read, found), "link")
+    check_shapes(links.values())
+
+    def read(element: Element) -> Joint:
+        reading.check()
+        return read_joint(element, warnings)
+
+    joints = unique(map(read, robot.findall("joint")), "joint")
+    roots = find_roots(links, joints)
+    if len(roots) > 1:
+        raise DescriptionError(f"links {roots[:10]} all have no parent joint; one root is needed")
+    model = ModelDescription(robot.get("name", ""), links, joints, roots[0], warnings=warnings)
+    model.initial_pose = read_origin(robot, "robot")
+    apply_extensions(model, robot)
+    reading.check()
+    try:
+        return lump_fixed_joints(model)
+    except DescriptionError as error:
+        if not warnings:
+            raise
+        # An inertial that was left out is what a root without mass comes from.
+        raise DescriptionError(f"{error}. Before that: {warnings[0]}") from error

@@ -1,0 +1,212 @@
+"""Fixed-joint lumping, as sdformat does it when Gazebo loads a URDF (docs/contract/gazebo.md 2.4).
+
+The child of a fixed joint melts into its parent: inertia, shapes and the joints below it move up, and
+its name is gone. A root link called `world` stands for the world itself. Links without mass are dropped.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TypeVar
+
+from bullet_gazebo.physics.description import (
+    DescriptionError,
+    Inertia,
+    Joint,
+    Link,
+    ModelDescription,
+    Shape,
+)
+from bullet_gazebo.physics.dynamics import combine, is_positive_definite
+from bullet_gazebo.physics.pose import Pose
+
+MAX_LINKS = 1000  # in the file; robots have some hundreds, and melting fixed joints is quadratic
+
+Named = TypeVar("Named", Link, Joint)
+
+
+def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
+    """Returns `items` by name.
+
+    Raises:
+        DescriptionError: for a name that is there twice.
+    """
+    found: dict[str, Named] = {}
+    for item in items:
+        if item.name in found:
+            raise DescriptionError(f"{what} '{item.name}' is there twice")
+        found[item.name] = item
+    return found
+
+
+def check_count(links: int) -> None:
+    """Refuses a model of too many links, before time is spent on them.
+
+    Raises:
+        DescriptionError: if there are more than MAX_LINKS.
+    """
+    if links > MAX_LINKS:
+        raise DescriptionError(f"there are {links} links; up to {MAX_LINKS} are read (MAX_LINKS)")
+
+
+def find_roots(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
+    """Returns the links that are nobody's child, in document order; all others hang from one of them.
+
+    Raises:
+        DescriptionError: for missing links, a link with two parents, and loops.
+    """
+    if not links:
+        raise DescriptionError("there is no <link>")
+    check_count(len(links))
+    below = _children(links, joints)
+    children = {name for names in below.values() for name in names}
+    roots = [name for name in links if name not in children]
+    if not roots:
+        raise DescriptionError("the links form a loop: no link is without a parent joint")
+    reached, todo = set(roots), list(roots)
+    while todo:
+        names = below[todo.pop()]
+        reached.update(names)
+        todo.extend(names)
+    loop = [name for name in links if name not in reached]
+    if loop:
+        raise DescriptionError(f"links {loop[:10]} form a loop")
+    return roots
+
+
+def _children(links: dict[str, Link], joints: dict[str, Joint]) -> dict[str, list[str]]:
+    below: dict[str, list[str]] = defaultdict(list)
+    seen: set[str] = set()
+    for joint in joints.values():
+        for role, name in (("parent", joint.parent), ("child", joint.child)):
+            if name not in links:
+                raise DescriptionError(f"joint '{joint.name}': {role} link '{name}' does not exist")
+        if joint.child in seen:
+            raise DescriptionError(f"link '{joint.child}' has more than one parent joint")
+        seen.add(joint.child)
+        below[joint.parent].append(joint.child)
+    return below
+
+
+WORLD = "world"
+LUMPED = "_fixed_joint_lump__"
+
+
+def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
+    """Returns `model` with its fixed joints lumped and its massless links gone (changed in place)."""
+    detach_from_world(model)
+    lumped = [j.name for j in model.joints.values() if j.kind == "fixed" and not j.kept]
+    for name in lumped[::-1]:
+        _lump(model, name)
+    _drop_free_joints(model)
+    drop_massless(model)
+    model.lumped = {name: at for name, at in model.lumped.items() if at[0] in model.links}
+    mend_moments(model)
+    for link in model.links.values():
+        link.collisions = _named(link, link.collisions, "_collision")
+        link.visuals = _named(link, link.visuals, "_visual")
+    return model
+
+
+def _named(link: Link, shapes: list[Shape], suffix: str) -> list[Shape]:
+    """Names shapes as sdformat does: after themselves or their link, numbered from the second one on."""
+    names = []
+    for count, shape in enumerate(shapes):
+        stem = link.name + shape.name if shape.name.startswith(LUMPED) else shape.name or link.name
+        names.append(f"{stem}{suffix}_{count}" if count else f"{stem}{suffix}")
+    return [replace(shape, name=name) for shape, name in zip(shapes, names, strict=True)]
+
+
+def detach_from_world(model: ModelDescription) -> None:
+    """A single fixed joint from the link `world` makes the model's base immovable; `world` is dropped."""
+    if model.root != WORLD:
+        return
+    anchors = [joint for joint in model.joints.values() if joint.parent == WORLD]
+    model.world_joints = [joint.name for joint in anchors if joint.kind == "fixed"]
+    if len(anchors) == 1 and anchors[0].kind == "fixed":
+        del model.joints[anchors[0].name], model.links[WORLD]
+        model.root, model.root_pose = anchors[0].child, anchors[0].pose
+    elif not model.world_joints:
+        model.world_joints = [WORLD]
+
+
+def _lump(model: ModelDescription, name: str) -> None:
+    joint = model.joints.pop(name)
+    parent, child = model.links[joint.parent], model.links.pop(joint.child)
+    parent.gravity = parent.gravity and child.gravity
+    parent.self_collide = parent.self_collide or child.self_collide
+    parent.inertia = combine(parent.inertia, _moved(child.inertia, joint.pose))
+    parent.collisions += [_lumped(shape, joint.pose, child.name) for shape in child.collisions]
+    parent.visuals += [_lumped(shape, joint.pose, child.name) for shape in child.visuals]
+    for other in model.joints.values():
+        if other.parent == child.name:
+            other.parent, other.pose = parent.name, joint.pose.compose(other.pose)
+    for name, (link, pose) in model.lumped.items():
+        if link == child.name:
+            model.lumped[name] = parent.name, joint.pose.compose(pose)
+    model.lumped[child.name] = parent.name, joint.pose
+
+
+def _moved(inertia: Inertia | None, pose: Pose) -> Inertia | None:
+    return None if inertia is None else replace(inertia, com=pose.compose(inertia.com))
+
+
+def _lumped(shape: Shape, pose: Pose, link: str) -> Shape:
+    name = shape.name if shape.name.startswith(LUMPED) else LUMPED + (shape.name or link)
+    return replace(shape, pose=pose.compose(shape.pose), name=name)
+
+
+def _drop_free_joints(model: ModelDescription) -> None:
+    """Gazebo makes no joint of a floating or planar one; a robot that hangs from the world by it is free."""
+    for joint in [j for j in model.joints.values() if not j.movable and not j.kept]:
+        if (
+            not joint.parent == model.root == WORLD
+            or len([j for j in model.joints.values() if j.parent == WORLD]) > 1
+        ):
+            raise DescriptionError(
+                f"joint '{joint.name}': a {joint.kind} joint is only simulated as the free base of a robot"
+            )
+        del model.joints[joint.name], model.links[WORLD]
+        model.root, model.root_pose, model.world_joints = joint.child, joint.pose, []
+
+
+def mend_moments(model: ModelDescription) -> None:
+    """Gives links whose moments no body has, all of them 0 for the most part, those that ODE gives them: 1.
+
+    With the file's own the world would be lost to the first step.
+    """
+    for link in model.links.values():
+        inertia = link.inertia
+        if model.static or inertia is None or inertia.mass <= 0.0 or is_positive_definite(inertia):
+            continue
+        model.warnings.append(
+            f"link '{link.name}': no body has its moments of inertia; they are 1 kg m² instead, as in ODE"
+        )
+        link.inertia = Inertia(inertia.mass, inertia.com, ixx=1.0, iyy=1.0, izz=1.0)
+
+
+def drop_massless(model: ModelDescription) -> None:
+    for name in list(model.links):
+        link = model.links.get(name)
+        if link is None or name == WORLD or (link.inertia is not None and link.inertia.mass > 0.0):
+            continue
+        if name == model.root and not model.static:
+            raise DescriptionError(
+                f"link '{name}': the root link has no mass, so Gazebo drops the model"
+            )
+        if name != model.root:
+            _drop_subtree(model, link)
+
+
+def _drop_subtree(model: ModelDescription, link: Link) -> None:
+    model.warnings.append(
+        f"link '{link.name}' has no mass: it is dropped with all that hangs from it"
+    )
+    doomed = [link.name]
+    while doomed:
+        name = doomed.pop()
+        model.links.pop(name, None)
+        for joint in [j for j in model.joints.values() if name in (j.parent, j.child)]:
+            if joint.parent == name:
+                doomed.append(joint.child)
+            del model.joints[joint.name]

@@ -1,1 +1,0 @@
-"""What follows from a description by mechanics alone: lumping, inertias, frames, bounds."""

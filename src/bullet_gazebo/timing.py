@@ -1,0 +1,173 @@
+"""Keeps simulated time in step with the wall clock."""
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import TracebackType
+
+
+class FairLock:
+    """First come, first served.
+
+    threading.Lock lets a thread that releases and re-acquires it in a loop, as the simulation does, keep
+    all others out. Here every waiter gets its turn after at most one tick.
+
+    Raises:
+        RuntimeError: if the thread that holds it takes it once more, for which it would wait for ever.
+    """
+
+    def __init__(self) -> None:
+        self._guard = threading.Lock()
+        self._waiting: deque[threading.Lock] = deque()
+        self._held = False
+        self._holder: int | None = None  # the thread
+        self.turns = 0  # how often it was taken
+
+    @property
+    def held(self) -> bool:
+        return self._held
+
+    @property
+    def holder(self) -> int | None:
+        """The thread that holds it; None also in the moment in which it is handed over."""
+        return self._holder
+
+    def __enter__(self) -> None:
+        thread = threading.get_ident()
+        if self._holder == thread:
+            raise RuntimeError("this thread holds the simulator's lock already")
+        self._take()
+        self._holder = thread
+        self.turns += 1
+
+    def _take(self) -> None:
+        with self._guard:
+            if not self._held:
+                self._held = True
+                return
+            turn = threading.Lock()
+            turn.acquire()
+            self._waiting.append(turn)
+        turn.acquire()
+
+    def wait(self, event: threading.Event, timeout: float) -> None:
+        """Lets go of the lock until `event` is set, or for `timeout` [s]; for the holder."""
+        self.__exit__(None, None, None)
+        event.wait(timeout)
+        self.__enter__()
+
+    def yield_turn(self) -> None:
+        """Lets everybody who waits have their turn first; for the holder, in the middle of long work."""
+        self.__exit__(None, None, None)
+        self.__enter__()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._holder = None
+        with self._guard:
+            if self._waiting:
+                self._waiting.popleft().release()  # the lock stays held: it is handed over
+            else:
+                self._held = False
+
+
+POLL = 0.2  # [s]
+
+
+class Holds:
+    """Who holds time at the moment. A world that is held is not paused: pausing is the clients' affair."""
+
+    def __init__(self, lock: FairLock, changed: Callable[[], None]) -> None:
+        """`lock` is the simulator's; `changed` is called under it."""
+        self._lock = lock
+        self._changed = changed
+        self._holders: set[object] = set()
+        self._free = threading.Event()
+        self._free.set()
+
+    def __bool__(self) -> bool:
+        return bool(self._holders)
+
+    @contextmanager
+    def hold(self, patience: float, late: Callable[[], None]) -> Iterator[None]:
+        """Lets no time pass within the block; not called under the lock.
+
+        What waits for time to pass in there would wait for ever: after `patience` [s of wall time] time goes
+        on, and `late` is called.
+        """
+        holder = object()
+        with self._lock:
+            self._holders.add(holder)
+            self._update()
+        timer = threading.Timer(patience, self._give_up, (holder, late))
+        timer.daemon = True
+        try:
+            timer.start()  # may fail: where memory is short there is no thread to be had
+            yield
+        finally:
+            timer.cancel()
+            self._release(holder)
+
+    def await_end(self, stopping: threading.Event) -> None:
+        """Returns when nobody holds time, or `stopping` is set; the caller's lock is let go of meanwhile."""
+        while self._holders and not stopping.is_set():
+            self._lock.wait(self._free, POLL)
+
+    def _give_up(self, holder: object, late: Callable[[], None]) -> None:
+        if self._release(holder):
+            late()
+
+    def _release(self, holder: object) -> bool:
+        with self._lock:
+            if holder not in self._holders:
+                return False
+            self._holders.remove(holder)
+            self._update()
+            return True
+
+    def _update(self) -> None:
+        if self._holders:
+            self._free.clear()
+        else:
+            self._free.set()
+        self._changed()
+
+
+MAX_LAG = 0.1  # [s]; a host that falls behind further than this isn't made up for
+
+
+class Pacer:
+    """Waits until the wall clock has caught up with the ticks done so far."""
+
+    def __init__(self) -> None:
+        self._due = time.perf_counter()
+
+    def restart(self) -> None:
+        """Begins to count from now, after a pause."""
+        self._due = time.perf_counter()
+
+    def wait(self, period: float, longest: float = math.inf) -> bool:
+        """Sleeps until `period` [s of wall time] after the previous due time; 0 never waits.
+
+        Returns:
+            False when that takes longer than `longest` [s]: call wait_on() until it is due.
+        """
+        self._due += period
+        if period <= 0.0 or self._due - time.perf_counter() < -MAX_LAG:
+            self._due = time.perf_counter()
+            return True
+        return self.wait_on(longest)
+
+    def wait_on(self, longest: float) -> bool:
+        """Sleeps until the due time, but no longer than `longest` [s]; returns whether it is due."""
+        delay = self._due - time.perf_counter()
+        if delay > 0.0:
+            time.sleep(min(delay, longest))
+        return delay <= longest

@@ -1,0 +1,10 @@
+"""Files shared with others: bounded reading of XML and YAML of unknown origin, and locks.
+
+A leaf: it imports nothing of this repository, no ROS and no engine, and may be imported everywhere.
+
+- `content`: reads a regular file within a bound of bytes.
+- `xml_text`, `yaml_text`: parse text of any encoding, however large or nested it would become.
+- `locks`: one process at a time in a folder or file.
+"""
+
+__all__ = ["content", "locks", "xml_text", "yaml_text"]

@@ -1,1 +1,0 @@
-"""Episodes and fragments of them that are played on other machines."""

@@ -1,1 +1,0 @@
-"""Writes videos: a leaf that knows nothing of what they show."""

@@ -1,0 +1,14 @@
+"""A page in the browser, the curves of a growing table on it, and MP4 files.
+
+This leaf knows nothing of what it shows. Its modules are imported one by one, because `server` and
+`curves` need viser, which takes a second to load; `address`, `table` and `video` load at once.
+
+Modules:
+    address: `find_address`, `Address`, and the command-line flags of a page.
+    server: `serve`, `stop`, `open_browser`, `hidden_page`.
+    curves: `Curves`.
+    table: `GrowingTable`.
+    video: `Mp4Writer`.
+"""
+
+__all__ = ["address", "curves", "server", "table", "video"]

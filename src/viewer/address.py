@@ -1,0 +1,132 @@
+"""Where a page is served: a free port, the flags that choose it, and how users reach it."""
+
+import argparse
+import getpass
+import ipaddress
+import os
+import secrets
+import socket
+from dataclasses import dataclass, field
+
+LOOPBACK = "127.0.0.1"
+FIRST_PORT = 8080
+LAST_PORT = 65535
+MAX_TRIES = 100  # ports from FIRST_PORT on
+TOKEN_BYTES = 16
+
+
+class PortInUse(Exception):
+    """The page can't be served at that address; the text says why."""
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where a page is served. Beyond loopback, the page answers only requests that carry `token`."""
+
+    host: str
+    port: int
+    token: str = field(default="", repr=False)
+
+    @property
+    def url(self) -> str:
+        """The address to open in a browser."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        if _is_any_address(self.host):
+            host = socket.gethostname()
+        return f"http://{host}:{self.port}/" + (f"?token={self.token}" if self.token else "")
+
+    def advice(self, what: str, power: str) -> list[str]:
+        """Returns lines that say where the page is and how to reach it from another machine.
+
+        Args:
+            what: the page's subject, as "the window".
+            power: what the page lets its visitors do, as "moves the simulation".
+        """
+        lines = [f"{what} is the page {self.url}"]
+        if self.token:
+            lines.append(
+                f"it is served on {self.host} to anybody who has this address; "
+                f"the connection is not encrypted, and the page {power}"
+            )
+        elif not has_display():
+            here = f"{getpass.getuser()}@{socket.gethostname()}"
+            tunnel = f"ssh -N -L {self.port}:{LOOPBACK}:{self.port} {here}"
+            lines.append(
+                f"no display here; on the machine with the browser, run  {tunnel}  and open the page"
+            )
+        return lines
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags of a command that serves a page: `host`, `port`, `no_browser`."""
+    add = parser.add_argument
+    add("--port", type=int, help="port of the page (default: the first free one from 8080 on)")
+    add(
+        "--host",
+        default=LOOPBACK,
+        help="address to serve on (default: %(default)s, this machine only); "
+        "on any other address, visitors need the token in the page's URL",
+    )
+    add("--no-browser", action="store_true", help="don't open a browser")
+
+
+def has_display() -> bool:
+    """Returns whether a browser can be opened on this machine."""
+    return bool(os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY"))
+
+
+def is_loopback(host: str) -> bool:
+    """Returns whether only this machine reaches `host`."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _is_any_address(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_unspecified
+    except ValueError:
+        return False
+
+
+def find_address(host: str, port: int | None) -> Address:
+    """Returns an address that can be served.
+
+    Args:
+        host: the address to bind to.
+        port: the port; None for the first free one.
+
+    Raises:
+        PortInUse: if nothing can be served there.
+    """
+    ports = [port] if port is not None else range(FIRST_PORT, FIRST_PORT + MAX_TRIES)
+    problem = ""
+    for each in ports:
+        try:
+            found = _bind(host, each)
+        except socket.gaierror as error:  # the same at any port, and each lookup may be slow
+            problem = error.strerror or str(error)
+            break
+        except UnicodeError:  # two dots in a row, more than 63 letters between dots, ...
+            problem = "no host can have that name"
+            break
+        except (OSError, OverflowError) as error:
+            problem = getattr(error, "strerror", None) or str(error)
+            continue
+        return Address(host, found, "" if is_loopback(host) else secrets.token_urlsafe(TOKEN_BYTES))
+    tried = f"port {port}" if port is not None else f"ports {ports[0]} to {ports[-1]}"
+    raise PortInUse(
+        f"the page can't be served on {host}, {tried}: {problem}; choose others with --host, --port"
+    )
+
+
+def _bind(host: str, port: int) -> int:
+    """Binds to a port for a moment; returns it, or the one that the system chose for port 0."""
+    if not 0 <= port <= LAST_PORT:
+        raise OverflowError(f"a port lies between 0 and {LAST_PORT}")
+    family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    with socket.socket(family, kind, protocol) as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        trial.bind(address)
+        return int(trial.getsockname()[1])

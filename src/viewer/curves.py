@@ -1,0 +1,218 @@
+"""The curves of a training on a page: charts with a bounded number of points over a table that grows."""
+
+import math
+from collections import deque
+from html import escape
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import viser
+from viser import uplot
+
+from viewer.table import GrowingTable, TableUpdate
+
+EPISODES, LENGTHS, SPEED = "charts/episodic_return", "charts/episodic_length", "charts/SPS"
+# The tags of trainings, in the order of the charts. Further losses follow as they come.
+TITLES = {
+    EPISODES: "return",
+    "eval/mean_reward": "return of greedy episodes",
+    "rollout/success_rate": "success rate of the last 100 episodes",
+    "eval/success_rate": "success rate of greedy episodes",
+    LENGTHS: "episode length [steps]",
+    "charts/epsilon": "epsilon",
+    SPEED: "steps/s",
+}
+LOSSES = "losses/"
+SMOOTHED = (EPISODES, LENGTHS)  # and losses
+MAX_CHARTS = 16
+HEIGHT = 150  # [pixels]
+# Mantissas of the axes' ends. The range of steps is set by us, and seldom: when viser fits it to the
+# data, a chart that is drawn while it is hidden loses its range.
+ENDS = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0, 6.4, 8.0, 10.0)
+AXES = (uplot.Axis(space=85), uplot.Axis(size=55))  # [pixels] for 100,000,000 and for 100,000
+PALE, STRONG, SINGLE = "rgba(76, 114, 176, 0.45)", "#c0392b", "#2a6f97"
+WINDOW = 20  # values of the moving average, as in the pictures that `plot` draws
+MAX_BUCKETS = 300  # a chart is about as many pixels wide
+
+Container = viser.GuiTabHandle | viser.GuiFolderHandle
+
+
+class Curves:
+    """Charts in a tab or a folder of a page.
+
+    Args:
+        gui: of the page.
+        container: the tab or folder.
+    """
+
+    def __init__(self, gui: viser.GuiApi, container: Container) -> None:
+        self._gui, self._container = gui, container
+        self._table: GrowingTable | None = None
+        with container:
+            self._summary = gui.add_html("")
+        self._series: dict[str, Series] = {}
+        self._charts: dict[str, viser.GuiUplotHandle] = {}
+        self._ends: dict[str, float] = {}  # of the charts' axes of steps
+        self._step = 0.0
+        self._changed: set[str] = set()  # tags with points that aren't drawn yet
+        self._summarise("no training")
+
+    def follow(self, path: Path) -> None:
+        """Shows another table, given by itself or by its folder."""
+        if self._table is None or self._table.path != path:
+            self._table = GrowingTable(path)
+            self._clear()
+
+    def update(self) -> bool:
+        """Draws new points; returns whether there are more to read at once."""
+        if self._table is None:
+            return False
+        update = self._table.read()
+        if update.restarted:
+            self._clear()
+        self._take(update)
+        if not update.has_more:  # else a long table would be drawn a hundred times while it is read
+            self._draw()
+        self._describe(update.problem)
+        return update.has_more
+
+    def _clear(self) -> None:
+        for chart in self._charts.values():
+            chart.remove()
+        self._charts, self._series, self._step = {}, {}, 0.0
+        self._changed = set()
+
+    def _take(self, update: TableUpdate) -> None:
+        for step, tag, value in update.points:
+            series = self._series.get(tag)
+            if series is None:
+                is_extra = tag.startswith(LOSSES) and len(self._series) < MAX_CHARTS
+                if tag not in TITLES and not is_extra:
+                    continue
+                series = self._series[tag] = Series()
+            series.add(step, value)
+            self._step = step
+            self._changed.add(tag)
+
+    def _draw(self) -> None:
+        for tag in sorted(self._changed):
+            x, values, averages = self._series[tag].arrays()
+            smooth = tag in SMOOTHED or tag.startswith(LOSSES)
+            data = (x, values, averages) if smooth else (x, values)
+            if tag in self._charts:
+                self._charts[tag].data = data
+                if self._ends[tag] < x[-1]:
+                    self._charts[tag].scales = self._scales(tag, x[-1])
+            else:
+                with self._container:
+                    self._charts[tag] = self._add_chart(tag, data)
+        self._changed.clear()
+
+    def _add_chart(self, tag: str, data: tuple[np.ndarray, ...]) -> viser.GuiUplotHandle:
+        lines = [uplot.Series(label="step")]
+        if len(data) == 3:
+            lines.append(uplot.Series(label="each", stroke=PALE, width=1))
+            lines.append(uplot.Series(label=f"mean of {WINDOW}", stroke=STRONG, width=2))
+        else:
+            lines.append(uplot.Series(label=tag, stroke=SINGLE, width=2))
+        names = list(TITLES)
+        index = names.index(tag) if tag in names else len(names)
+        return self._gui.add_uplot(
+            data, tuple(lines), title=TITLES.get(tag, tag), height=HEIGHT,
+            order=float(self._summary.order) + 0.001 * (1 + index),
+            legend=uplot.Legend(show=False), axes=AXES, scales=self._scales(tag, data[0][-1]),
+        )  # fmt: skip
+
+    def _scales(self, tag: str, last: float) -> dict[str, uplot.Scale]:
+        """An axis from 0 to somewhat beyond the last step."""
+        tens = 10.0 ** math.floor(math.log10(max(last, 1.0)))
+        self._ends[tag] = next(each * tens for each in ENDS if each * tens >= last)
+        return {"x": uplot.Scale(time=False, auto=False, range=(0.0, self._ends[tag]))}
+
+    def _describe(self, problem: str) -> None:
+        parts = []
+        if EPISODES in self._series:
+            series = self._series[EPISODES]
+            parts.append(f"{series.count} episodes, {self._step:.0f} steps")
+            parts.append(f"return {series.average:.1f} (mean of {WINDOW})")
+        if problem:
+            parts.append(problem)
+        self._summarise(escape(", ".join(parts)) or "no episode has ended yet")
+
+    def _summarise(self, text: str) -> None:
+        content = f'<div style="padding: 0.4em 0.8em">{text}</div>'
+        if content != self._summary.content:
+            self._summary.content = content
+
+
+class _Bucket(NamedTuple):
+    """Consecutive values as one: their ends, their extremes in order, the moving average at the end."""
+
+    begin: float
+    end: float
+    first: float
+    last: float
+    average: float
+
+
+class Series:
+    """Values over steps, with their moving average over the last WINDOW of them.
+
+    From 2 * MAX_BUCKETS values on, neighbours share a bucket, which is drawn by its least and its
+    greatest value. The average is that of the single values.
+    """
+
+    def __init__(self) -> None:
+        self._recent: deque[float] = deque(maxlen=WINDOW)
+        self._closed: list[_Bucket] = []
+        self._size = 1  # values of a bucket
+        self._open: list[tuple[float, float]] = []  # x and value, in the bucket that isn't full
+        self.count = 0
+
+    def add(self, x: float, value: float) -> None:
+        """Appends a value; x must not fall."""
+        self.count += 1
+        self._recent.append(value)
+        self._open.append((x, value))
+        if len(self._open) == self._size:
+            self._closed.append(self._bucket())
+            self._open = []
+            if len(self._closed) == 2 * MAX_BUCKETS:
+                pairs = zip(self._closed[::2], self._closed[1::2], strict=True)
+                self._closed = [_join(first, second) for first, second in pairs]
+                self._size *= 2
+
+    @property
+    def average(self) -> float:
+        """The moving average at the end."""
+        return sum(self._recent) / len(self._recent)
+
+    def _bucket(self) -> _Bucket:
+        first, last = _extremes([value for _, value in self._open])
+        return _Bucket(self._open[0][0], self._open[-1][0], first, last, self.average)
+
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Returns x, values and averages, each (N,) with N of at most 4 * MAX_BUCKETS."""
+        buckets = [*self._closed, *([self._bucket()] if self._open else [])]
+        if self._size == 1:
+            rows = [(each.end, each.last, each.average) for each in buckets]
+        else:
+            rows = []
+            before = buckets[0].average
+            for each in buckets:
+                rows += [(each.begin, each.first, before), (each.end, each.last, each.average)]
+                before = each.average
+        table = np.array(rows, dtype=np.float64).reshape(-1, 3)
+        return table[:, 0].copy(), table[:, 1].copy(), table[:, 2].copy()
+
+
+def _join(one: _Bucket, following: _Bucket) -> _Bucket:
+    first, last = _extremes([one.first, one.last, following.first, following.last])
+    return _Bucket(one.begin, following.end, first, last, following.average)
+
+
+def _extremes(values: list[float]) -> tuple[float, float]:
+    """The least and the greatest value, in the order in which they came."""
+    low, high = min(values), max(values)
+    return (low, high) if values.index(low) <= values.index(high) else (high, low)

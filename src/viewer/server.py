@@ -1,0 +1,153 @@
+"""A viser server behind a gate, without viser's console output and its tunnel to the internet.
+
+viser serves everybody who reaches the port. Pages of other sites in the same browser reach it too: a
+browser lets them connect anywhere and only reports where they come from. So `Gate` checks each request.
+"""
+
+import contextlib
+import hmac
+import http
+import io
+import secrets
+import webbrowser
+from collections.abc import Callable, Iterator
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import viser
+import websockets.asyncio.server
+from viser import _messages as messages
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from viewer.address import LOOPBACK, TOKEN_BYTES, Address, PortInUse, has_display, is_loopback
+
+Answer = Callable[[Any, Request], Response | None]
+Point = tuple[float, float, float]  # [m]
+
+
+class Gate:
+    """Admits this machine's own browsers, or, beyond loopback, requests that carry the token."""
+
+    def __init__(self, address: Address) -> None:
+        self._token = address.token
+        self._cookie = f"viewer_{address.port}"
+
+    def refusal(self, request: Request) -> str:
+        """Returns why the request is refused; empty if it is admitted."""
+        host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
+        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+            return "it comes from another page"
+        if self._token:
+            return "" if self._has_token(request) else "the address needs its token"
+        # A foreign name that resolves to this machine belongs to a foreign page (DNS rebinding).
+        return "" if is_loopback(_host_name(host)) else "the page is at 127.0.0.1 only"
+
+    def _has_token(self, request: Request) -> bool:
+        given = parse_qs(urlsplit(request.path).query).get("token", [])
+        try:
+            kept = SimpleCookie(request.headers.get("Cookie", "")).get(self._cookie)
+        except CookieError:
+            kept = None
+        given += [kept.value] if kept is not None else []
+        return any(hmac.compare_digest(each.encode(), self._token.encode()) for each in given)
+
+    def guard(self, answer: Answer) -> Answer:
+        """Wraps `answer` in the check; the answer sets the cookie that the page's websocket sends."""
+
+        def guarded(connection: Any, request: Request) -> Response | None:
+            refusal = self.refusal(request)
+            if refusal:
+                return Response(
+                    http.HTTPStatus.FORBIDDEN, "Forbidden", Headers(), f"{refusal}\n".encode()
+                )
+            response = answer(connection, request)
+            if self._token and response is not None:
+                response.headers["Set-Cookie"] = (
+                    f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+                )
+            return response
+
+        return guarded
+
+
+def _host_name(header: str) -> str:
+    try:
+        return urlsplit(f"//{header}").hostname or ""
+    except ValueError:
+        return ""
+
+
+def _start(address: Address, title: str = "") -> viser.ViserServer:
+    """Starts viser with a gate in front; viser has no public hook for one."""
+    module = websockets.asyncio.server
+    serve_anyone, gate = module.serve, Gate(address)
+
+    def serve_guarded(*arguments: Any, process_request: Answer, **options: Any) -> Any:
+        return serve_anyone(*arguments, process_request=gate.guard(process_request), **options)
+
+    module.serve = serve_guarded  # type: ignore[assignment,misc]
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            return viser.ViserServer(address.host, address.port, label=title, verbose=False)
+    finally:
+        module.serve = serve_anyone  # type: ignore[misc]
+
+
+def serve(address: Address, title: str, camera: Point, look_at: Point) -> viser.ViserServer:
+    """Starts the server, which runs in its own threads.
+
+    Args:
+        address: from `find_address`.
+        title: of the page.
+        camera: where visitors look from [m].
+        look_at: what they look at [m].
+
+    Raises:
+        PortInUse: if another process has taken the port since.
+    """
+    server = _start(address, title)
+    if server.get_port() != address.port:
+        stop(server)
+        raise PortInUse(f"another process has just taken port {address.port}; start again")
+    for message in (messages.ShareUrlRequest, messages.ShareUrlDisconnect):
+        server._websock_server.unregister_handler(message)
+    server.gui.configure_theme(
+        control_layout="fixed", control_width="medium", show_logo=False, show_share_button=False
+    )
+    server.initial_camera.position = camera
+    server.initial_camera.look_at = look_at
+    return server
+
+
+def stop(server: viser.ViserServer) -> None:
+    """Stops the server."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+@contextlib.contextmanager
+def hidden_page() -> Iterator[viser.ViserServer]:
+    """A page for recordings, which viser can make only of a server; nobody has its token."""
+    server = _start(Address(LOOPBACK, 0, secrets.token_urlsafe(TOKEN_BYTES)))
+    try:
+        yield server
+    finally:
+        stop(server)
+
+
+def open_browser(address: Address, warn: Callable[[str], None]) -> None:
+    """Opens the page in a browser on this machine, if it has a display.
+
+    Args:
+        warn: receives a line if no browser could be opened.
+    """
+    if not has_display():
+        return
+    try:
+        opened = webbrowser.open(address.url)
+    except webbrowser.Error:
+        opened = False
+    if not opened:
+        warn(f"no browser could be opened here; open {address.url} in one")

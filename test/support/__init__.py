@@ -1,0 +1,1 @@
+"""What tests share, by subject: `from support.robots.cartpole import cartpole_urdf`."""

@@ -1,0 +1,89 @@
+"""Options and the table of the stress tests (test/stress).
+
+    ./ws test -m stress                                     # all of it, up to an hour; another seed each time
+    ./ws test -m stress --stress-seed 7 -k kill             # the same cases again
+    ./ws test -m stress --stress-seed 7 -k kill --stress-case 12 -x     # the one that failed
+
+Without `-m stress` only a little of each runs, always the same, so that the code stays alive.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator
+from dataclasses import asdict
+
+import pytest
+from support.stress import table
+from support.stress.scenario import Row, Scenario
+
+LITTLE = 0.0005  # of the full number of cases
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("stress")
+    group.addoption("--stress-scale", type=float, help="part of each stress test that is done")
+    group.addoption("--stress-seed", type=int, help="of all that stress tests draw")
+    group.addoption("--stress-case", type=int, help="the one case of each scenario that is tried")
+
+
+def is_asked_for(config: pytest.Config) -> bool:
+    """Whether it is a run of stress tests, not one of all tests."""
+    return config.option.markexpr == "stress"
+
+
+def prepare(config: pytest.Config) -> None:
+    """Chooses what wasn't given; the processes of pytest-xdist get it with the other options."""
+    if config.option.stress_scale is None:
+        config.option.stress_scale = 1.0 if is_asked_for(config) else LITTLE
+    if config.option.stress_seed is None:
+        config.option.stress_seed = secrets.randbelow(10**6) if is_asked_for(config) else 0
+
+
+def pytest_report_header(config: pytest.Config) -> list[str]:
+    option = config.option
+    if not is_asked_for(config):
+        return []
+    return [f"stress: --stress-seed {option.stress_seed} --stress-scale {option.stress_scale:g}"]
+
+
+def deselect_full(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leaves what is marked `stress(full=True)` to a run of stress tests: its like runs in any."""
+    if is_asked_for(config):
+        return
+    marks = ((item, item.get_closest_marker("stress")) for item in items)
+    left = [item for item, mark in marks if mark and mark.kwargs.get("full")]
+    if left:
+        config.hook.pytest_deselected(items=left)
+        items[:] = [item for item in items if item not in left]
+
+
+@pytest.fixture
+def scenario(request: pytest.FixtureRequest) -> Iterator[Scenario]:
+    """What a stress test draws from and counts with."""
+    option = request.config.option
+    made = Scenario(option.stress_seed, option.stress_scale, option.stress_case)
+    yield made
+    request.node.user_properties += [("stress", asdict(row)) for row in made.rows]
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    """Tells and keeps the table of a run of stress tests."""
+    if not is_asked_for(config):
+        return
+    option = config.option
+    reports = [each for group in terminalreporter.stats.values() for each in group]
+    rows = [
+        Row(**value)
+        for report in reports
+        if getattr(report, "when", "") == "teardown"
+        for name, value in report.user_properties
+        if name == "stress"
+    ]
+    records = [table.record(row, option.stress_seed, option.stress_scale) for row in rows]
+    if records:
+        table.write(records)
+        terminalreporter.section(f"stress, seed {option.stress_seed}")
+        terminalreporter.write(table.render(records))

@@ -1,0 +1,162 @@
+"""XML of every encoding, with whatever before its declaration, and texts that only exhaust their reader."""
+
+import os
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from files import content, xml_text
+from files.content import FileError, TooLarge, read_file
+from files.xml_text import parse
+
+TEXT = '<a name="Gelände">\r\n<b/>\r\n</a>'
+BEFORE = ["", " ", "\n\n", "\t\r\n", "<!-- by hand -->\n", "\n<!-- one --><!-- two -->\n "]
+ENCODINGS = [
+    "utf-8",
+    "UTF-8",
+    "iso-8859-1",
+    "latin-1",
+    "windows-1252",
+    "us-ascii",
+    "utf-16",
+    "gb18030",
+]
+
+
+def written(before, declared, codec, mark=b""):
+    name = "" if declared is None else f'<?xml version="1.0" encoding="{declared}"?>\r\n'
+    text = TEXT.replace("ä", "a") if codec == "us-ascii" else TEXT
+    return mark + f"{before}{name}{text}".encode(codec)
+
+
+def check(root):
+    assert root.tag == "a"
+    assert root.get("name") in ("Gelände", "Gelande")
+    assert len(root) == 1
+
+
+@pytest.mark.parametrize("before", BEFORE)
+def test_a_text_may_have_anything_harmless_before_its_declaration(before):
+    for declaration in ("", '<?xml version="1.0"?>', "<?xml version='1.0' encoding='latin-1'?>"):
+        for mark in ("", "\ufeff"):
+            check(parse(f"{mark}{before}{declaration}{TEXT}"))
+
+
+@pytest.mark.parametrize("before", BEFORE)
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_a_file_is_read_in_the_encoding_that_it_declares(encoding, before):
+    codec = "utf-8" if encoding == "utf-16" else encoding  # which what reads as ASCII can't be in
+    check(parse(written(before, encoding, codec)))
+
+
+@pytest.mark.parametrize("declared", [None, "utf-8", "utf-16", "iso-8859-1"])
+@pytest.mark.parametrize("codec", ["utf-8", "utf-16-le", "utf-16-be", "utf-32-le", "utf-32-be"])
+def test_a_byte_order_mark_says_more_than_the_declaration(codec, declared):
+    check(parse(written("\n", declared, codec, "\ufeff".encode(codec))))
+
+
+@pytest.mark.parametrize("codec", ["utf-16-le", "utf-16-be"])
+def test_utf_16_needs_no_mark(codec):
+    check(parse(written("", "utf-16", codec)))
+
+
+@pytest.mark.parametrize(
+    ("data", "fault"),
+    [
+        (b"<a>\xe9</a>", "byte 3 is no utf-8: is its encoding declared in the first line?"),
+        (b"\xff\xfe<", "is no utf-16-le"),
+        (
+            b'<?xml version="1.0" encoding="klingon"?><a/>',
+            "its encoding 'klingon' is not known here",
+        ),
+        (
+            b'<?xml version="1.0" encoding="punycode"?><a/>',
+            "its encoding 'punycode' is not known here",
+        ),
+        (b'<?xml version="1.0" encoding="hex"?><a/>', "its encoding 'hex' is not known here"),
+        (b"", "not well-formed XML: no element found"),
+        (b"\0\0\0", "not well-formed XML"),
+        ("<a>\ud800</a>", "not well-formed XML"),
+        ('<a/><?xml version="1.0"?>', "not well-formed XML"),
+        ("<?xmlish?><a/>" * 2, "not well-formed XML"),
+        ("<!-- open <?xml version='1.0'?><a/>", "not well-formed XML"),
+        ("x<?xml version='1.0'?><a/>", "not well-formed XML"),
+    ],
+)
+def test_what_is_no_xml_says_so_in_one_line(data, fault):
+    with pytest.raises(FileError) as raised:
+        parse(data)
+    assert fault in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ('<!DOCTYPE a [<!ENTITY b "bb">]><a>&b;</a>', "(<!DOCTYPE>) is not taken"),
+        ('<!DOCTYPE a SYSTEM "http://example.com/a.dtd"><a/>', "(<!DOCTYPE>) is not taken"),
+        ('<!DOCTYPE a [<!ENTITY b SYSTEM "file:///dev/zero">]><a>&b;</a>', "(<!DOCTYPE>)"),
+        ("<a>" * 101 + "</a>" * 101, "nested more than 100 deep"),
+        ("<a>" * 1_000_000, "nested more than 100 deep"),
+        ("<a>" + "<b/>" * 500_000 + "</a>", "more than 500000 elements (MAX_ELEMENTS)"),
+    ],
+)
+def test_traps_are_refused(text, fault):
+    with pytest.raises(FileError) as raised:
+        parse(text)
+    assert fault in str(raised.value)
+
+
+def test_a_text_beyond_the_limit_is_not_looked_at(monkeypatch):
+    monkeypatch.setattr(xml_text, "MAX_BYTES", 10)
+    check_none = "it has more than 10 bytes (MAX_BYTES)"
+    for text in ("<" * 11, b"<" * 11):
+        with pytest.raises(TooLarge) as raised:
+            parse(text)
+        assert str(raised.value) == check_none
+
+
+def test_who_counts_may_end_the_parsing():
+    counted = []
+
+    def count(elements):
+        counted.append(elements)
+        if len(counted) == 3:
+            raise TooLarge("enough")
+
+    assert len(parse("<a>" + "<b/>" * 1500 + "</a>", count)) == 1500
+    assert sum(counted) == 1501
+    with pytest.raises(TooLarge, match="enough"):
+        parse("<a>" + "<b/>" * 1500 + "</a>", count)
+
+
+def test_only_files_are_read(tmp_path):
+    (tmp_path / "file").write_bytes(b"12345")
+    assert read_file(tmp_path / "file") == b"12345"
+    with pytest.raises(TooLarge, match=r"it has more than 4 bytes"):
+        read_file(tmp_path / "file", 4)
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    faults = {
+        "pipe": "it is not a file", "zero": "it is not a file", "": "it is not a file",
+        "loop": "it can't be read: Too many levels", "gone": "it can't be read: No such file",
+        "x\0y": "it can't be read: ", "x" * 300: "it can't be read: File name too long",
+    }  # fmt: skip
+    for name, fault in faults.items():
+        with pytest.raises(FileError) as raised:
+            read_file(tmp_path / name)
+        assert str(raised.value).startswith(fault)
+    assert content.MAX_BYTES >= 2**20
+
+
+@settings(deadline=None)
+@given(st.binary(max_size=60) | st.text(alphabet="<>?!-xml \n\ufeff", max_size=60).map(str.encode))
+def test_no_bytes_are_anything_but_a_tree_or_a_fault(data):
+    try:
+        root = parse(data)
+    except FileError as error:
+        assert "\n" not in str(error)
+    else:
+        assert isinstance(root.tag, str)

@@ -1,0 +1,109 @@
+"""Where a page is, and who gets in."""
+
+import socket
+
+import pytest
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from viewer.address import Address, PortInUse, find_address
+from viewer.server import Gate
+
+TOKEN = "a-token"
+WINDOW = ("the window", "moves the simulation")
+
+
+@pytest.fixture
+def taken():
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        held.listen()
+        yield held.getsockname()[1]
+
+
+def ask(gate, path="/", **headers):
+    """What a request is answered: a refusal, or what stands behind the gate."""
+    named = Headers({key.title().replace("_", "-"): value for key, value in headers.items()})
+    behind = Response(200, "OK", Headers(), b"the page")
+    return gate.guard(lambda connection, request: behind)(None, Request(path, named))
+
+
+def test_a_port_in_use_is_one_line(taken):
+    with pytest.raises(
+        PortInUse, match=rf"127\.0\.0\.1, port {taken}: Address already in use.*--port"
+    ):
+        find_address("127.0.0.1", taken)
+
+
+@pytest.mark.parametrize("port", [-1, 70000])
+def test_what_is_no_port_is_one_line(port):
+    with pytest.raises(PortInUse, match="port"):
+        find_address("127.0.0.1", port)
+
+
+def test_a_host_of_somebody_else_is_one_line():
+    for host in ("192.0.2.1", "no.such.host.invalid"):
+        with pytest.raises(PortInUse, match="--host"):
+            find_address(host, 0)
+
+
+@pytest.mark.parametrize("host", ["a..b", ".", "a" * 64, "é" * 64, "", "\udcff", "[::1]"])
+def test_what_is_no_host_is_one_line(host):
+    with pytest.raises(PortInUse, match="can't be served on .*--host") as refused:
+        find_address(host, None)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_free_port_is_found():
+    found = find_address("127.0.0.1", None)
+    assert found.port >= 8080
+    assert not found.token
+    assert found.url == f"http://127.0.0.1:{found.port}/"
+
+
+def test_this_machine_needs_no_token_and_no_display(monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    told = "\n".join(Address("127.0.0.1", 8081).advice(*WINDOW))
+    assert "http://127.0.0.1:8081/" in told
+    assert "ssh -N -L 8081:127.0.0.1:8081" in told
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert "ssh" not in "\n".join(Address("127.0.0.1", 8081).advice(*WINDOW))
+
+
+def test_other_machines_need_a_token_and_that_is_said():
+    found = find_address("0.0.0.0", 0)
+    assert len(found.token) > 16
+    assert found.url.endswith(f"/?token={found.token}")
+    assert "anybody who has this address" in "\n".join(found.advice(*WINDOW))
+    assert found.token not in repr(found)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost:9", "[::1]:8080", "127.0.0.1"])
+def test_this_machines_browsers_get_in(host):
+    gate = Gate(Address("127.0.0.1", 8080))
+    assert ask(gate, host=host).status_code == 200
+    upgrade = {"upgrade": "websocket", "host": host}
+    assert ask(gate, **upgrade, origin=f"http://{host}").status_code == 200
+    assert ask(gate, **upgrade, origin="http://elsewhere.example").status_code == 403
+    assert ask(gate, **upgrade, origin="null").status_code == 403
+
+
+@pytest.mark.parametrize("host", ["elsewhere.example:8080", "", "[", "127.0.0.1.elsewhere.example"])
+def test_a_name_that_leads_here_is_refused(host):
+    assert ask(Gate(Address("127.0.0.1", 8080)), host=host).status_code == 403
+
+
+def test_without_the_token_nobody_gets_in():
+    gate = Gate(Address("0.0.0.0", 8080, TOKEN))
+    host = "robot:8080"
+    for path in ("/", "/?token=", "/?token=b", "/?token=ä", f"/?x={TOKEN}"):
+        assert ask(gate, path, host=host).status_code == 403
+        assert ask(gate, path, host=host, upgrade="websocket").status_code == 403
+    for cookie in ("", "viewer_8080=b", f"viewer_8081={TOKEN}", "=;="):
+        assert ask(gate, host=host, cookie=cookie).status_code == 403
+    answer = ask(gate, f"/?token={TOKEN}", host=host)
+    assert answer.status_code == 200
+    cookie = answer.headers["Set-Cookie"].partition(";")[0]
+    assert ask(gate, host=host, cookie=cookie, origin=f"http://{host}").status_code == 200
+    assert ask(gate, host=host, cookie=cookie, origin="http://other").status_code == 403
