@@ -1,7 +1,7 @@
 """Requests that follow each other on a lasting connection: polled for, and read in one piece.
 
 - `PolledService`: the thread that serves a client sleeps between two steps, and waking it may take longer
-  than a step; and reading a request takes half as long as the step itself (test_polling.py)
+  than a step; and reading a request takes half as long as the step itself (test_rospy_polling.py)
 """
 
 from collections.abc import Callable

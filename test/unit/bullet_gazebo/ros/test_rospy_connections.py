@@ -20,6 +20,7 @@ from rospy.exceptions import TransportTerminated
 from rospy.impl.tcpros_base import TCPROSTransportProtocol, TCPServer
 from std_msgs.msg import Float64, String
 
+from bullet_gazebo.ros.common import rospy_connections as connections
 from bullet_gazebo.ros.common.rospy_connections import (
     LARGEST_CALL,
     LARGEST_HEADER,
@@ -28,7 +29,6 @@ from bullet_gazebo.ros.common.rospy_connections import (
     bound_calls,
     bound_messages,
 )
-from bullet_gazebo.ros.wire.rospy_patches import connections
 
 BOUND = 60.0  # [s]
 LOOPBACK = "127.0.0.1"

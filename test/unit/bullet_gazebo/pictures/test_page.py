@@ -7,8 +7,8 @@ from support.pages.viser_recording import Recording
 from bullet_gazebo.physics.description import Shape
 from bullet_gazebo.physics.pose import Pose, normalized
 from bullet_gazebo.pictures.page import Picture
+from bullet_gazebo.pictures.page_batches import MOST_INSTANCES, compose
 from bullet_gazebo.pictures.visuals import VisibleLink, VisibleModel
-from bullet_gazebo.pictures.page_batches import MOST_PARTS, compose
 
 AT_REST = (0.0, 0.0, 0.0, 1.0)
 
@@ -73,7 +73,7 @@ def test_a_thousand_links_are_a_few_objects_and_what_rests_is_not_told_again(ser
     picture.move(poses)
     picture.move(poses)
     told = Recording(recording.serialize())
-    assert len(told.of("BatchedMeshesMessage")) == -(-1000 // MOST_PARTS)
+    assert len(told.of("BatchedMeshesMessage")) == -(-1000 // MOST_INSTANCES)
     assert told.of("SceneNodeUpdateMessage") == []
     recording = server.get_scene_serializer()
     poses[-1, 2] = 1.0
@@ -110,7 +110,9 @@ def test_a_file_with_looks_is_sent_once_for_all_models(server, picture, tmp_path
     path = tmp_path / "triangle.obj"
     path.write_text("mtllib looks.mtl\nv 0 0 0\nv 1 0 0\nv 0 0 1\nusemtl red\nf 1 2 3\n")
     models = [
-        VisibleModel(i, f"m{i}", [VisibleLink("l", [Shape("mesh", (1.0, 1.0, 2.0), mesh=str(path))])])
+        VisibleModel(
+            i, f"m{i}", [VisibleLink("l", [Shape("mesh", (1.0, 1.0, 2.0), mesh=str(path))])]
+        )
         for i in range(5)
     ]
     picture.draw(models, [])

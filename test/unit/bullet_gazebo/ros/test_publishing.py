@@ -4,8 +4,8 @@ import threading
 
 import pytest
 
+from bullet_gazebo.ros.common import publishing
 from bullet_gazebo.ros.common.publishing import ThinnedTopic, Thinner
-from bullet_gazebo.ros.wire import thinning
 
 BOUND = 60.0  # [s]
 
@@ -66,7 +66,7 @@ def test_in_real_time_everything_is_sent_at_once(sim, thinner):
 
 
 def test_a_world_that_slows_down_sends_nothing_stale(sim, thinner, monkeypatch):
-    monkeypatch.setattr(thinning, "PERIOD", BOUND)
+    monkeypatch.setattr(publishing, "PERIOD", BOUND)
     reader = Reader()
     topic = ThinnedTopic(thinner, "/topic", reader)
     topic.send(1)
@@ -90,7 +90,7 @@ def test_a_closed_topic_publishes_nothing(thinner):
 
 def test_a_topic_whose_message_can_not_be_sent_silences_no_other(thinner, monkeypatch):
     told = threading.Event()
-    monkeypatch.setattr(thinning.rospy, "logerr_throttle", lambda period, text: told.set())
+    monkeypatch.setattr(publishing.rospy, "logerr_throttle", lambda period, text: told.set())
 
     def fail(sample):
         raise OverflowError("no number for a message")

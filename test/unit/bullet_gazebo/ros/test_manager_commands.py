@@ -1,4 +1,4 @@
-"""The filters of `controller_manager_msgs.utils`, which rqt's plugins use."""
+"""The commands controller_manager and controller_group, and the filters of controller_manager_msgs."""
 
 import pytest
 from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
@@ -9,6 +9,33 @@ from controller_manager_msgs.utils import (
     filter_by_state,
     filter_by_type,
 )
+
+from bullet_gazebo.ros.clients import manager_commands as commands
+
+MANAGER = ["", "spin cart", "load", "unload", "start", "stop", "spawn", "sp", "kill", "kl", "list cart",
+           "lc cart", "list-types x", "lt x", "--list", "reload-libraries --revert",
+           "reload-libraries --restore now"]  # fmt: skip
+GROUP = ["", "list upper", "spawn", "switch", "switch upper lower", "stop upper", "--list"]
+HELP = ["-h", "--help"]
+
+
+@pytest.mark.parametrize(
+    ("main", "usage", "name", "line"),
+    [(commands.main, commands.MANAGER_USAGE, "controller_manager", line) for line in MANAGER + HELP]
+    + [
+        (commands.group_main, commands.GROUP_USAGE, "controller_group", line)
+        for line in GROUP + HELP
+    ],
+)
+def test_what_is_no_command_is_answered_with_the_usage(main, usage, name, line, capsys):
+    # What roslaunch adds to each command line is no argument.
+    code = main([name, *line.split(), "__name:=node", "__log:=file"])
+    output, errors = capsys.readouterr()
+    assert output == f"{usage}\n"
+    assert errors == ""
+    assert output.startswith(f"usage: {name} COMMAND")
+    assert code == (0 if line in HELP else 2)
+
 
 EFFORT, VELOCITY = (
     "hardware_interface::EffortJointInterface",

@@ -1,15 +1,15 @@
-"""gzserver's and gz's command lines, and the paths of models."""
+"""The command lines of gzserver, gzclient, gz and spawn_model, and the paths of models."""
 
 import random
 
 import numpy as np
 import pytest
 
-from bullet_gazebo.ros.clients import gz
+from bullet_gazebo.ros.clients import gz, gzclient
 from bullet_gazebo.ros.clients.spawn_model import parse
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
-from bullet_gazebo.ros.node.server_args import parse_args
-from bullet_gazebo.ros.services import model_paths
+from bullet_gazebo.ros.node.gzserver import parse_args
+from bullet_gazebo.ros.services.resource_paths import model_paths
 
 
 def test_options_stand_in_any_order():
@@ -85,4 +85,25 @@ def test_model_paths_of_the_environment_and_of_packages(tmp_path, monkeypatch):
     )
     monkeypatch.setenv("GAZEBO_MODEL_PATH", f"{tmp_path}/a:/nix")
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
-    assert model_paths.model_paths() == [f"{tmp_path}/a", f"{tmp_path}/mine/models"]
+    assert model_paths() == [f"{tmp_path}/a", f"{tmp_path}/mine/models"]
+
+
+@pytest.mark.parametrize(
+    ("line", "dead", "living", "anonymous"),
+    [
+        ("", [], [], False),
+        ("", ["/gazebo_gui"], [], False),
+        ("", [], ["/gazebo_gui"], True),
+        ("__name:=gazebo_gui", [], ["/gazebo_gui"], False),
+        ("__ns:=/second", [], ["/gazebo_gui"], False),
+        ("__ns:=/second", [], ["/second/gazebo_gui"], True),
+    ],
+)
+def test_another_window_keeps_its_name(line, dead, living, anonymous, master, monkeypatch):
+    monkeypatch.delenv("ROS_NAMESPACE", raising=False)
+    master.nodes.update(dict.fromkeys(dead, "http://127.0.0.1:1"))
+    master.nodes.update(dict.fromkeys(living, master.uri))
+    taken = []
+    monkeypatch.setattr(gzclient, "init_node", lambda name, _, anonymous: taken.append(anonymous))
+    gzclient.become_node(["gzclient", *line.split()])
+    assert taken == [anonymous]

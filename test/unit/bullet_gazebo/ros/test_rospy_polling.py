@@ -15,8 +15,8 @@ from rospy.impl.tcpros_base import TCPROSTransport
 from rospy.impl.tcpros_service import ServiceImpl, TCPService
 from std_srvs.srv import SetBool, SetBoolRequest
 
+from bullet_gazebo.ros.common import rospy_polling as polling
 from bullet_gazebo.ros.common.rospy_polling import PolledService
-from bullet_gazebo.ros.wire.rospy_patches import polling
 from ros_calls import polling as general
 from ros_calls.polling import RECENT, AdaptivePoll
 
