@@ -6,10 +6,9 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.output import reader_may_go
-from rl_workbench.training import cli as training
-from rl_workbench.training.options.options import unknown
-from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.option import unknown
+from rl_workbench.starting import Interrupt, reader_may_go
+from rl_workbench.training import train as training
 
 PROG = "rl-workbench"
 DESCRIPTION = """\

@@ -1,7 +1,7 @@
 """The packages of requirements/base.txt that a program needs, and the command that installs them.
 
-For programs alone, before they import anything else: in somebody's own catkin workspace nobody has installed
-what rosdep and `catkin_make` don't.
+Programs call it before they import anything else: in a user's own catkin workspace, rosdep and `catkin_make`
+don't install what only pip has.
 """
 
 from __future__ import annotations
@@ -18,14 +18,23 @@ PAGE = "docs/catkin.md"
 # What the simulator runs on, PyBullet's engine with meshes of all kinds; its window; and all programs.
 SIMULATOR = ("collada", "numpy", "pybullet", "scipy", "trimesh", "xacro", "yaml")
 WINDOW = (*SIMULATOR, "PIL", "viser", "websockets")
-ALL = (*WINDOW, "gymnasium", "matplotlib", "pygame", "tensorboard", "torch", "tqdm")
+ALL = (
+    *WINDOW,
+    "gymnasium",
+    "imageio_ffmpeg",
+    "matplotlib",
+    "pygame",
+    "tensorboard",
+    "torch",
+    "tqdm",
+)
 
 
 def require(modules: tuple[str, ...]) -> None:
     """Ends the program, with one line that says how to install what is missing.
 
     Raises:
-        SystemExit: if one of the modules isn't there.
+        SystemExit: if one of the modules is missing.
     """
     text = lack(modules)
     if text:
@@ -33,7 +42,7 @@ def require(modules: tuple[str, ...]) -> None:
 
 
 def lack(modules: tuple[str, ...]) -> str:
-    """Returns one line that names the modules that are missing, and what installs them; empty if none is."""
+    """Returns one line that names the missing modules and what installs them; empty if none is missing."""
     missing = [name for name in modules if importlib.util.find_spec(name) is None]
     if not missing:
         return ""
@@ -50,7 +59,7 @@ def lack(modules: tuple[str, ...]) -> str:
 
 
 def _is_managed() -> bool:
-    """Whether pip needs to be told to write beside the system's packages (PEP 668)."""
+    """Returns whether pip refuses to install beside the system's packages (PEP 668)."""
     return (
         sys.prefix == sys.base_prefix
         and Path(sysconfig.get_path("stdlib"), "EXTERNALLY-MANAGED").exists()
@@ -58,7 +67,7 @@ def _is_managed() -> bool:
 
 
 def _file() -> Path:
-    """The list of packages: in the sources, or where catkin has installed it."""
+    """Returns the list of packages: in the source tree, or where catkin has installed it."""
     here = Path(__file__).resolve()
     for above in here.parents:
         for place in (above / FILE, above / "share/cartpole" / FILE):

@@ -14,8 +14,8 @@ import numpy as np
 
 from bullet_gazebo.physics.description import Color, DescriptionError
 from bullet_gazebo.physics.files.elements import parse_xml
-from bullet_gazebo.physics.files.mesh_formats import axes_of
-from bullet_gazebo.physics.files.meshes import FAULTS, check_mesh, read_mesh
+from bullet_gazebo.physics.files.mesh_program import axes_of
+from bullet_gazebo.physics.files.meshes import check_mesh, read_mesh
 
 if TYPE_CHECKING:  # imported with the first mesh, because they take long
     import trimesh
@@ -28,8 +28,11 @@ LARGEST_IMAGE = 1024  # [pixels] a side, for pictures
 STOPGAP = 2  # [pixels] a side of trimesh's image for a missing one
 WHITE = (255, 255, 255, 255)
 PLAIN = (".stl",)  # endings of files that have no materials
-# With Pillow's and pycollada's own; after any of them the shape is shown without its looks.
-FAULTY = (*FAULTS, OSError, ImportError, SyntaxError)
+# What trimesh, pycollada and Pillow raise over broken materials: the shape is shown without its looks.
+FAULTY = (
+    *(ArithmeticError, AssertionError, AttributeError, LookupError, RuntimeError),
+    *(TypeError, ValueError, OSError, ImportError, SyntaxError),
+)
 
 
 @dataclass(frozen=True, eq=False)

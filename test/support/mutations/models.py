@@ -1,4 +1,4 @@
-"""Models that were changed at random, by somebody who knows their grammar, and what reading one may lead to.
+"""Models with random changes, made with knowledge of the grammar; and what reading one may do.
 
 For `test_mutations.py`, which draws some hundreds, and for the stress suite, which draws thousands: each of
 CASES has a strategy of texts and a reader, which returns "read" or the one line of the refusal, and raises
@@ -30,8 +30,8 @@ from bullet_gazebo.physics.files.world_file import parse_world, read_entity
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
 from files.content import FileError
+from files.expansion import CannotExpand, expand
 from files.yaml_text import load_parameters
-from ros_calls.expansion import CannotExpand, expand
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 LONGEST = 5000  # characters of a refusal

@@ -103,7 +103,7 @@ def test_private_parameters_are_options_and_flags_count_more() -> None:
 
 
 def test_a_mistake_in_a_task_is_one_line_with_its_place(run: Path, monkeypatch, capsys) -> None:
-    from robot_envs.backends.deployment import policy_node as node
+    from robot_envs.deployment import policy_node as node
 
     def fails(*arguments: object) -> None:
         raise ZeroDivisionError("division by zero")

@@ -1,7 +1,7 @@
-"""Every command of the documentation is one that its program takes: flags, files, arguments, requests.
+"""Every command in the documentation is one that its program takes: flags, files, arguments, requests.
 
-Those of the tutorials and of README's workbench are run by test_tutorial.py and test_tutorial_robot.py, those
-of docs/catkin.md by test_catkin_workspace.py. A command that nothing here knows how to look at is a fault.
+test_tutorial.py, test_tutorial_robot.py and test_catkin_workspace.py run those of their pages. A command
+that no test here knows how to check is a fault.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ from gazebo_msgs.srv import GetWorldPropertiesRequest
 
 from bullet_gazebo.ros.clients import gzclient
 from cartpole import dqn_train, pg_train, policy_node, workbench
+from lockstep_runner import launcher as lockstep_launcher
 from package_writing import cli as new_robot
-from rl_workbench.training import cli as training_cli
+from rl_workbench.training import train as training_cli
 from rl_workbench.training.algorithms import ALGORITHMS
 
 pytestmark = pytest.mark.usefixtures("signals")
@@ -40,7 +41,8 @@ RUN_ELSEWHERE = (
     "docs/catkin.md",
 )  # fmt: skip
 STARTS = re.compile(r"(\./ws|rosrun|roslaunch|rosservice|gz|spawn_model)\s")
-PLACEHOLDERS = {"your_script.py", "ppo.py", "my_arm"}  # the reader's own
+PLACEHOLDERS = {"your_script.py", "my_arm"}  # the reader's own
+RUN_BY_TESTS = ("examples/own_task.py", "examples/ppo_over_ros.py")
 TRAININGS = {"pg_train.py": pg_train.main, "dqn_train.py": dqn_train.main}
 THEIR_ENVIRONMENT = """
 import gymnasium
@@ -115,6 +117,7 @@ GROUPS = {
     "packages": of("rosrun cartpole new_robot.py"),
     "tests": of("test", "rostest", "check", "shell", "tensorboard"),
     "window": of("rosrun gazebo_ros gzclient"),
+    "lockstep": of("rosrun cartpole lockstep.py"),
     "clusters": of("ray"),
     "gains": of("rosrun dynamic_reconfigure dynparam set"),
 }
@@ -164,6 +167,12 @@ def test_the_window_takes_it(command: Command) -> None:
     assert gzclient.parse_args(command.words[3:]).ignored == []
 
 
+@pytest.mark.parametrize("command", GROUPS["lockstep"], ids=str)
+def test_lockstep_takes_it(command: Command, only_parsing: None) -> None:
+    with pytest.raises(Parsed):
+        lockstep_launcher.main(command.words[3:])
+
+
 def with_extras(command: Command) -> object:
     """The command, which needs the package of the algorithm that it names."""
     words = dict(itertools.pairwise(command.words))
@@ -176,8 +185,8 @@ def test_the_workbench_takes_it(command: Command, only_parsing: None, monkeypatc
     name, *arguments = command.words[3:]
     if name == "--help":
         return
-    if name == "train":  # has a parser of its own; README's are run by test_tutorial.py
-        if command.page == "README.md":
+    if name == "train":  # has a parser of its own
+        if "--resume" in arguments:  # needs a run; test_tutorial.py has one
             return
 
         def begin(*_: object) -> NoReturn:
@@ -209,7 +218,7 @@ def test_a_policys_node_takes_it(command: Command) -> None:
 @pytest.mark.parametrize("command", GROUPS["scripts"], ids=str)
 def test_a_script_takes_it(command: Command, only_parsing: None, monkeypatch) -> None:
     script, *arguments = command.words[1:]
-    if script in PLACEHOLDERS or script == "examples/own_task.py":  # run by test_own_task.py
+    if script in PLACEHOLDERS or script in RUN_BY_TESTS:
         return
     monkeypatch.setattr(sys, "argv", [script, *arguments])
     monkeypatch.setattr(sys, "path", [str((ROOT / script).parent), *sys.path])

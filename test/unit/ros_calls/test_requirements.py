@@ -22,7 +22,7 @@ STARTED = "\n".join(
     [
         "import sys, bullet_gazebo.ros.node.gzserver",
         "from bullet_gazebo.physics.engines import make_engine",
-        "import bullet_gazebo.physics.files.mesh_formats, bullet_gazebo.physics.files.mesh_formats",
+        "import bullet_gazebo.physics.files.mesh_program",
         "make_engine()",
         "print(*sys.modules)",
     ]

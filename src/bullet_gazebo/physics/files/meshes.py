@@ -1,39 +1,32 @@
-"""Mesh files into checked arrays. The libraries that parse them are imported with the first mesh."""
+"""Mesh files as checked triangles. A limited child process reads them (`mesh_program`)."""
 
-from collections.abc import Callable
+import json
+from io import BytesIO
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from bullet_gazebo.physics.description import DescriptionError, Mesh
-from bullet_gazebo.physics.files.elements import place, shown
-from bullet_gazebo.physics.files.mesh_formats import (
-    Part,
-    Submesh,
-    centred,
-    make_mesh,
-    read_collada,
-    read_obj,
-    read_stl,
-)
-from files.content import FileError, read_file
+from bullet_gazebo.physics.files.elements import place
+from files.limited import LimitedProcess, Limits, RequestRefused
 
-READERS: dict[str, Callable[[bytes, str], list[Part]]] = {
-    ".stl": read_stl,
-    ".dae": read_collada,
-    ".obj": read_obj,
-}
-MOST_BYTES = 200_000_000  # of a file: a million triangles as COLLADA writes them
-# What a library raises over a file that isn't as it expects: each of them was met.
-FAULTS = (
-    ArithmeticError,
-    AssertionError,
-    AttributeError,
-    LookupError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-)
+SUFFIXES = (".stl", ".dae", ".obj")
+LIMITS = Limits(processor_time=60, wall_time=120.0, memory=4 << 30, output=1 << 30)
+DIGEST = 32  # characters
+
+# It stays for further meshes: starting Python and importing trimesh takes longer than most files.
+_process = LimitedProcess("bullet_gazebo.physics.files.mesh_program:answer", LIMITS)
+
+
+class Submesh(NamedTuple):
+    """One named part of a mesh file (SDF's `<submesh>`).
+
+    `centred` moves the middle of its bounding box to the origin.
+    """
+
+    name: str
+    centred: bool
 
 
 def read_mesh(path: Path, submesh: Submesh | None = None) -> Mesh:
@@ -43,8 +36,19 @@ def read_mesh(path: Path, submesh: Submesh | None = None) -> Mesh:
         DescriptionError: if it can't be simulated: the file, the place in it and the fault, in one line.
     """
     check_mesh(path)
+    request = json.dumps([str(path), submesh])
     with place(f"mesh '{path}'"):
-        return make_mesh(_parts(READERS[path.suffix.lower()], _content(path), submesh))
+        try:
+            data = _process.ask(request.encode())
+        except RequestRefused as error:
+            raise DescriptionError(str(error)) from error
+    stream = BytesIO(data)
+    digest, arrays = stream.read(DIGEST).decode(), []
+    while stream.tell() < len(data):
+        arrays.append(np.load(stream, allow_pickle=False))
+        arrays[-1].setflags(write=False)
+    vertices, faces, *hulls = arrays
+    return Mesh(vertices, faces, tuple(hulls), digest)
 
 
 def check_mesh(path: Path) -> None:
@@ -53,30 +57,9 @@ def check_mesh(path: Path) -> None:
     Raises:
         DescriptionError: the text names the file.
     """
-    if path.suffix.lower() not in READERS:
-        raise DescriptionError(f"mesh '{path}': only {', '.join(READERS)} files are read")
+    if path.suffix.lower() not in SUFFIXES:
+        raise DescriptionError(f"mesh '{path}': only {', '.join(SUFFIXES)} files are read")
     if not path.is_file():  # reading a pipe would wait for ever
         raise DescriptionError(f"mesh '{path}': it is not a file")
     if path.stat().st_size == 0:
         raise DescriptionError(f"mesh '{path}': the file is empty")
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return read_file(path, MOST_BYTES)
-    except FileError as error:
-        raise DescriptionError(str(error)) from error
-
-
-def _parts(
-    read: Callable[[bytes, str], list[Part]], data: bytes, submesh: Submesh | None
-) -> list[Part]:
-    try:
-        with np.errstate(all="ignore"):  # what isn't finite is refused by make_mesh
-            parts = read(data, submesh.name if submesh else "")
-            return centred(parts) if submesh and submesh.centred else parts
-    except DescriptionError as error:  # a limit of XML's, too, is that of this file alone
-        raise DescriptionError(str(error)) from error
-    except FAULTS as error:
-        text = shown(str(error)) or type(error).__name__
-        raise DescriptionError(f"it can't be read: {text}") from error

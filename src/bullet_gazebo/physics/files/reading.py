@@ -10,8 +10,7 @@ from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, Mesh
 from bullet_gazebo.physics.files.elements import files_named_by_a_model, parse_xml, place, shown
-from bullet_gazebo.physics.files.mesh_formats import Submesh
-from bullet_gazebo.physics.files.meshes import check_mesh, read_mesh
+from bullet_gazebo.physics.files.meshes import Submesh, check_mesh, read_mesh
 from files.content import MAX_BYTES, FileError, TooLarge, read_file
 from files.xml_text import MAX_ELEMENTS
 

@@ -13,7 +13,7 @@ from bullet_gazebo.physics.files.elements import (
     positive,
     shown,
 )
-from bullet_gazebo.physics.files.mesh_formats import Submesh
+from bullet_gazebo.physics.files.meshes import Submesh
 from bullet_gazebo.physics.files.reading import MeshFile, MeshFinder, Reading
 from bullet_gazebo.physics.pose import Pose, Quaternion, cross, from_rpy, normalized
 

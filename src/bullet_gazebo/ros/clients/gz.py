@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import rosgraph
 
-from ros_calls import xmlrpc
+from ros_calls import master
 
 NODE = "gazebo"
 METHOD = "gazeboWorld"  # of the node's XML-RPC server; node/world_control.py answers it
@@ -33,10 +33,10 @@ class RemoteWorld:
         """
         self._node = node
         try:
-            self._address = str(xmlrpc.call(master_uri, "lookupNode", node))
-        except xmlrpc.NoAnswer as fault:
+            self._address = str(master.call_node(master_uri, "lookupNode", node))
+        except master.NoAnswer as fault:
             raise ControlFailed(f"no ROS master at {master_uri}: {fault}") from fault
-        except xmlrpc.Refused as fault:
+        except master.Refused as fault:
             raise ControlFailed(
                 f"no node {node} at the master {master_uri}: is a simulator running?"
             ) from fault
@@ -48,12 +48,12 @@ class RemoteWorld:
             ControlFailed: the simulator doesn't answer, or refuses.
         """
         try:
-            xmlrpc.call(self._address, METHOD, name, count, timeout=TIMEOUT)
-        except xmlrpc.Refused as fault:
+            master.call_node(self._address, METHOD, name, count, timeout=TIMEOUT)
+        except master.Refused as fault:
             raise ControlFailed(f"{self._node}: {fault}") from fault
-        except xmlrpc.BadAnswer as fault:
+        except master.BadAnswer as fault:
             raise ControlFailed(f"{self._node} doesn't know {METHOD}: {fault}") from fault
-        except xmlrpc.NoAnswer as fault:
+        except master.NoAnswer as fault:
             raise ControlFailed(f"{self._node} doesn't answer: {fault}") from fault
 
     def step(self, ticks: int) -> None:

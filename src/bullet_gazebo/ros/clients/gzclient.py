@@ -20,9 +20,8 @@ from bullet_gazebo.ros.common.node_process import (
     wait_for_master,
 )
 from bullet_gazebo.ros.common.rospy_node import stop_hearing_clock
-from ros_calls.nodes import living_address
+from ros_calls.master import NoAnswer, living_address
 from ros_calls.requirements import WINDOW, lack
-from ros_calls.xmlrpc import NoAnswer
 from viewer.address import PortInUse, add_flags, find_address
 
 NAME = "gazebo_gui"

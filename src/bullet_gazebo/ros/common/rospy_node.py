@@ -16,8 +16,8 @@ import rospy.impl.simtime
 from rospy.impl.masterslave import ROSHandler
 from rospy.impl.registration import RegManager
 
-from ros_calls import master, xmlrpc
-from ros_calls.xmlrpc import Refused
+from ros_calls import master
+from ros_calls.master import Refused
 
 
 def answer_xmlrpc(method: str, answer: Callable[..., tuple[int, str, Any]]) -> None:
@@ -87,7 +87,7 @@ def _register(method: str, name: str, what: str, timeout: float) -> list[str]:
     """Registers one topic or service; returns a topic's publishers where the master names them."""
     own = (rospy.get_name(), name, what, rospy.core.get_node_uri())
     try:
-        answer = xmlrpc.call_plain(master.uri(), method, *own, timeout=timeout)
+        answer = master.call_plain(master.uri(), method, *own, timeout=timeout)
     except Refused as refusal:
         rospy.logerr("%s of %s: the master refuses it: %s", method, name, refusal)
         return []

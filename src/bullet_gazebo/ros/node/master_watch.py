@@ -8,8 +8,7 @@ import rospy
 
 from bullet_gazebo.ros.common.rospy_node import register_again, witness
 from ros_calls import master
-from ros_calls.nodes import living_address
-from ros_calls.xmlrpc import NoAnswer, Refused
+from ros_calls.master import NoAnswer, Refused, living_address
 
 PERIOD = 10.0  # [s of wall time] between two questions
 TIMEOUT = 5.0  # [s] of each question

@@ -19,8 +19,8 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.ros.clients.gz import ControlFailed, RemoteWorld
 from ros_calls import master
+from ros_calls.master import NoAnswer, Refused
 from ros_calls.service import ServiceClient, ServiceFailed
-from ros_calls.xmlrpc import NoAnswer, Refused
 
 SIMULATOR = "gazebo"
 SILENCE = 2.0  # [s of wall time] without a message, after which the simulator is asked again

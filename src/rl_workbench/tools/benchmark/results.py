@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rl_workbench.env_ids import threshold
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.plotting.curves import WINDOW
 from rl_workbench.tools.runs.episodes import play
@@ -18,10 +19,9 @@ from rl_workbench.tools.runs.runs import (
     summary_of,
     training_curve,
 )
-from rl_workbench.training.environments.names import threshold
-from rl_workbench.training.run.evaluator import Evaluation
-from rl_workbench.training.run.history import LAST
-from rl_workbench.training.run.scalar_log import CONFIRMED, EVALUATION
+from rl_workbench.training.evaluator import Evaluation
+from rl_workbench.training.history import LAST
+from rl_workbench.training.scalar_log import CONFIRMED, EVALUATION
 
 
 @dataclass(frozen=True)

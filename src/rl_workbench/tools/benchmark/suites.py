@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.option import is_plain
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm
-from rl_workbench.training.options.config_file import default_file, read_section
-from rl_workbench.training.options.record import is_plain
-from rl_workbench.training.options.training_options import choose, known_options
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.options import default_file, known_options, read_section
 
 CONFIG = "benchmark.yaml"
 NAME = re.compile(r"\w[\w.+-]*")  # of a variant, which is a folder's too

@@ -11,9 +11,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from files.content import open_text
-from rl_workbench.env_ids import as_file_name
+from rl_workbench.env_ids import as_file_name, threshold
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.option import key_values
 from rl_workbench.plotting.curves import evaluation_curves, seed_curves
+from rl_workbench.starting import Interrupt
+from rl_workbench.storage import as_json, as_text, write_file
 from rl_workbench.tools.benchmark import tables
 from rl_workbench.tools.benchmark.results import RunResult, examine
 from rl_workbench.tools.benchmark.suites import (
@@ -31,13 +34,9 @@ from rl_workbench.tools.jobs.job import Job, last_words
 from rl_workbench.tools.jobs.running import run_jobs
 from rl_workbench.tools.pictures.panels import seed_panels, variant_panels
 from rl_workbench.tools.runs.runs import Run, open_run
+from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.environments.names import threshold
-from rl_workbench.training.options.options import key_values
-from rl_workbench.training.run import folder as run_folder
-from rl_workbench.training.run.files import as_json, as_text, write_file
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell, warn
+from rl_workbench.training.progress import tell, warn
 
 RECORD = "suite.json"
 

@@ -4,15 +4,15 @@ import argparse
 from pathlib import Path
 
 from rl_workbench.plotting.curves import seed_curves
+from rl_workbench.starting import Interrupt
+from rl_workbench.storage import as_json, check_writable, write_file
 from rl_workbench.tools.benchmark import tables
 from rl_workbench.tools.benchmark.results import RunResult, examine
 from rl_workbench.tools.commands.shared import number, write_figure
 from rl_workbench.tools.pictures.panels import seed_panels
 from rl_workbench.tools.runs.policies import WHICH
 from rl_workbench.tools.runs.runs import find_runs
-from rl_workbench.training.run.files import as_json, check_writable, write_file
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell, warn
+from rl_workbench.training.progress import tell, warn
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:

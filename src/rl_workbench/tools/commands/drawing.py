@@ -4,15 +4,15 @@ import argparse
 from pathlib import Path
 
 from rl_workbench.plotting.curves import STEPS, training_curves
+from rl_workbench.starting import Interrupt
+from rl_workbench.storage import check_writable
 from rl_workbench.tools.commands.shared import add_policy_flags, env_options, write_figure
 from rl_workbench.tools.pictures.panels import run_panels
 from rl_workbench.tools.pictures.policy_map import policy_map, state_plane
 from rl_workbench.tools.runs.episodes import TEST_SEED
 from rl_workbench.tools.runs.policies import load_learned
 from rl_workbench.tools.runs.runs import find_runs, open_run
-from rl_workbench.training.run.files import check_writable
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell, warn
+from rl_workbench.training.progress import tell, warn
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:

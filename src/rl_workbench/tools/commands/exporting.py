@@ -3,14 +3,14 @@
 import argparse
 from pathlib import Path
 
+from rl_workbench.starting import Interrupt
+from rl_workbench.storage import check_writable, write_file
 from rl_workbench.tools.commands.shared import add_policy_flags, env_options
 from rl_workbench.tools.runs.exported import open_exported
 from rl_workbench.tools.runs.exporting import Agreement, export
 from rl_workbench.tools.runs.policies import load_learned
 from rl_workbench.tools.runs.runs import open_run
-from rl_workbench.training.run.files import check_writable, write_file
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
+from rl_workbench.training.progress import tell
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:

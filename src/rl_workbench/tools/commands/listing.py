@@ -6,10 +6,10 @@ from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
 
+from rl_workbench.starting import Interrupt
+from rl_workbench.storage import as_json, write_file
 from rl_workbench.tools.jobs.states import JobState, read_states
-from rl_workbench.training.run.files import as_json, write_file
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
+from rl_workbench.training.progress import tell
 
 
 def add_flags(parser: argparse.ArgumentParser, command: str) -> None:

@@ -5,13 +5,13 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
+from rl_workbench.option import Options
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.commands.shared import number
 from rl_workbench.tools.jobs.ledger import settle
 from rl_workbench.tools.jobs.machines import CARRIED, SHARED, Machines, ThisMachine
-from rl_workbench.training.options.options import Options
-from rl_workbench.training.options.session import ClusterOptions
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
+from rl_workbench.training.options import ClusterOptions
+from rl_workbench.training.progress import tell
 
 
 def add_job_flags(parser: argparse.ArgumentParser) -> None:

@@ -9,8 +9,10 @@ from typing import Any
 
 from files.content import open_text
 from rl_workbench.env_ids import as_file_name
-from rl_workbench.errors import WorkbenchError
-from rl_workbench.extras import need
+from rl_workbench.errors import WorkbenchError, need
+from rl_workbench.option import key_values
+from rl_workbench.starting import Interrupt
+from rl_workbench.storage import as_json, check_writable, write_file
 from rl_workbench.tools.commands.machines import add_job_flags, machines_for
 from rl_workbench.tools.commands.shared import number
 from rl_workbench.tools.jobs.running import run_jobs
@@ -18,14 +20,11 @@ from rl_workbench.tools.sweep.ranges import read_ranges
 from rl_workbench.tools.sweep.study import PRUNERS, Pruner, Study
 from rl_workbench.tools.sweep.sweep import Search, Sweep, write_results
 from rl_workbench.tools.sweep.trainings import flags
+from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.options.options import key_values
-from rl_workbench.training.options.run_options import RunOptions
-from rl_workbench.training.options.training_options import choose, known_options
-from rl_workbench.training.run import folder as run_folder
-from rl_workbench.training.run.files import as_json, check_writable, write_file
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.options import RunOptions, known_options
+from rl_workbench.training.progress import tell
 
 RECORD, OLD = "sweep.json", "study.db"
 

@@ -7,11 +7,11 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.option import Options
 from rl_workbench.plotting.figure import as_png
+from rl_workbench.storage import write_file
 from rl_workbench.tools.runs.policies import RANDOM, WHICH
-from rl_workbench.training.options.options import Options
-from rl_workbench.training.options.run_options import RunOptions
-from rl_workbench.training.run.files import write_file
+from rl_workbench.training.options import RunOptions
 
 
 def add_policy_flags(

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import torch
 
+from rl_workbench.env_ids import import_module_of
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.commands.shared import add_environment_flags, env_options
 from rl_workbench.tools.pictures.filming import draw_without_display
 from rl_workbench.tools.runs.runs import open_run
 from rl_workbench.tools.viewing.page import Place, Wanted, show_run
 from rl_workbench.tools.viewing.recorder import POLICIES
-from rl_workbench.training.environments.names import import_module_of
-from rl_workbench.training.run.interrupt import Interrupt
 from viewer.address import add_flags as add_page_flags
 
 KINDNESS = 10  # of a page beside a training: whatever it does, the training goes first

@@ -9,7 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from rl_workbench.env_ids import threshold
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt
+from rl_workbench.storage import as_json, check_writable, write_file
 from rl_workbench.tools.commands.shared import add_policy_flags, env_options, number
 from rl_workbench.tools.commands.viewing import show as show_page
 from rl_workbench.tools.pictures import videos
@@ -35,10 +38,7 @@ from rl_workbench.tools.runs.policies import (
 )
 from rl_workbench.tools.runs.runs import Run, open_run
 from rl_workbench.tools.viewing.page import Place, Wanted
-from rl_workbench.training.environments.names import threshold
-from rl_workbench.training.run.files import as_json, check_writable, write_file
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
+from rl_workbench.training.progress import tell
 from viewer.address import LOOPBACK
 
 WINDOWS = (*DISPLAYS, "SDL_VIDEODRIVER")  # where any of them is given, a window may be opened

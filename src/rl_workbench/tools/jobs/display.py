@@ -12,7 +12,7 @@ from rl_workbench.tools.jobs.job import Job
 from rl_workbench.tools.jobs.ledger import DONE, FAILED, RUNNING, Ledger
 from rl_workbench.tools.jobs.runner import Watch
 from rl_workbench.tools.jobs.states import steps_of, told
-from rl_workbench.training.run.progress import tell, writable
+from rl_workbench.training.progress import tell, writable
 
 REFRESH = 0.5  # [s]
 OTHER_LINES = 3  # of the terminal: the bar over all jobs, and what was told last

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.storage import as_json, write_file
 from rl_workbench.tools.runs.runs import SUMMARY, cost_file, cost_of, read_leniently
-from rl_workbench.training.run import folder as run_folder
-from rl_workbench.training.run.checkpoints import LAST
-from rl_workbench.training.run.files import as_json, write_file
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.checkpoints import LAST
 
 MASTERS = range(
     30000, 32768

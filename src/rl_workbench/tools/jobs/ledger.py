@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from rl_workbench.storage import as_json, write_file
 from rl_workbench.tools.jobs.job import Job
 from rl_workbench.tools.jobs.runner import Watch
 from rl_workbench.tools.runs.runs import read_leniently
-from rl_workbench.training.run.files import as_json, write_file
 
 NAME = "jobs.json"
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"

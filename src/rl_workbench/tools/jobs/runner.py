@@ -6,10 +6,10 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.jobs.job import Ending, Job, add_cost, last_words
 from rl_workbench.tools.jobs.machines import Machines
-from rl_workbench.training.run.checkpoints import LAST
-from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.checkpoints import LAST
 
 LOOK_EVERY = 0.2  # [s] at the user's Ctrl-C
 MOST_LOST = 8  # attempts in a row that were lost before a new checkpoint

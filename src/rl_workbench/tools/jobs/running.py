@@ -4,12 +4,12 @@ import contextlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.jobs.display import Display
 from rl_workbench.tools.jobs.job import Job
 from rl_workbench.tools.jobs.ledger import Ledger
 from rl_workbench.tools.jobs.machines import Machines
 from rl_workbench.tools.jobs.runner import Runner, Watch
-from rl_workbench.training.run.interrupt import Interrupt
 
 
 def run_jobs(

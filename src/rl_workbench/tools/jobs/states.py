@@ -10,12 +10,12 @@ from typing import Any
 
 from files.content import open_text
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.storage import CONFIG_RECORD
 from rl_workbench.tools.jobs.job import last_words, log_of
 from rl_workbench.tools.jobs.ledger import ALIVE, DONE, FAILED, NAME, RUNNING, WAITING, Entry
 from rl_workbench.tools.runs.runs import SUMMARY, read_leniently
-from rl_workbench.training.options.record import CONFIG_RECORD
-from rl_workbench.training.run import folder as run_folder
-from rl_workbench.training.run.scalar_log import NAME as SCALARS
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.scalar_log import NAME as SCALARS
 
 STOPPED = "stopped"  # half done, and nobody runs it now
 TAIL = 4096  # [bytes] of a table that hold its last row

@@ -11,9 +11,9 @@ import numpy as np
 from gymnasium.envs.registration import load_env_creator
 from PIL import Image, ImageDraw, ImageFont
 
+from rl_workbench.env_ids import spec_of
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.episodes import episode_steps
-from rl_workbench.training.environments.names import spec_of
 
 Act = Callable[[Any], Any]
 Size = tuple[int, int]

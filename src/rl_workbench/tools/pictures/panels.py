@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from rl_workbench.env_ids import threshold
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.plotting.curves import Panel, SeedCurve
 from rl_workbench.tools.runs.runs import (
@@ -15,7 +16,6 @@ from rl_workbench.tools.runs.runs import (
     summary_of,
     training_curve,
 )
-from rl_workbench.training.environments.names import threshold
 
 
 def run_panels(runs: Sequence[Run], over: str) -> list[Panel]:

@@ -11,9 +11,9 @@ from typing import Any
 import gymnasium
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.storage import write_file
 from rl_workbench.tools.pictures.filming import Player, Recorded, Shot, frame_rate, shots
-from rl_workbench.training.environments.making import shares_robot
-from rl_workbench.training.run.files import write_file
+from rl_workbench.training.environments import shares_robot
 from viewer.server import hidden_page
 
 DRAW = "draw_on"  # method of an environment

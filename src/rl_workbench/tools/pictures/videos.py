@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.run.files import write_file
+from rl_workbench.storage import write_file
 from viewer.video import EncoderFailed, Mp4Writer
 
 RATES = {

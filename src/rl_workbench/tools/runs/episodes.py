@@ -9,8 +9,8 @@ import numpy as np
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.runs.policies import RANDOM, LearnedPolicy, RandomPolicy
-from rl_workbench.training.environments.answers import as_float32, succeeded
-from rl_workbench.training.run.evaluator import Evaluation, run_greedily
+from rl_workbench.training.environments import as_float32, succeeded
+from rl_workbench.training.evaluator import Evaluation, run_greedily
 
 TEST_SEED = 5_000_000  # other episodes than those of any training or of its evaluations
 

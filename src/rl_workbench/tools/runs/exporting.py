@@ -22,8 +22,8 @@ from rl_workbench.tools.runs.exported import (
 )
 from rl_workbench.tools.runs.policies import LearnedPolicy
 from rl_workbench.tools.runs.runs import Run
-from rl_workbench.training.environments.answers import as_float32
-from rl_workbench.training.run.folder import LIBRARIES, versions
+from rl_workbench.training.environments import as_float32
+from rl_workbench.training.folder import LIBRARIES, versions
 
 TRIED = 1000  # observations
 ROUNDING = 1e-4  # what another order of the same sums makes at most, in single precision

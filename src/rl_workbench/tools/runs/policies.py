@@ -11,13 +11,14 @@ from torch import nn
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
+from rl_workbench.storage import CONFIG_RECORD
 from rl_workbench.tools.runs.runs import Run
-from rl_workbench.training.algorithms import algorithm, recorded_options
-from rl_workbench.training.environments.making import make_environment
-from rl_workbench.training.options.record import CONFIG_RECORD
-from rl_workbench.training.run import checkpoints
-from rl_workbench.training.run.policy import load_policy
-from rl_workbench.training.run.progress import warn
+from rl_workbench.training import checkpoints
+from rl_workbench.training.algorithm import load_policy
+from rl_workbench.training.algorithms import algorithm
+from rl_workbench.training.environments import make_environment
+from rl_workbench.training.options import recorded_options
+from rl_workbench.training.progress import warn
 
 WHICH = ("best", "last")
 RANDOM = "random"  # a policy that every environment has

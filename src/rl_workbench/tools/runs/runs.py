@@ -15,9 +15,9 @@ import numpy as np
 
 from files.content import open_text
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.options.record import CONFIG_RECORD
-from rl_workbench.training.run.scalar_log import EVALUATION, RETURN, SUCCESS
-from rl_workbench.training.run.scalar_log import NAME as SCALARS
+from rl_workbench.storage import CONFIG_RECORD
+from rl_workbench.training.scalar_log import EVALUATION, RETURN, SUCCESS
+from rl_workbench.training.scalar_log import NAME as SCALARS
 
 SUMMARY = "summary.json"
 RECORDED = {"env_id": str, "env_kwargs": dict, "exp_name": str, "seed": int}

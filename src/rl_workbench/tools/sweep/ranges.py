@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.options.config_file import default_file, read_section, section_names
-from rl_workbench.training.options.options import unknown
+from rl_workbench.option import unknown
+from rl_workbench.training.options import default_file, read_section, section_names
 
 CONFIG = "sweep.yaml"
 KEYS = ("low", "high", "log", "choices")

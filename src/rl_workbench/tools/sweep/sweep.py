@@ -17,13 +17,13 @@ import yaml
 from tqdm import tqdm
 
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.storage import as_json, as_text, write_file
 from rl_workbench.tools.jobs.job import Job
 from rl_workbench.tools.jobs.runner import Watch
 from rl_workbench.tools.sweep.ranges import Range
 from rl_workbench.tools.sweep.study import Study, Trial
 from rl_workbench.tools.sweep.trainings import Evaluations, score_of, training
-from rl_workbench.training.run.files import as_json, as_text, write_file
-from rl_workbench.training.run.progress import tell
+from rl_workbench.training.progress import tell
 
 
 @dataclass(frozen=True)

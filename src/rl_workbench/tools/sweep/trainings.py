@@ -7,7 +7,7 @@ from typing import Any
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.jobs.job import Job
 from rl_workbench.tools.runs.runs import open_run
-from rl_workbench.training.run.scalar_log import EVALUATION
+from rl_workbench.training.scalar_log import EVALUATION
 from viewer.table import GrowingTable
 
 

@@ -13,7 +13,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.viewing.player import Player
 from rl_workbench.tools.viewing.recorder import Recorder
 from rl_workbench.tools.viewing.views import CAMERA, LOOK_AT
-from rl_workbench.training.run.progress import tell, warn
+from rl_workbench.training.progress import tell, warn
 from viewer.address import PortInUse, find_address
 from viewer.curves import Curves
 from viewer.server import open_browser, serve, stop

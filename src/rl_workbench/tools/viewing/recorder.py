@@ -14,8 +14,8 @@ from rl_workbench.tools.runs.episodes import TEST_SEED, episode_steps
 from rl_workbench.tools.runs.policies import environment_of, load_learned
 from rl_workbench.tools.runs.runs import Run, open_run
 from rl_workbench.tools.viewing.views import View, make_view
-from rl_workbench.training.run import checkpoints
-from rl_workbench.training.run.folder import is_held
+from rl_workbench.training import checkpoints
+from rl_workbench.training.folder import is_held
 
 BEST, LAST, RANDOM = POLICIES = ("best", "last", "random")
 BACKEND = "backend"  # the option by which an environment may move a robot outside of its process

@@ -10,15 +10,14 @@ import tempfile
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from rl_workbench.errors import WorkbenchError
-from rl_workbench.extras import need
+from rl_workbench.errors import WorkbenchError, need
 from rl_workbench.training.cluster.address import AUTO, LOCAL, check_address, without_auto
 from rl_workbench.training.cluster.head import ANOTHER_TOKEN, check_head, head_of_this_machine
 from rl_workbench.training.cluster.nodes import Cluster
 from rl_workbench.training.cluster.obituary import obituary
 from rl_workbench.training.cluster.scratch import scratch_folder
 from rl_workbench.training.cluster.stuck import ended_if_stuck
-from rl_workbench.training.run.progress import warn
+from rl_workbench.training.progress import warn
 
 STORE = 128 * 2**20  # [bytes] of a local cluster's object store, which jobs hardly use
 SOCKETS = 107  # [bytes] in the path of a socket, at most

@@ -7,7 +7,7 @@ from importlib import metadata
 from pathlib import Path
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.options.config_file import default_file
+from rl_workbench.training.options import default_file
 
 PACKAGE = "rl_workbench"
 LIBRARIES = ("numpy", "torch", "gymnasium")  # the bits depend on their versions, too

@@ -5,8 +5,7 @@ import pytest
 from support.mutations.mesh_files import CORNERS, FACES, dae, obj
 
 from bullet_gazebo.physics.description import DescriptionError
-from bullet_gazebo.physics.files.mesh_formats import Submesh
-from bullet_gazebo.physics.files.meshes import read_mesh
+from bullet_gazebo.physics.files.meshes import Submesh, read_mesh
 from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane

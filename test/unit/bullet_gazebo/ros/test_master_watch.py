@@ -11,7 +11,7 @@ from support.ros.ros_fakes import FakeMaster
 from bullet_gazebo.ros.common.node_process import full_name, one_at_a_time
 from bullet_gazebo.ros.node import master_watch
 from bullet_gazebo.ros.node.master_watch import MasterWatch, NodeNameTaken, refuse_twin
-from ros_calls.xmlrpc import NoAnswer
+from ros_calls.master import NoAnswer
 
 BOUND = 60.0  # [s]
 SERVICE, OURS = "/gazebo/get_loggers", "rosrpc://127.0.0.1:1"

@@ -201,8 +201,8 @@ FAR = spaces.Box(np.array([-2.0, 1.0]), np.array([3.0, 1.5]), dtype=np.float32)
 )  # fmt: skip
 def test_observations_in_parts(algorithm: str, actions: spaces.Space) -> None:
     """As of environments with a goal; and every kind of action."""
-    from rl_workbench.training.sb3.network import greedy_network
-    from rl_workbench.training.sb3.options import algorithm_class
+    from rl_workbench.training.sb3.acting import greedy_network
+    from rl_workbench.training.sb3.models import algorithm_class
 
     env = Reach(actions)
     model = algorithm_class(algorithm)("MultiInputPolicy", env, seed=1)

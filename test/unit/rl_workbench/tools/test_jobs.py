@@ -14,7 +14,7 @@ from rl_workbench.tools.jobs.cluster.parcels import Inbox, Outbox, Parcel
 from rl_workbench.tools.jobs.job import Job
 from rl_workbench.tools.jobs.ledger import Ledger, settle
 from rl_workbench.tools.jobs.states import read_states
-from rl_workbench.training.run import folder as run_folder
+from rl_workbench.training import folder as run_folder
 
 pytestmark = pytest.mark.usefixtures("signals")
 

@@ -15,7 +15,7 @@ from rl_workbench import cli
 from rl_workbench.tools.runs.episodes import episode_steps
 from rl_workbench.tools.runs.policies import load_learned
 from rl_workbench.tools.runs.runs import open_run
-from rl_workbench.training.cli import PROGRAM
+from rl_workbench.training.train import PROGRAM
 
 pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.slow]
 

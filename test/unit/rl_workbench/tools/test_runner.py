@@ -9,6 +9,7 @@ import pytest
 from support.training.training_runs import assert_same_run
 from support.training.workbench_runs import job
 
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.benchmark.suites import (
     make_variant,
     training_flags,
@@ -19,9 +20,8 @@ from rl_workbench.tools.jobs.machines import ThisMachine
 from rl_workbench.tools.jobs.runner import Runner, Watch
 from rl_workbench.tools.jobs.states import steps_of
 from rl_workbench.tools.runs.runs import cost_of
-from rl_workbench.training.cli import PROGRAM
-from rl_workbench.training.run import folder as run_folder
-from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.train import PROGRAM
 
 pytestmark = pytest.mark.usefixtures("signals")
 

@@ -21,7 +21,7 @@ from rl_workbench.tools.runs.runs import open_run
 from rl_workbench.tools.viewing import recorder as recording
 from rl_workbench.tools.viewing.player import LINGER, Player
 from rl_workbench.tools.viewing.recorder import Episode, Recorder
-from rl_workbench.training.run.folder import held
+from rl_workbench.training.folder import held
 from robot_envs.errors import SimulatorError
 
 pytestmark = pytest.mark.usefixtures("signals")

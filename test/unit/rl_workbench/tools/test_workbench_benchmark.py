@@ -28,8 +28,8 @@ from rl_workbench.tools.commands import benchmarking
 from rl_workbench.tools.jobs import machines
 from rl_workbench.tools.jobs.job import Job, command
 from rl_workbench.tools.runs.runs import cost_file, open_run
-from rl_workbench.training.cli import PROGRAM
-from rl_workbench.training.run import folder as run_folder
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.train import PROGRAM
 
 pytestmark = pytest.mark.usefixtures("signals")
 

@@ -14,6 +14,7 @@ import yaml
 
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt
 from rl_workbench.tools.jobs.job import Ending, Job
 from rl_workbench.tools.jobs.ledger import Ledger
 from rl_workbench.tools.jobs.machines import Progressed
@@ -23,8 +24,7 @@ from rl_workbench.tools.sweep.ranges import Range, read_ranges
 from rl_workbench.tools.sweep.study import Pruner, Study
 from rl_workbench.tools.sweep.sweep import Search, Sweep, write_results
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.options.training_options import known_options
-from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.training.options import known_options
 
 pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.extras("optuna", "stable_baselines3")]
 RANGES = {"x": Range(-10.0, 10.0, False, ()), "kind": Range(0, 0, False, ("a", "b"))}

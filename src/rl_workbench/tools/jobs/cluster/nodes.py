@@ -10,6 +10,7 @@ from typing import Any
 
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import search_path
+from rl_workbench.storage import as_text, write_file
 from rl_workbench.tools.jobs.cluster.attempt import (
     TOKEN,
     Began,
@@ -22,11 +23,10 @@ from rl_workbench.tools.jobs.cluster.faults import in_a_line
 from rl_workbench.tools.jobs.cluster.parcels import Inbox, Outbox
 from rl_workbench.tools.jobs.job import Ending, Job
 from rl_workbench.tools.jobs.machines import CARRIED, SHARED, Progressed
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.checkpoints import LAST
 from rl_workbench.training.cluster.nodes import Cluster, Node, only
-from rl_workbench.training.run import folder as run_folder
-from rl_workbench.training.run.checkpoints import LAST
-from rl_workbench.training.run.files import as_text, write_file
-from rl_workbench.training.run.progress import warn
+from rl_workbench.training.progress import warn
 
 UPDATE_EVERY = 5.0  # [s] of which nodes there are
 PATIENCE = 60.0  # [s] for a node's answer, and for a node where none is left

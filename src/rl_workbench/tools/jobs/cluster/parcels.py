@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from rl_workbench.training.run.checkpoints import BEST, LAST, give_name
-from rl_workbench.training.run.scalar_log import EVENTS
-from rl_workbench.training.run.scalar_log import NAME as SCALARS
+from rl_workbench.training.checkpoints import BEST, LAST, give_name
+from rl_workbench.training.scalar_log import EVENTS
+from rl_workbench.training.scalar_log import NAME as SCALARS
 
 PIECE = 4 * 2**20  # [bytes], at most
 TAIL = 256  # [bytes] before where a file grew, by which it is seen to be the same one

@@ -1,0 +1,66 @@
+"""The points that a convex body is made of, as few as an engine can compute with in time."""
+
+import numpy as np
+
+MOST_POINTS = 4096  # of a hull; PyBullet walks through all of them at each contact, in each step
+PIECE = 50_000  # points that are looked at together: memory
+LEFT = 0.9  # of the points; where more are left it is of no use to look again
+# Points and directions of one product: larger ones are shared among threads, which wait for each other on a
+# busy machine.
+BLOCK = 256
+
+
+def hull_points(points: np.ndarray) -> np.ndarray:
+    """Returns points (k, 3) with the same convex hull as `points` (n, 3), in their order.
+
+    Up to `MOST_POINTS` are returned as they are. A hull that has more corners is cut down to those that lie
+    farthest out in as many directions: of a ball that takes 0.1 % of the radius.
+    """
+    points = _different(points)
+    while len(points) > MOST_POINTS:
+        pieces = np.array_split(points, len(points) // PIECE + 1)
+        corners = np.concatenate([_corners(piece) for piece in pieces])
+        if len(corners) > LEFT * len(points):
+            return _outermost(corners) if len(corners) > MOST_POINTS else corners
+        points = corners
+    return points
+
+
+def _different(points: np.ndarray) -> np.ndarray:
+    """Each point once. np.unique does it too, and holds all other threads for as long as it sorts rows."""
+    order = np.lexsort(points.T)
+    new = np.append(True, (np.diff(points[order], axis=0) != 0.0).any(axis=1))
+    return points[np.sort(order[new])]
+
+
+def _corners(points: np.ndarray) -> np.ndarray:
+    """The corners of the convex hull; all points, if it has no inside."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return points[np.sort(ConvexHull(points).vertices)]
+    except QhullError:
+        return points
+
+
+def _outermost(points: np.ndarray) -> np.ndarray:
+    """The farthest points in `MOST_POINTS` directions that a spiral spreads evenly over the sphere."""
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(MOST_POINTS)
+    height = 1.0 - (2.0 * np.arange(MOST_POINTS) + 1.0) / MOST_POINTS
+    ring = np.sqrt(1.0 - height**2)
+    directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
+    centred = points - points.mean(axis=0)
+    spread = np.abs(centred).max(axis=0)
+    centred = (
+        centred / np.where(spread > 0.0, spread, 1.0)
+    ).T  # a flat body has as fine an outline
+    best, farthest = np.full(MOST_POINTS, -np.inf), np.zeros(MOST_POINTS, int)
+    for start in range(0, len(points), BLOCK):
+        piece = np.ascontiguousarray(centred[:, start : start + BLOCK])
+        for some in np.array_split(np.arange(MOST_POINTS), MOST_POINTS // BLOCK):
+            reach = directions[some] @ piece
+            index = reach.argmax(axis=1)
+            value = reach[np.arange(len(some)), index]
+            better = value > best[some]
+            best[some[better]], farthest[some[better]] = value[better], start + index[better]
+    return points[np.unique(farthest)]

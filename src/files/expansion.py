@@ -1,0 +1,191 @@
+"""Expanding xacro files within limits, and the program ``xacro``.
+
+A xacro file is a program: it may include itself, compute without end or ask for all memory. So it runs in
+a child process, with the xacro that the caller would import.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NoReturn
+
+from files.limited import (
+    LimitedProcess,
+    Limits,
+    ProcessDied,
+    RequestRefused,
+    limit_memory,
+    limit_time,
+    why_ended,
+)
+from files.xml_text import decode, without_declaration
+
+LIMITS = Limits(
+    processor_time=30,  # [s], far more than the largest robots in use need
+    wall_time=60.0,
+    memory=1 << 30,
+    output=64 << 20,
+)
+MAX_REASON = 500  # characters
+MAX_FILES = 3  # that an error names
+
+BROKEN = 2  # exit code, xacro's own
+
+
+class CannotExpand(Exception):
+    """The file can't be expanded; the text is one line with the file, the place and the reason."""
+
+
+def expand(
+    path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None, limits: Limits = LIMITS
+) -> str:
+    """Expands a URDF or xacro file.
+
+    Args:
+        path: the file, which may be plain XML.
+        mappings: xacro arguments, name and value.
+        limits: what it may take.
+
+    Returns:
+        The XML text.
+
+    Raises:
+        CannotExpand: if the file is broken or goes beyond a limit.
+    """
+    return _ask("xml", os.fspath(path), mappings, limits)
+
+
+def included_files(
+    path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None
+) -> list[str]:
+    """Returns the files that a xacro file includes, or takes numbers from, with these arguments.
+
+    Raises:
+        CannotExpand: if the file is broken or goes beyond a limit.
+    """
+    return _ask("files", os.fspath(path), mappings, LIMITS).splitlines()
+
+
+def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: Limits) -> str:
+    request = {"wanted": wanted, "path": path, "mappings": dict(mappings or {})}
+    # A process for each file: xacro keeps its state in module variables.
+    process = LimitedProcess("files.expansion:answer", limits)
+    try:
+        return process.ask(json.dumps(request).encode()).decode(errors="surrogateescape")
+    except ProcessDied as fault:
+        raise CannotExpand(f"{path}: xacro: {fault}") from fault
+    except RequestRefused as fault:
+        text = str(fault)
+        raise CannotExpand(text if path in text else f"{path}: xacro: {text}") from fault
+    finally:
+        process.close()
+
+
+def answer(data: bytes) -> bytes:
+    """Answers a request of this module in the child process: the XML, or a line for each included file."""
+    request = json.loads(data)
+    path = request["path"]
+    try:
+        import xacro
+    except ImportError as fault:
+        raise ImportError(f"{fault}: is it installed?") from fault
+
+    def parse(given: Any, name: str | None = None) -> Any:
+        """xacro itself takes UTF-8, and nothing before the declaration."""
+        if given is None and name is not None:
+            with suppress(OSError):  # xacro has its own way with files that are missing
+                given = without_declaration(decode(Path(name).read_bytes()))
+        return xacro_parse(given, name)
+
+    xacro_parse, xacro.parse = xacro.parse, parse
+    with _in_one_line(xacro, path):
+        document = xacro.process_file(path, mappings=request["mappings"])
+        if request["wanted"] == "files":
+            text = "\n".join(sorted(set(xacro.all_includes)))
+        else:
+            text = document.toprettyxml(indent="  ")
+    return text.encode(errors="surrogateescape")
+
+
+def main() -> int:
+    """The program ``xacro`` with its own options; returns its exit code."""
+    worker = os.fork()
+    if not worker:
+        _run_program()
+    signal.signal(signal.SIGTERM, lambda number, _: os.kill(worker, number))
+    try:
+        status = os.waitstatus_to_exitcode(os.waitpid(worker, 0)[1])
+    except KeyboardInterrupt:  # which the worker got as well
+        return 128 + signal.SIGINT
+    if status == -signal.SIGPIPE:  # the reader has gone
+        return 128 + signal.SIGPIPE
+    if status < 0:
+        print(f"xacro: {why_ended(status, LIMITS)}", file=sys.stderr)
+        return BROKEN
+    return status
+
+
+def _run_program() -> NoReturn:
+    limit_memory(LIMITS.memory)
+    limit_time(LIMITS.processor_time, LIMITS.wall_time)
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    import xacro
+
+    options, path = xacro.process_args(sys.argv[1:])
+    if options.root_dir:
+        xacro.root_dir = options.root_dir
+    try:
+        with _in_one_line(xacro, path):
+            document = xacro.process_file(path, **vars(options))
+            if options.just_deps:
+                text = " ".join(sorted(set(xacro.all_includes)))
+            else:
+                text = document.toprettyxml(indent="  ")
+            with xacro.open_output(options.output) as output:  # only now: it may be in use so far
+                output.write(text)
+    except CannotExpand as fault:
+        if options.verbosity > 1:
+            raise
+        print(f"xacro: {fault}", file=sys.stderr)
+        sys.exit(BROKEN)
+    sys.exit(0)
+
+
+@contextmanager
+def _in_one_line(xacro: Any, path: str) -> Iterator[None]:
+    """Turns whatever is raised inside into CannotExpand."""
+    try:
+        yield
+    except Exception as fault:
+        # xacro evaluates the file's own Python expressions: anything may come out.
+        raise CannotExpand(_what_went_wrong(xacro, path, fault)) from fault
+
+
+def _what_went_wrong(xacro: Any, path: str, fault: Exception) -> str:
+    """One line: the file that xacro was reading, the files and macros that led there, the reason."""
+    files = [str(file) for file in reversed(xacro.filestack or [path]) if file]
+    macros = [macro.body.getAttribute("name") for macro in reversed(xacro.macrostack or [])]
+    through = [f"included from {file}" for file in files[1:]] + [f"in macro {m}" for m in macros]
+    if len(through) > MAX_FILES:
+        through[MAX_FILES:] = [f"and {len(through) - MAX_FILES} more"]
+    chain: list[BaseException] = [fault]  # xacro wraps what it meets in exceptions of its own
+    while chain[-1].__context__ is not None:
+        chain.append(chain[-1].__context__)
+    if any(isinstance(each, RecursionError) for each in chain):
+        reason = "nested without end: does a file include itself, or a macro call itself?"
+    elif any(isinstance(each, MemoryError) for each in chain):
+        reason = f"needs more than {LIMITS.memory >> 20} MiB of memory"
+    else:
+        missing = getattr(fault, "exc", None)  # of xacro's own exception, which repeats its text
+        if isinstance(missing, OSError) and missing.filename and missing.strerror:
+            own = missing.filename == files[0]
+            fault = Exception(missing.strerror + ("" if own else f": {missing.filename}"))
+        text = " ".join(str(fault.args[0] if isinstance(fault, KeyError) else fault).split())
+        reason = text[:MAX_REASON] or type(fault).__name__
+    return f"{', '.join([*files[:1], *through])}: {reason}"
