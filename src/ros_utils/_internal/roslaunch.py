@@ -9,9 +9,9 @@ from ros_calls import master as _master
 from ros_calls.master import NoAnswer, Refused, call_plain
 from ros_calls.waiting import POLL
 from ros_utils._internal import log as _log
-from ros_utils._internal.processes import nodes as _nodes
-from ros_utils._internal.processes import processes as _processes
-from ros_utils._internal.processes.program import Handle
+from ros_utils._internal import nodes as _nodes
+from ros_utils._internal import programs as _programs
+from ros_utils._internal.programs import Handle
 
 SETTLE = 5.0  # [s] at most, for the nodes of a launch file to register after their processes run
 STABLE = 0.3  # [s] without a further process: roslaunch has started them all
@@ -33,9 +33,9 @@ def start(
         MasterDown: there is no master and roslaunch couldn't start one there.
         CannotStart: roslaunch can't be run.
     """
-    _processes.end_orphans()  # or their master would be taken for one that stays
+    _programs.end_orphans()  # or their master would be taken for one that stays
     _master.is_up_or_startable()
-    return _processes.start(
+    return _programs.start(
         ["roslaunch", *arguments],
         "launch",
         label,
@@ -84,7 +84,7 @@ def let_settle(handle: Handle) -> None:
 
 
 def _warn(handle: Handle, text: str) -> None:
-    _log.warn(f"{handle.entry.label}: {text}{handle.where()}")
+    _log.warn(f"{handle.start.label}: {text}{handle.where()}")
 
 
 def _own_nodes(handle: Handle) -> int:

@@ -6,12 +6,12 @@ import contextlib
 import time
 from urllib.parse import urlsplit
 
+import psutil
 import rospy
 
 from ros_calls import master as _master
 from ros_calls.master import NoAnswer, NobodyListens, Refused, call_node, call_plain
 from ros_calls.waiting import POLL
-from ros_utils._internal.processes import procfs as _procfs
 
 CORE_NODES = ("/rosout",)  # lives and dies with the master
 
@@ -63,7 +63,19 @@ def _master_of(address: str) -> str | None:
         pass
     host = urlsplit(address).hostname
     pid = node_pid(address) if host and _master.host_is_local(host) else None
-    return _procfs.master_uri(pid) if pid else None
+    return _started_with(pid) if pid else None
+
+
+def _started_with(pid: int) -> str | None:
+    """Returns the master that a process was started with; None if it wasn't, or is another user's."""
+    try:
+        process = psutil.Process(pid)
+        given = [each for each in process.cmdline() if each.startswith("__master:=")]
+        if given:
+            return given[0].removeprefix("__master:=")
+        return process.environ().get("ROS_MASTER_URI")
+    except psutil.Error:
+        return None
 
 
 def ask_to_shut_down(address: str) -> bool:
