@@ -3,6 +3,7 @@
 
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -16,6 +17,8 @@ from ros_utils.simulation import Simulation, reserved_port
 
 ROOT = Path(rospkg.RosPack().get_path("cartpole"))
 SCRIPTS = ROOT / "test" / "data" / "scripts"
+EXISTING = Path(__file__).resolve().parents[4] / "shared" / "pg_script" / "launch_robot_test.py"
+EPISODES = 10
 BOUND = 300  # [s]
 
 
@@ -48,6 +51,28 @@ class LaunchingTest(unittest.TestCase):
             seen.append([line for line in out.splitlines() if re.match(r"\d \d+ ", line)])
             self.assertGreater(len(seen[-1]), 190, out)
         self.assertEqual(*seen)
+
+    @unittest.skipUnless(EXISTING.is_file(), "the existing script isn't here")
+    def test_the_existing_script_is_repeatable_also_on_a_busy_machine(self):
+        folders = [tempfile.mkdtemp(prefix="lockstep_test_") for _ in range(2)]
+        both = [start("--seed", 0, EXISTING, env=environment(), cwd=each) for each in folders]
+        self.assertEqual(*map(self.episodes, both, folders))
+
+    def episodes(self, process, folder):
+        """What the script prints in its first episodes, and its weights after the first one."""
+        lines = []
+        try:
+            for line in process.stdout:
+                if line.startswith(f"Episode {EPISODES},"):
+                    break
+                if line.startswith("Episode"):
+                    lines.append(line)
+        finally:
+            os.killpg(process.pid, signal.SIGINT)
+            _, err = process.communicate(timeout=BOUND)
+        self.assertGreater(len(lines), EPISODES, err)
+        self.assertEqual(process.returncode, 0, err)  # as it ends without us
+        return lines, Path(folder, "models", "policy_network_episode_0.pth").read_bytes()
 
     def test_a_world_in_real_time_is_refused(self):
         with Simulation() as simulation:
