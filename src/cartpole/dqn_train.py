@@ -4,7 +4,7 @@ import sys
 
 from cartpole.workbench import PROGRAM, ros_options
 from rl_workbench.starting import ended_by_ctrl_c
-from rl_workbench.training import cli
+from rl_workbench.training import train as cli
 from robot_envs.errors import RobotEnvError
 
 NODE = "dqn_train"

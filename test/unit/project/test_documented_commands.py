@@ -30,7 +30,7 @@ from bullet_gazebo.ros.clients import gzclient
 from cartpole import dqn_train, pg_train, policy_node, workbench
 from lockstep_runner import launcher as lockstep_launcher
 from package_writing import cli as new_robot
-from rl_workbench.training import cli as training_cli
+from rl_workbench.training import train as training_cli
 from rl_workbench.training.algorithms import ALGORITHMS
 
 pytestmark = pytest.mark.usefixtures("signals")

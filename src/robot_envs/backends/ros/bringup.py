@@ -15,8 +15,8 @@ from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from ros_calls import master
+from ros_calls.master import NoAnswer, Refused
 from ros_calls.waiting import wait_until
-from ros_calls.xmlrpc import NoAnswer, Refused
 from ros_utils import ros_controllers
 from ros_utils.readiness import NotReady, Ready
 

@@ -33,8 +33,8 @@ from robot_envs.variation import Variation
 from robot_envs.variation.applying import Applier, JointFriction, PidGains
 from robot_envs.variation.parts import RobotPart, gains_of
 from ros_calls import master
+from ros_calls.master import NoAnswer, Refused
 from ros_calls.service import TIMEOUT
-from ros_calls.xmlrpc import NoAnswer, Refused
 
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 

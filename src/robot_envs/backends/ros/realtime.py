@@ -18,9 +18,9 @@ from std_srvs.srv import Empty
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.ros.bringup import full_name, ready
 from robot_envs.backends.ros.gazebo import RunningSimulator, SimulatorService
+from robot_envs.backends.ros.messages import JointStateReader, pose_of
 from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.backends.ros.shared_world import SharedWorld
-from robot_envs.backends.ros.wire.messages import JointReader, pose_of
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
@@ -49,7 +49,7 @@ class JointStates:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._read = JointReader(scene)
+        self._read = JointStateReader(scene)
         self._newest: tuple[JointStateMsg, float] | None = None  # with its wall time [s]
         self._arrived = threading.Condition()
         self._subscriber = rospy.Subscriber(

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""controller_manager and controller_group as processes: printed lines and exit codes.
+"""The programs controller_manager and controller_group: printed lines and exit codes.
 
 The world is paused throughout. Lines are those that ros_control's own tests expect of its scripts.
 """
