@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""examples/ppo_over_ros.py runs as it stands, for fewer steps."""
+"""examples/ppo_over_ros.py runs unchanged, but for fewer steps."""
 
 import importlib.util
 import unittest

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The pendulum over ROS, by a session that its user starts and ends: in lock-step, or in real time."""
+"""The pendulum over ROS in a session that its user starts and ends, in lock-step or in real time."""
 
 import sys
 import unittest

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A user's own package through ros_utils: its files lie where the functions look by themselves."""
+"""ros_utils with a user's package, whose files it finds in the usual folders."""
 
 import os
 import subprocess

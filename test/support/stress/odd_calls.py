@@ -1,4 +1,4 @@
-"""A node that calls all that a simulator offers with odd values: python3 -m stress.odd_calls SEED COUNT.
+"""Calls all of a simulator's interface with odd values: python3 -m support.stress.odd_calls SEED COUNT.
 
 Types are right, values are not. Each request of a service has to be answered within a time limit: carried out
 or refused. Its last line is a JSON object with the numbers of those that were sent, by kind.

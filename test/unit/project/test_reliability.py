@@ -1,4 +1,4 @@
-"""The frame of the stress tests: random numbers for each case, failures, and the table of the docs."""
+"""The frame of the stress tests: random numbers for each case, failures, the table."""
 
 from dataclasses import asdict
 

@@ -1,4 +1,4 @@
-"""Folders of the user's in `ws`: --with, CARTPOLE_WITH, ROS_PACKAGE_PATH; their packages and modules."""
+"""The user's folders in `ws`: --with, CARTPOLE_WITH, ROS_PACKAGE_PATH; their packages and modules."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Limits, control period, and controllers of users that have faults (docs/contract/ros_control.md 5)."""
+"""Limits, control periods and faulty controllers of users (docs/contract/ros_control.md 5)."""
 
 import math
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every type of controller through ROS: parameters, command topic, law, state.
+"""Controllers over ROS: parameters, command topics, control laws, states.
 
 See docs/contract/ros_control.md 3.
 """

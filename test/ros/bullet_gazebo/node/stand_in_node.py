@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Gazebo's services and topics as a client sees them (docs/contract/gazebo.md 1 and 2), over real ROS."""
+"""Gazebo's services and topics as a client sees them (docs/contract/gazebo.md 1 and 2)."""
 
 import threading
 import unittest

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A world from a file, and SDF models spawned into it, as a client sees them.
+"""A world from a file, and SDF models spawned into it.
 
 See docs/contract/gazebo.md 2.3 to 2.5.
 """

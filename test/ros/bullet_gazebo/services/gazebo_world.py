@@ -1,4 +1,4 @@
-"""What the tests of Gazebo's services share: calls, the world they begin with, and ways to check answers."""
+"""The world that the tests of Gazebo's services start from, calls, and checks of answers."""
 
 import unittest
 

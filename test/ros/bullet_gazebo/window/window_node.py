@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The window in a real browser: the page shows what happens, and what is clicked there happens."""
+"""The window in a real browser: the page shows the world, and its buttons work."""
 
 import io
 import tempfile
