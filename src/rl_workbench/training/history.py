@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import torch
 
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, replaying, watching
-from rl_workbench.plotting.curves import learning_curve
-from rl_workbench.plotting.figure import as_png
+from rl_workbench.plotting import as_png, learning_curve
 from rl_workbench.states import array, number, sequence, whole
 from rl_workbench.storage import as_json, write_atomically
 from rl_workbench.training.checkpoints import candidates
