@@ -26,8 +26,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rl_workbench.plotting.curves import learning_curve
-from rl_workbench.plotting.figure import as_png
+from rl_workbench.plotting import as_png, learning_curve
 from rl_workbench.storage import write_file
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -14,10 +14,10 @@ from gymnasium import spaces
 from cartpole.workbench import ros_options
 from rl_workbench.errors import WorkbenchError, error_line
 from rl_workbench.starting import Interrupt, reader_may_go
-from rl_workbench.tools.commands.shared import env_options, number
-from rl_workbench.tools.runs.exported import described, open_exported
-from rl_workbench.tools.runs.policies import WHICH, load_learned
-from rl_workbench.tools.runs.runs import open_run
+from rl_workbench.tools.flags import WHICH, env_options, number
+from rl_workbench.tools.policies import load_learned
+from rl_workbench.tools.runs import open_run
+from rl_workbench.tools.torchscript import described, open_exported
 from rl_workbench.training.environments import as_float32, make_environment
 from robot_envs.backends import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
 from robot_envs.environment import RobotEnv

@@ -1,4 +1,4 @@
-"""Many simulators of one's own on few cores, whose processes get signals: no bit differs, none is left."""
+"""Many own simulators on few cores get signals: bit-identical results, no process left."""
 
 import os
 import random

@@ -1,4 +1,4 @@
-"""A simulator that is stopped, whose clock jumps, that runs out of files, memory or disk: it serves again."""
+"""A simulator is stopped, its clock jumps, it runs out of files, memory or disk: it serves again."""
 
 import contextlib
 import os

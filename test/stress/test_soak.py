@@ -1,4 +1,4 @@
-"""Thousands of resets, spawns and deletions: the same bits each time, and nothing that grows."""
+"""Thousands of resets, spawns and deletions: the same bits each time, and nothing grows."""
 
 import random
 

@@ -106,8 +106,7 @@ class CurvesPicture(Callback):
         if not history.returns:
             return
         # matplotlib is slow to import
-        from rl_workbench.plotting.curves import learning_curve
-        from rl_workbench.plotting.figure import as_png
+        from rl_workbench.plotting import as_png, learning_curve
 
         title = f"{training.options.kind.name}, {run.env_id}, seed {run.seed}"
         figure = learning_curve(history.lengths, history.returns, title, history.successes)

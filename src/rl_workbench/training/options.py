@@ -89,18 +89,6 @@ class RunOptions:
 
 
 @dataclass(frozen=True)
-class ClusterOptions:
-    """Where a command runs its trainings."""
-
-    ray: str | None = option(
-        None,
-        "on a cluster of Ray's: HOST:PORT of its head, auto for the one that this machine belongs to, or "
-        "local to start one on this machine alone",
-        metavar="ADDRESS",
-    )
-
-
-@dataclass(frozen=True)
 class SessionOptions:
     """Options of one session. They aren't recorded, so they may differ when the training is resumed."""
 

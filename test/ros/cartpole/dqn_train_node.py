@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""dqn_train.py as a ROS node, and with no ROS around."""
+"""dqn_train.py as a ROS node, and without ROS."""
 
 import json
 import unittest

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""pg_train.py when things go wrong: a clear line within seconds, what was learned is saved."""
+"""pg_train.py when something fails: one clear line within seconds, and what was learned is saved."""
 
 import json
 import signal

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""pg_train.py from nothing: it trains, leaves its files, and leaves nothing running."""
+"""pg_train.py from nothing: it trains, writes its files, and leaves no process behind."""
 
 import contextlib
 import json

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""policy_node.py on the cart-pole, in real time: it balances, stops where states are late, and at Ctrl-C."""
+"""policy_node.py on the cart-pole in real time: it balances, and stops at late states and at Ctrl-C."""
 
 import os
 import signal

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The robot in RViz: in its colours while no simulated time has passed, and where the simulator has it."""
+"""RViz shows the robot in its colours before time starts, and then where the simulator has it."""
 
 import os
 import signal

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""workbench.py with an arm that reaches for goals: over ROS, where there is one robot, as in this process.
+"""workbench.py with an arm that reaches for goals: the same figures over ROS as in-process.
 
 Evaluations come in the midst of episodes, and move the robot that is learned with. Halfway, in the midst of
 an episode, the training over ROS ends with its simulator, and is gone on with in another one.

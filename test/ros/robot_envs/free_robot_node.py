@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A robot that isn't fixed to the world, over ROS: its pictures are those of the robot in this process."""
+"""A robot that isn't fixed to the world: pictures over ROS equal those in-process."""
 
 import tempfile
 import unittest

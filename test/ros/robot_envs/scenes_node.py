@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Over ROS in lock-step, one after the other in one process: two arms with a ball, a rover with a crate."""
+"""Scenes over ROS in lock-step, one after the other: two arms with a ball, a rover with a crate."""
 
 import tempfile
 import unittest

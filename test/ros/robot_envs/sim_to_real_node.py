@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Imperfect sensors and actuators, and robots that differ, over ROS: the same bits, and given back."""
+"""Sensor and actuator imperfections and varied robots over ROS: the bits of the in-process world."""
 
 import sys
 import unittest

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Two simulators side by side, each with a master of its own, and all that ros_utils asks of them."""
+"""All of ros_utils against simulators: two side by side, and a user's session."""
 
 import math
 import os

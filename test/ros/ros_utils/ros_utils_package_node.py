@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A user's own package through ros_utils: its files lie where the functions look by themselves."""
+"""ros_utils with a user's package, whose files it finds in the usual folders."""
 
 import os
 import subprocess
@@ -90,6 +90,11 @@ class Package(unittest.TestCase):
     def test_the_packages_world(self):
         self.assertIn("x", ros_gazebo.gazebo_get_model_names())
         self.assertEqual(ros_gazebo.gazebo_get_gravity().z, -1.5)
+
+    def test_a_world_by_its_path(self):
+        path = self.path("worlds/light.world")
+        with Simulation(custom_world_path=path, verbose=True, recording=True) as other:
+            self.assertIn("x", other.model_names())
 
     def test_urdf(self):
         expanded = ros_urdf.urdf_parse_from_pkg("my_robot", "robot.xacro", args_xacro=["mass:=7"])

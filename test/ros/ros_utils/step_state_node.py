@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Links, models and contacts over ROS: bit for bit what the same world tells in this process."""
+"""Links, models and contacts over ROS are bit-identical to those in-process."""
 
 import importlib.util
 import unittest

@@ -1,4 +1,4 @@
-"""Lets pytest collect rostest files, so that one command selects and counts all tests alike.
+"""Collects rostest files as pytest items, so that one command runs and counts all tests.
 
 Every `test/ros/*.test` becomes one item. It passes when rostest ends with exit code 0 *and* its
 result files hold at least one test and no failure: rostest alone has been seen to report success

@@ -1,4 +1,4 @@
-"""When a subscriber has every message from now on: its publishers have to know it, not only it them."""
+"""Listeners that miss no message: they wait until each publisher knows them."""
 
 import re
 import threading

@@ -1,4 +1,4 @@
-"""Trainings in processes of their own, forked off one that has imported all: that takes longest."""
+"""Trainings in processes forked from one that has imported everything, which takes longest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the cart-pole's environments promise: inherit, say `identifier` and `backend`, and it is tested."""
+"""What every cart-pole environment promises: inherit, set `identifier` and `backend`."""
 
 import warnings
 from typing import Any, ClassVar

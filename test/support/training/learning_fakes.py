@@ -1,4 +1,4 @@
-"""Small robots and environments to learn on in unit tests: quick, and all but one deterministic."""
+"""Small, quick robots and environments to learn on; all but one deterministic."""
 
 import random
 from typing import Any, ClassVar

@@ -1,4 +1,4 @@
-"""Small trainings in this process, and what is left of two of them compared: but for the clock, bits."""
+"""Small in-process trainings, and comparisons of two: bit-identical except for the clock."""
 
 import csv
 import json

@@ -65,7 +65,7 @@ def test_an_exported_policy_of_another_task_is_refused(exported: Path, monkeypat
 
 
 def renamed(env_id: str):
-    from rl_workbench.tools.runs.exported import ExportedPolicy, open_exported
+    from rl_workbench.tools.torchscript import ExportedPolicy, open_exported
 
     def opened(path: Path) -> ExportedPolicy:
         act, metadata = open_exported(path)

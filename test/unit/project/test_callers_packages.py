@@ -1,4 +1,4 @@
-"""A workspace that the caller has built and sourced, in `ws`: its packages win over the companions."""
+"""A workspace that the caller has built and sourced: its packages win over the companions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The package in somebody's own catkin workspace: the commands of docs/catkin.md, as they stand."""
+"""The package in a user's own catkin workspace: the commands of docs/catkin.md, unchanged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The documentation's links lead somewhere, and the check of them sees it when they don't."""
+"""tools/check_links.py finds broken links and paths in the documentation."""
 
 import runpy
 

@@ -1,4 +1,4 @@
-"""What CI runs: a failed check is named, stops neither other checks nor the tests, and fails the run."""
+"""What CI runs: a failed check is named, stops neither other checks nor tests, and fails the run."""
 
 import shutil
 import subprocess

@@ -1,4 +1,4 @@
-"""A rostest that didn't prove anything must not pass."""
+"""A rostest that proved nothing must not pass."""
 
 from __future__ import annotations
 

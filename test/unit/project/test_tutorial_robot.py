@@ -1,4 +1,4 @@
-"""Every command of docs/tutorial_robot.md, in order, with shorter trainings: a package of one's own.
+"""Every command of docs/tutorial_robot.md in order, with shorter trainings: a user's own package.
 
 A block `sh skip` is another way to begin. One of Python that names a file is put at that file's end.
 Simulations are started, seen to be there, and ended; with RViz their launch files are read.
@@ -182,6 +182,7 @@ def test_every_command_works(reader: Reader) -> None:
 
 def test_both_languages_have_the_same_commands() -> None:
     mine, other = blocks(ENGLISH), blocks(CHINESE)
+    assert len(mine) > 10
     assert [block[:2] for block in mine] == [block[:2] for block in other]
 
     def code(page: list[Block]) -> list[str]:

@@ -1,4 +1,4 @@
-"""`ws`, the one entry: called as a user calls it, from a copy where it would do harm."""
+"""`ws` called as a user calls it: command line, environment, network."""
 
 from __future__ import annotations
 

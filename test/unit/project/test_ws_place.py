@@ -1,4 +1,4 @@
-"""Where `ws` builds: in the checkout, wherever that lies, or elsewhere where it can't be written."""
+"""Where `ws` builds: in the checkout, wherever that lies, or elsewhere if it can't be written."""
 
 from __future__ import annotations
 

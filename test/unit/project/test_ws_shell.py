@@ -1,4 +1,4 @@
-"""`ws shell`, typed at a terminal: roscd and its family, completion, the user's own ~/.bashrc."""
+"""`ws shell` at a terminal: roscd and its family, completion, the user's ~/.bashrc."""
 
 import os
 import pty

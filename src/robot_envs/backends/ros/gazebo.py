@@ -17,8 +17,7 @@ from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, Sim
 from robot_envs.files import Source, is_text, locate
 from robot_envs.robot import EMPTY, Robot
 from ros_calls import master, service
-from ros_calls.nodes import living_address
-from ros_calls.xmlrpc import NoAnswer, Refused
+from ros_calls.master import NoAnswer, Refused, living_address
 from ros_utils import ros_gazebo
 
 NODE = "/gazebo"

@@ -18,9 +18,9 @@ from std_srvs.srv import Empty
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.ros.bringup import full_name, ready
 from robot_envs.backends.ros.gazebo import RunningSimulator, SimulatorService
+from robot_envs.backends.ros.messages import JointStateReader, pose_of
 from robot_envs.backends.ros.properties import RosVariation
 from robot_envs.backends.ros.shared_world import SharedWorld
-from robot_envs.backends.ros.wire.messages import JointReader, pose_of
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
@@ -49,7 +49,7 @@ class JointStates:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._read = JointReader(scene)
+        self._read = JointStateReader(scene)
         self._newest: tuple[JointStateMsg, float] | None = None  # with its wall time [s]
         self._arrived = threading.Condition()
         self._subscriber = rospy.Subscriber(
@@ -219,10 +219,6 @@ class RealtimeWorld:
 
         Waits for the joint state that the reset publishes. If the simulator publishes none while it is
         paused, the joints are taken to be where they were put.
-
-        Raises:
-            ValueError: for an unknown joint.
-            SimulatorError: if the simulator refuses, or doesn't answer.
         """
         positions = {name: at for name, (at, _) in self.scene.placed_joints(initial).items()}
         with self._simulator:
@@ -259,12 +255,7 @@ class RealtimeWorld:
         """See `RobotBackend.begin`; does nothing."""
 
     def act(self, commands: Commands) -> WorldState:
-        """See `RobotBackend.act`.
-
-        Raises:
-            SimulatorError: if joint states stop coming, the simulator doesn't answer, or another environment
-                has moved the robot since the reset.
-        """
+        """See `RobotBackend.act`."""
         self._world.check_holder(self)
         with self._simulator:
             self._unpause()
@@ -277,11 +268,7 @@ class RealtimeWorld:
         return WorldState(max(0.0, now - self._begin), joints, self._held)
 
     def look(self, query: StateQuery) -> None:
-        """See `RobotBackend.look`.
-
-        Raises:
-            RobotEnvError: for any query that isn't empty.
-        """
+        """See `RobotBackend.look`."""
         if query != StateQuery():
             raise RobotEnvError(f"{_ONLY_JOINTS}: links, models and contacts aren't told")
 
@@ -296,11 +283,7 @@ class RealtimeWorld:
         self._variation.undo()
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
-        """See `RobotBackend.poses`; makes a call for each.
-
-        Raises:
-            SimulatorError: if the simulator doesn't answer, or has no such link.
-        """
+        """See `RobotBackend.poses`; makes a call for each."""
         found = []
         with self._simulator:
             for link in links:

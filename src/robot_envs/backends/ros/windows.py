@@ -11,9 +11,8 @@ import rospy
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from ros_calls import master
-from ros_calls.nodes import living_address
+from ros_calls.master import NoAnswer, Refused, living_address
 from ros_calls.waiting import wait_until
-from ros_calls.xmlrpc import NoAnswer, Refused
 from ros_utils import ros_launch, ros_node
 
 Say = Callable[[str], None]

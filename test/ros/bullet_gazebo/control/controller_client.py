@@ -1,4 +1,4 @@
-"""What the tests of the controller manager share: a client of one manager, and robots to spawn."""
+"""A client of one controller manager, and robots to spawn."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""The robot `slides` in a lock-step world, as a client of its controller manager sees it."""
+"""A client of the robot `slides` and its controller manager in a lock-step world."""
 
 import unittest
 

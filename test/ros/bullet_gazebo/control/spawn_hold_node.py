@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""No step between a model's appearance and its drives, however slowly its plugins load."""
+"""A spawned model takes no step before its drives exist, however slowly its plugins load."""
 
 import threading
 import unittest

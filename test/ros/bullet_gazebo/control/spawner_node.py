@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""spawner in a user's launch file, and its command line and printed lines in full."""
+"""spawner and unspawner: in launch files, on the command line, and every line they print."""
 
 import re
 import signal

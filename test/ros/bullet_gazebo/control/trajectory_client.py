@@ -1,4 +1,4 @@
-"""A client of a trajectory controller, as MoveIt, rqt and rostopic are; waits are in wall time."""
+"""A client of a trajectory controller, as MoveIt, rqt and rostopic are; it waits in wall time."""
 
 import actionlib
 import rospy

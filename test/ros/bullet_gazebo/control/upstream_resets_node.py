@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Resets with relatch_on_reset: false: controllers go on as in ros_control, but for their period."""
+"""Resets with relatch_on_reset: false: controllers go on as in ros_control, except for their period."""
 
 import rospy
 import rostest

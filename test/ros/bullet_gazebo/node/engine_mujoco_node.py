@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Gazebo's interface on MuJoCo: spawn, control, reset, place, step, delete; and what is said without it."""
+"""Gazebo's interface on MuJoCo: spawn, control, reset, place, step, delete; and the error without MuJoCo."""
 
 import importlib.util
 import subprocess

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Package gazebo_ros as a user has it: own robot, own launch file, spawn_model, gz, gazebo."""
+"""Package gazebo_ros with a user's robot and launch file: spawn_model, gz, gazebo."""
 
 import os
 import signal

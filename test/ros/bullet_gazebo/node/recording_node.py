@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`record:=FILE`: a video that is whole after Ctrl-C, and one line for what can't be recorded."""
+"""`record:=FILE` leaves a complete video after Ctrl-C; what can't be recorded is one line of error."""
 
 import os
 import re
@@ -52,7 +52,7 @@ class Recording(unittest.TestCase):
         self.await_line("starting joint_state_controller")
         launch.send_signal(signal.SIGINT)
         launch.wait(BOUND)
-        told = self.await_line(r"recording: .*video\.mp4: (\d+) pictures, [0-9.]+ s")
+        told = self.await_line(r"recording: .*video\.mp4: (\d+) frames, [0-9.]+ s")
         self.assertGreater(int(told[1]), 0)
         read = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(video), "-f", "null", "-"]
         self.assertEqual(subprocess.run(read, check=False, timeout=BOUND).returncode, 0)

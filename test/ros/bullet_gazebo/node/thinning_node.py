@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Beyond real time topics are thinned, and the last message before a pause always comes; else all come."""
+"""Topics are thinned only beyond real time, and the last message before a pause always arrives."""
 
 import time
 import unittest

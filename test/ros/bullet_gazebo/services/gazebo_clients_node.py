@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Clients that hang, die or come in crowds; and a node that goes by the wall's clock."""
+"""Clients that hang, die or come in crowds; a node on the wall clock."""
 
 import contextlib
 import signal

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Services that tell, change and place joints, and the resets: over real ROS."""
+"""Services that report, change and place joints; resets."""
 
 import threading
 

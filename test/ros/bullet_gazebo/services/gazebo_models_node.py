@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Services that tell and place models: each text, failure and effect, over real ROS."""
+"""Services that report and place models: each text, failure and effect."""
 
 import math
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Physics properties, dynamic_reconfigure, lights and loggers: over real ROS."""
+"""Physics properties, dynamic_reconfigure, lights and loggers."""
 
 import time
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The step service over real ROS: exact ticks, repeatable bits, and what it refuses."""
+"""The step service: exact ticks, repeatable bits, refusals."""
 
 import threading
 import unittest

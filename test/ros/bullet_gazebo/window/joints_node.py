@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Sliders of the window's page: they place joints of a paused world, and command running controllers."""
+"""The sliders of the window's page place joints while paused, and command running controllers."""
 
 import rospy
 import rostest

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The window outlives simulators that are killed, pages that go or take nothing, and other windows."""
+"""The window survives killed simulators, pages that leave or stop reading, and other windows."""
 
 import contextlib
 import subprocess

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a window is told over ROS: the scene once, and where its links are."""
+"""What the simulator sends a window: the scene once, then the poses of its links."""
 
 import threading
 import unittest
@@ -20,7 +20,7 @@ from gazebo_msgs.srv import (
     SpawnModelRequest,
 )
 
-from bullet_gazebo.ros.clients.world_client import RemoteWorld
+from bullet_gazebo.ros.clients.gz import RemoteWorld
 
 BOUND = 60.0  # [s of wall time]
 BALL = """<robot name="ball"><link name="ball">

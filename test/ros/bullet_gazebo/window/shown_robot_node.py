@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What RViz is told of a robot: where its joints are, and where it stands."""
+"""What RViz hears of a robot: its joints and where it stands."""
 
 import subprocess
 import unittest

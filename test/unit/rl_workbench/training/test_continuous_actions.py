@@ -18,8 +18,8 @@ from support.training.training_runs import (
 )
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.tools.runs.policies import load_learned
-from rl_workbench.tools.runs.runs import open_run
+from rl_workbench.tools.policies import load_learned
+from rl_workbench.tools.runs import open_run
 
 pytestmark = pytest.mark.slow
 
