@@ -57,7 +57,7 @@ class AdvanceService:
                 request.node, request.subscriptions, request.publications
             )
         with self._one_at_a_time:
-            self._sim.post_goes_with_steps = True
+            self._sim.deliver_with_steps = True
             if request.reseed:
                 seed_random_numbers(request.seed, tell=False)
             faults = self._deliver(request)
@@ -97,7 +97,7 @@ class AdvanceService:
         sim, mailboxes = self._sim, self._mailboxes
 
         def has_post() -> bool:
-            return any(postman.has_post() for postman in sim.postmen)
+            return any(postman.has_messages() for postman in sim.outboxes)
 
         def ends_slice() -> bool:
             return mailboxes.has_awaited or has_post()
@@ -111,7 +111,7 @@ class AdvanceService:
                     with self._watchdog:
                         passed += sim.advance(min(SLICE, left), ends_slice)
                 goes_on = passed < ticks and not sim.paused
-                postmen = [each for each in sim.postmen if each.has_post()]
+                postmen = [each for each in sim.outboxes if each.has_messages()]
             for postman in postmen:
                 postman.deliver()
             if not goes_on or mailboxes.has_awaited:
