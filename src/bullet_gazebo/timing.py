@@ -6,7 +6,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import TracebackType
 
 POLL = 0.2  # [s]
 MAX_LAG = 0.1  # [s]; a host that falls behind further than this isn't made up for
@@ -58,21 +57,19 @@ class FairLock:
 
     def wait(self, event: threading.Event, timeout: float) -> None:
         """Releases the lock until `event` is set, or for `timeout` [s]. Only the holder may call it."""
-        self.__exit__(None, None, None)
+        self._release()
         event.wait(timeout)
         self.__enter__()
 
     def yield_turn(self) -> None:
         """Lets all waiters go first. The holder calls it in the middle of long work."""
-        self.__exit__(None, None, None)
+        self._release()
         self.__enter__()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
+        self._release()
+
+    def _release(self) -> None:
         self._holder = None
         with self._guard:
             if self._waiting:

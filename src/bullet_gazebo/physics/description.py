@@ -1,5 +1,6 @@
 """What a model consists of, whatever file it came from and whatever engine simulates it."""
 
+from collections import defaultdict
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
@@ -185,3 +186,19 @@ class ModelDescription:
     @property
     def movable_joints(self) -> list[Joint]:
         return [joint for joint in self.joints.values() if joint.movable]
+
+    def joints_by_parent(self) -> defaultdict[str, list[Joint]]:
+        """Returns the joints that each link carries, in document order."""
+        joints = defaultdict(list)
+        for joint in self.joints.values():
+            joints[joint.parent].append(joint)
+        return joints
+
+    def carriers(self, link: str) -> list[Joint]:
+        """Returns the joints between the root and `link`, from the root on."""
+        above = {joint.child: joint for joint in self.joints.values()}
+        found: list[Joint] = []
+        while link in above:
+            found.insert(0, above[link])
+            link = above[link].parent
+        return found

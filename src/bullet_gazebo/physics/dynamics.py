@@ -1,7 +1,6 @@
 """Mechanics of an articulated model: inertias, link poses, and what an effort on a joint has to move."""
 
 import math
-from collections import defaultdict
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -79,9 +78,7 @@ def link_poses(
     """
     poses = {model.root: root}
     poses.update({name: root.compose(pose) for name, pose in model.islands.items()})
-    below: dict[str, list[Joint]] = defaultdict(list)
-    for joint in model.joints.values():
-        below[joint.parent].append(joint)
+    below = model.joints_by_parent()
     order = list(poses)
     for parent in order:
         for joint in below[parent]:
@@ -142,9 +139,7 @@ def mobility(
 def poses_at_zero(model: ModelDescription) -> dict[str, Pose]:
     """Returns the poses of the links, seen from the root, with all joints at zero."""
     poses = {model.root: Pose()}
-    below = defaultdict(list)
-    for joint in model.joints.values():
-        below[joint.parent].append(joint)
+    below = model.joints_by_parent()
     todo = [model.root]
     for name in todo:
         for joint in below[name]:
@@ -158,9 +153,7 @@ def most_inertias(model: ModelDescription) -> dict[str, float]:
 
     It is that of all that the joint carries, stretched out.
     """
-    below = defaultdict(list)
-    for joint in model.joints.values():
-        below[joint.parent].append(joint)
+    below = model.joints_by_parent()
     return {joint.name: _stretched(model, below, joint) for joint in model.movable_joints}
 
 
@@ -190,7 +183,7 @@ def _jacobian(
         linear[:, :3] = angular[:, 3:6] = np.eye(3)
         arm = point - np.array(poses[model.root].position)
         linear[:, 3:6] = np.cross(np.eye(3), arm).T
-    carriers = _carriers(model, link)
+    carriers = {joint.name for joint in model.carriers(link)}
     for column, joint in enumerate(joints, start=base):
         if joint.name not in carriers:
             continue
@@ -202,12 +195,3 @@ def _jacobian(
             linear[:, column] = np.cross(axis, point - np.array(frame.position))
             angular[:, column] = axis
     return linear, angular
-
-
-def _carriers(model: ModelDescription, link: str) -> set[str]:
-    parents = {joint.child: joint for joint in model.joints.values()}
-    found = set()
-    while link in parents:
-        found.add(parents[link].name)
-        link = parents[link].parent
-    return found

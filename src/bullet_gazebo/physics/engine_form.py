@@ -169,12 +169,10 @@ def _pieces(link: Link) -> list[Link]:
 
 def parents_first(model: ModelDescription) -> ModelDescription:
     """Returns the model with each link after its parent: PyBullet crashes otherwise."""
-    below = defaultdict(list)
-    for joint in model.joints.values():
-        below[joint.parent].append(joint.child)
+    below = model.joints_by_parent()
     order = [model.root]
     for name in order:
-        order.extend(below[name])  # the list grows while it is walked
+        order.extend(joint.child for joint in below[name])  # the list grows while it is walked
     return replace(model, links={name: model.links[name] for name in order})
 
 

@@ -62,12 +62,8 @@ class Model:
 
     def carriers(self, link: str) -> list[str]:
         """Names of the movable joints between the root and `link`, from the root on."""
-        found: list[str] = []
-        parents = {joint.child: joint for joint in self.description.joints.values()}
-        while link in parents:
-            found.insert(0, parents[link].name)
-            link = parents[link].parent
-        return [name for name in found if name in self._joints]
+        joints = self.description.carriers(link)
+        return [joint.name for joint in joints if joint.name in self._joints]
 
     def link_state(self, name: str) -> tuple[Pose, Twist]:
         """Returns pose and twist of the frame of link `name`, in world axes."""
@@ -230,5 +226,5 @@ class Model:
 
     def _below(self, link: str) -> list[str]:
         """Names of the joints on the child side of `link`."""
-        below = [j for j in self.description.joints.values() if j.parent == link]
+        below = self.description.joints_by_parent()[link]
         return [name for joint in below for name in (joint.name, *self._below(joint.child))]

@@ -1,6 +1,5 @@
 """Writes a ModelDescription into MuJoCo's model of the whole world."""
 
-from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -72,9 +71,7 @@ class ModelWriter:
         base = self._add_link(self._spec.worldbody, model.root, pose)
         if not model.fixed_base:
             self._elements.free = base.add_freejoint()
-        below = defaultdict(list)
-        for joint in model.joints.values():
-            below[joint.parent].append(joint)
+        below = model.joints_by_parent()
         for link, where in model.islands.items():
             self._add_link(base, link, where)
         order = [model.root, *model.islands]

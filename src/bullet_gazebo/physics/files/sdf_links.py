@@ -12,6 +12,7 @@ from bullet_gazebo.physics.files.elements import (
     numbers,
     positive,
     shown,
+    truth,
 )
 from bullet_gazebo.physics.files.meshes import Submesh
 from bullet_gazebo.physics.files.reading import MeshFile, MeshFinder, Reading
@@ -148,7 +149,7 @@ def _submesh(mesh: Element) -> Submesh | None:
     name = (mesh.findtext("submesh/name") or "").strip()
     if name in ("", NO_NAME):
         return None
-    return Submesh(name, (mesh.findtext("submesh/center") or "").strip().lower() in ("1", "true"))
+    return Submesh(name, truth(mesh.findtext("submesh/center")))
 
 
 def _friction(collision: Element, where: str) -> float:

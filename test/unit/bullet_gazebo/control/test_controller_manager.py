@@ -127,15 +127,6 @@ def test_unload(manager):
     assert [entry.name for entry in manager.listed()] == ["states", "cart2", "pole", "cart"]
 
 
-def test_a_stopped_controller_leaves_its_last_command(manager):
-    manager.switch(["cart"], [], STRICT)
-    manager.get("cart").command(0.5)
-    manager.update(1, 0.001)
-    manager.switch([], ["cart"], STRICT)
-    manager.update(2, 0.001)
-    assert manager.hardware.joints["stand_cart"].command == 0.5
-
-
 def test_moved_joints_relatch_running_controllers(manager):
     manager.switch(["cart"], [], STRICT)
     joint, cart = manager.hardware.joints["stand_cart"], manager.get("cart")
