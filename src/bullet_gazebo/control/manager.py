@@ -217,7 +217,7 @@ class ControllerManager:
 def _check_made(controller: object, name: str, hardware: RobotHardware) -> None:
     """Refuses a user's controller that would break list_controllers or the check for conflicts."""
     if not isinstance(controller, Controller):
-        raise ControlError(f"create() returned {controller!r}, which is no controller")
+        raise ControlError(f"create() returned {controller!r}, which isn't a controller")
     if controller.name != name:
         raise ControlError(
             f"it calls itself {controller.name!r}: __init__ must get create()'s name"
@@ -229,7 +229,7 @@ def _check_made(controller: object, name: str, hardware: RobotHardware) -> None:
         name in hardware.joints for name in claimed
     ):
         raise ControlError(
-            f"it claims {claimed!r}, which is no tuple of names of controlled joints "
+            f"it claims {claimed!r}, which isn't a tuple of names of controlled joints "
             f"({', '.join(hardware.joints) or 'there are none'})"
         )
 

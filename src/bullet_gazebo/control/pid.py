@@ -72,7 +72,7 @@ class Pid:
     """Gains, and the state that they act on: one instance for each controlled joint.
 
     If `publish_state` is set, a ROS adapter sets `sink`, which takes a report of each computation, and
-    `listeners`, which returns the number of subscribers: there is no report for nobody.
+    `listeners`, which returns the number of subscribers: without any there is no report.
     """
 
     __slots__ = ("d_error", "gains", "i_error", "last_error", "listeners", "output", "p_error",

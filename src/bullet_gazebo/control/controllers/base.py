@@ -19,7 +19,7 @@ class Output:
     adapters convert: JointState, JointControllerState, ...
 
     `sink` takes the records, once a ROS adapter has set it. `listeners` returns the number of subscribers,
-    so that no record needs to be made for nobody.
+    so that a controller needs to make no record without any.
     """
 
     __slots__ = ("kind", "listeners", "shared", "sink", "topic")

@@ -76,23 +76,11 @@ class BulletBody(Body):
         self._weightless = weightless
         self._description = description
         self._offsets = offsets
-        joints = {name: i for i, name in enumerate(self._engine_joints())}
-        self.joint_names = tuple(
-            name for name, joint in description.joints.items() if joint.movable and name in joints
-        )
-        self._indices = [joints[name] for name in self.joint_names]
-        self._links = {description.root: BASE} | {
-            joint.child: joints[name] for name, joint in description.joints.items()
-        }
-        self.link_names = tuple(
-            name
-            for name, link in description.links.items()
-            if name in self._links and not link.part_of
-        )
+        self._fixed = description.fixed_base
+        self._map_names()
         self.touching = {
             index: _touching(description.links[name]) for name, index in self._links.items()
         }
-        self._fixed = description.fixed_base
         dynamics = pybullet.getDynamicsInfo(body, BASE, client)
         self._check_meshes()
         self._com = Pose(dynamics[3], dynamics[4])  # the engine turns it onto the principal axes
@@ -112,6 +100,23 @@ class BulletBody(Body):
         self._base = pose.compose(self._com)  # where the centre of mass was put last
         if not is_plane(description):
             self.reset_base(pose)
+
+    def _map_names(self) -> None:
+        """Finds PyBullet's indices of joints and links."""
+        description = self._description
+        joints = {name: i for i, name in enumerate(self._engine_joints())}
+        self.joint_names = tuple(
+            name for name, joint in description.joints.items() if joint.movable and name in joints
+        )
+        self._indices = [joints[name] for name in self.joint_names]
+        self._links = {description.root: BASE} | {
+            joint.child: joints[name] for name, joint in description.joints.items()
+        }
+        self.link_names = tuple(
+            name
+            for name, link in description.links.items()
+            if name in self._links and not link.part_of
+        )
 
     def forget_contacts(self) -> None:
         """Makes PyBullet drop the points and forces of contacts, which it keeps even if bodies are placed.

@@ -88,15 +88,24 @@ class BulletClient:
             flags |= (
                 pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
             )
+        body = self._load_files(engine_form, pose, flags)
+        try:
+            made = BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
+        except DescriptionError:
+            self.remove(body)
+            raise
+        return self._keep(made)
+
+    def _load_files(self, model: ModelDescription, pose: Pose, flags: int) -> int:
+        """Loads a model in the engine's form by way of files; returns PyBullet's number of the body."""
         try:
             with scratch_folder() as folder:
                 path = folder / "model.urdf"
-                text = write_urdf(parents_first(engine_form), folder)
-                path.write_text(text, encoding="utf-8")
+                path.write_text(write_urdf(parents_first(model), folder), encoding="utf-8")
                 size = _size(folder)
                 with _decimal_points():
-                    body = pybullet.loadURDF(
-                        str(path), pose.position, pose.orientation, useFixedBase=description.fixed_base,
+                    body: int = pybullet.loadURDF(
+                        str(path), pose.position, pose.orientation, useFixedBase=model.fixed_base,
                         flags=flags, physicsClientId=self._client,
                     )  # fmt: skip
         except pybullet.error as error:
@@ -107,12 +116,7 @@ class BulletClient:
                 f"the physics engine's files can't be written: {error.strerror or error}"
             ) from error
         self._sizes[body] = size
-        try:
-            made = BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
-        except DescriptionError:
-            self.remove(body)
-            raise
-        return self._keep(made)
+        return body
 
     def _load_plane(self, description: ModelDescription, pose: Pose) -> BulletBody:
         shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)

@@ -46,9 +46,7 @@ class Resources:
         Raises:
             DescriptionError: if it isn't found; the text lists where it was looked for.
         """
-        with files_named_by_a_model(
-            f"'{shown(uri)}' is not found"
-        ):  # ~ of somebody with a null character
+        with files_named_by_a_model(f"'{shown(uri)}' is not found"):  # ~ and a null character
             tried = list(self._candidates(unquote(uri.strip()), folder))
         reason = ""
         for path in tried:
@@ -72,7 +70,7 @@ class Resources:
         if scheme == "file":
             path = Path(rest)
             return [path] if path.is_absolute() else [f / path for f in self._relative(folder)]
-        raise DescriptionError(f"'{uri[:200]}': {scheme[:20]}:// is not read here")
+        raise DescriptionError(f"'{uri[:200]}': {scheme[:20]}:// is not supported")
 
     def _relative(self, folder: Path | None) -> list[Path]:
         return [*([] if folder is None else [folder]), *self.media]

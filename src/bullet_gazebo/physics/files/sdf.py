@@ -282,7 +282,7 @@ def sdf_version(root: Element) -> tuple[int, int]:
     version = _version(root.get("version", "1.4"))
     if version is None or version[0] != 1:
         raise DescriptionError(
-            f"<sdf version>: '{shown(root.get('version', ''))}' is no version 1.x"
+            f"<sdf version>: '{shown(root.get('version', ''))}' isn't a version 1.x"
         )
     return version
 

@@ -133,15 +133,8 @@ class ShapeReader:
             pose = pose.compose(Pose(orientation=_onto_normal(solid, where)))
         else:
             positive(size, f"{where}, {solid.tag}")
-        shape = Shape(
-            solid.tag,
-            size,
-            pose,
-            mesh[0],
-            _color(element, where),
-            element.get("name", ""),
-            solid=mesh[1],
-        )
+        color, name = _color(element, where), element.get("name", "")
+        shape = Shape(solid.tag, size, pose, mesh[0], color, name, solid=mesh[1])
         return replace(shape, mu=_friction(element, where)) if collides else shape
 
 

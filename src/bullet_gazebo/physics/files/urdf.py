@@ -82,7 +82,7 @@ def read_joint(element: Element, warnings: list[str]) -> Joint:
     place = f"joint '{name}'"
     kind = element.get("type", "")
     if kind not in KINDS:
-        raise DescriptionError(f"{place}: type '{shown(kind)}' is none of {', '.join(KINDS)}")
+        raise DescriptionError(f"{place}: type '{shown(kind)}' is not one of {', '.join(KINDS)}")
     joint = Joint(
         name=name,
         kind=kind,

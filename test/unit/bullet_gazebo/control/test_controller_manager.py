@@ -269,7 +269,7 @@ def test_claims_that_are_no_joints_are_refused(manager, faults, claimed, monkeyp
         return made
 
     monkeypatch.setattr(Faulty, "create", create)
-    with pytest.raises(ControlError, match="no tuple of names of controlled joints"):
+    with pytest.raises(ControlError, match="isn't a tuple of names of controlled joints"):
         manager.load("faulty", {"type": "test/Faulty"})
     monkeypatch.setattr(Faulty, "create", lambda name, params, hardware: None)
     with pytest.raises(ControlError, match="returned None"):

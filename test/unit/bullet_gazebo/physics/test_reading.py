@@ -215,8 +215,8 @@ def test_files_that_are_none_are_refused_at_once(tmp_path, name, scheme):
 @pytest.mark.parametrize(
     ("uri", "fault"),
     [
-        ("gz://models/box", "gz:// is not read here"),
-        ("https://fuel.gazebosim.org/1.0/m", "https:// is not read here"),
+        ("gz://models/box", "gz:// is not supported"),
+        ("https://fuel.gazebosim.org/1.0/m", "https:// is not supported"),
         ("file:///dev/zero", "it is not a file"),
         ("file:///dev/tty", "it is not a file"),
         ("/proc/self/mem", "it can't be read"),
@@ -234,7 +234,7 @@ def test_uris_that_lead_nowhere(tmp_path, uri, fault):
 
 
 def test_versions_of_any_length_are_versions_or_none(tmp_path):
-    with pytest.raises(DescriptionError, match="no version 1.x"):
+    with pytest.raises(DescriptionError, match="isn't a version 1.x"):
         parse_sdf(f'<sdf version="1.{"9" * 5000}"><model name="m">{LINK}</model></sdf>')
     (tmp_path / "m").mkdir()
     config = f'<model><sdf version="1.{"9" * 5000}">model.sdf</sdf></model>'

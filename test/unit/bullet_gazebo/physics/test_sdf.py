@@ -286,7 +286,7 @@ def test_what_is_not_simulated_is_named():
         ("<!DOCTYPE x [<!ENTITY a 'aa'>]><sdf>&a;</sdf>", "<!DOCTYPE>"),
         ("<a>" * 1000 + "</a>" * 1000, "nested more than 100 deep"),
         ("<robot/>", "root element is <robot>"),
-        ('<sdf version="2.0"/>', "no version 1.x"),
+        ('<sdf version="2.0"/>', "isn't a version 1.x"),
         ('<sdf version="1.6"/>', "there is no <model>"),
         (sdf(), "model 'm': there is no <link>"),
         (sdf(link("a"), link("a")), "link 'a' is there twice"),
