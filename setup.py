@@ -40,7 +40,7 @@ setup(
     package_dir={"": "src"},
     package_data={
         "package_writing": ["parts/*", "template/**/*"],
-        "rl_workbench.tools.pictures": ["page.html"],
+        "rl_workbench.tools": ["page.html"],
     },
     cmdclass={"build_py": BuildWithData},
 )

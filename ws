@@ -1,33 +1,33 @@
 #!/usr/bin/env bash
-# The one entry: makes the workspace ready, then runs a command in it. See ./ws --help.
+# The only entry point: makes the workspace ready, then runs a command in it. See ./ws --help.
 #
-# Each step keeps a stamp, the hash of what it was made from, in .ws/stamp; a step whose hash
-# has not changed is not run again, and a step that failed has no stamp, so the next call resumes.
+# Each step keeps a stamp in .ws/stamp, the hash of its inputs. A step runs again only if its hash has
+# changed. A step that failed leaves no stamp, so the next call resumes there.
 set -euo pipefail
 
-# The sign at the end keeps a line feed at the end of the path, which $() would take away.
+# The dot at the end protects a trailing line feed, which $() would strip.
 CHECKOUT=$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")"; echo .)
 CHECKOUT=${CHECKOUT%$'\n.'}
 CHECKSUM=$(printf '%s' "$CHECKOUT" | cksum)
 CHECKSUM=${CHECKSUM%% *}
 
-# The kernel takes no blanks in the path of a script's interpreter and no more than 127 bytes, rosrun
-# splits paths at blanks, ROS at colons, CMake at semicolons.
+# The kernel allows no blanks and at most 127 bytes in the path of a script's interpreter; rosrun splits
+# paths at blanks, ROS at colons, CMake at semicolons.
 is_plain() {  # path
     local LC_ALL=C
     [[ $1 != *[!A-Za-z0-9_./+@,=~-]* && ${#1} -le 90 ]]
 }
 
-# Such a checkout is used through a link with a plain name.
+# A checkout with such a path is used through a link with a plain name.
 ROOT=$CHECKOUT
 if ! is_plain "$ROOT"; then
     ROOT=/tmp/cartpole-$UID-$CHECKSUM
     for link in /tmp/cartpole-"$UID"-*; do
-        # Of a checkout that is gone, without `ws clean`.
+        # Left behind by a checkout that was removed without `ws clean`.
         if [[ -L $link && ! -e $link ]]; then rm -f -- "$link" 2>/dev/null || true; fi
     done
     [[ -e $ROOT || -L $ROOT ]] || ln -s -- "$CHECKOUT" "$ROOT"
-    # Whoever owns the link could lead it elsewhere later.
+    # Another owner of the link could redirect it later.
     if [[ ! $ROOT -ef $CHECKOUT || $(stat --format %u -- "$ROOT") -ne $UID ]]; then
         echo "ws: $ROOT is in the way of a link to $CHECKOUT; remove it" >&2
         exit 1
@@ -35,7 +35,7 @@ if ! is_plain "$ROOT"; then
 fi
 SYSTEM_PYTHON=/usr/bin/python3  # rospy is Debian's, so is the interpreter, whatever PATH says
 
-# A port of this user and checkout for the master, so that neither two users nor two checkouts meet.
+# The master's port depends on user and checkout, so two of them never share a master.
 DEFAULT_MASTER=http://127.0.0.1:$((20000 + (CHECKSUM + UID) % 10000))
 
 # shellcheck source=tools/ws_place.sh
@@ -51,45 +51,44 @@ source "$ROOT/tools/ws_with.sh"
 # shellcheck source=tools/ws_check.sh
 source "$ROOT/tools/ws_check.sh"
 
-# The markers (pyproject.toml) of what `ws test --fast` leaves out.
+# The markers (pyproject.toml) that `ws test --fast` deselects.
 NOT_FAST="rostest or slow or long or stress or extras"
 
 usage() {
     cat <<END
 usage: ws CMD [ARG...]       make the workspace ready, then run CMD in it
        ws --with FOLDER [--with FOLDER]... CMD [ARG...]
-                             the same, with the catkin packages and Python modules in the user's FOLDERs
+                             the same, with the catkin packages and Python modules in your FOLDERs
        ws test [ARG...]      run all tests; ARGs go to pytest, e.g. -k gazebo
        ws test --fast [ARG...]
-                             run the tests of about a minute, without those through ROS (test/ros),
-                             those that take seconds each (marked slow, long or stress), and
-                             those that need requirements/extras.txt (marked extras)
-       ws check [NAME...]    run the checks, or those named: ${CHECKS[*]}
-       ws shell              an interactive bash in the workspace, with roscd and completion
+                             run the quick tests (about a minute): none over ROS (test/ros), none
+                             marked slow, long or stress, none that need requirements/extras.txt
+       ws check [NAME...]    run all checks, or those named: ${CHECKS[*]}
+       ws shell              open an interactive bash in the workspace, with roscd and completion
        ws extras [CMD...]    install requirements/extras.txt too, then run CMD, if any
        ws rviz [CMD...]      install Debian's RViz too, then run CMD, if any
        ws clean              remove everything that ws made
-       ws --help             this text
+       ws --help             show this text
 
 For example:
        ./ws rosrun cartpole pg_train.py
        ./ws roslaunch gazebo_ros empty_world.launch gui:=false
        ./ws --with ~/my_ws roslaunch my_arm arm.launch
 
-Ready means: the packages of requirements/debian.txt are installed (apt-get, through sudo when
-not root), .ws/venv holds requirements/base.txt, and .ws is a catkin workspace built from this
-package and companions/. What is ready is not made again. Logs are in .ws/log.
+To make the workspace ready, ws installs the packages of requirements/debian.txt (apt-get, through
+sudo unless you are root), installs requirements/base.txt into .ws/venv, and builds the catkin
+workspace .ws from this package and companions/. It does each step once; logs are in .ws/log.
 Apart from Debian's packages everything lies in $CHECKOUT/.ws.
-Where that can't be written, it lies in ~/.cache/cartpole; CARTPOLE_WS_DIR names another folder.
+If that can't be written, ws uses ~/.cache/cartpole; CARTPOLE_WS_DIR names another folder.
 
-ROS talks over loopback only, to a master on a port of this user and checkout: $DEFAULT_MASTER
-Set ROS_MASTER_URI, ROS_IP or ROS_HOSTNAME to use another master or network.
-FOLDERs may also stand in CARTPOLE_WITH, with colons between them; folders on ROS_PACKAGE_PATH are
-such as well. What CMake has to make of packages in them, such as messages, is built in .ws/with.
-Catkin workspaces that the caller has sourced are used as they were built. Packages of the caller go
-before this checkout's of the same name, all but cartpole and bullet_gazebo_msgs. All else of
-PYTHONPATH and CMAKE_PREFIX_PATH, a whole ROS, ROS_NAMESPACE, conda and virtual environments are left
-out.
+ROS uses loopback only, and a master on a port of this user and checkout: $DEFAULT_MASTER
+To use another master or network, set ROS_MASTER_URI, ROS_IP or ROS_HOSTNAME.
+
+CARTPOLE_WITH (with colons) and ROS_PACKAGE_PATH may name FOLDERs, too. ws builds what CMake has to
+make of their packages, such as messages, in .ws/with; it uses sourced catkin workspaces as they
+were built. Your packages win over this checkout's of the same name, except cartpole and
+bullet_gazebo_msgs. ws ignores the rest of PYTHONPATH and CMAKE_PREFIX_PATH, a whole ROS,
+ROS_NAMESPACE, conda and virtual environments.
 END
 }
 
@@ -98,9 +97,8 @@ run_tests() {  # [--fast] [ARG...]
     for argument in "$@"; do
         if [[ $argument == --fast ]]; then fast=yes; else arguments+=("$argument"); fi
     done
-    # More processes than the two cores that are meant: those through ROS wait a quarter of their time.
-    # What a file's tests share is made once, so a file stays in one process. In the order of
-    # collection, so that the long ones, those through ROS, begin first.
+    # Three processes for two cores, because tests over ROS wait a quarter of their time. Each file stays
+    # in one process, which makes its fixtures once. Without reordering, the long tests over ROS start first.
     [[ ${#arguments[@]} -gt 0 ]] ||
         arguments=(--numprocesses 3 --dist loadfile --no-loadscope-reorder)
     [[ -z $fast ]] || arguments=(-m "not ($NOT_FAST)" "${arguments[@]}")
@@ -113,7 +111,7 @@ interactive_shell() {
     exec bash --rcfile "$ROOT/tools/ws_shell.sh" -i
 }
 
-# What a user who has just made the workspace ready may want to know.
+# What to do next, once the workspace is ready.
 next_thing() {
     case ${COMMAND%% *} in
         true | extras | rviz | :) echo ". Next: ./ws rosrun cartpole pg_train.py, or ./ws --help" ;;
@@ -124,7 +122,7 @@ next_thing() {
 clean() {
     if [[ -d $WS ]]; then
         hold_lock
-        # The folder of the lock goes last, so that nobody builds in a half-removed one.
+        # Remove the lock last, so that nobody builds in a half-removed folder.
         find "$WS" -mindepth 1 -maxdepth 1 ! -name lock -exec rm -rf -- {} +
         rm -rf -- "$WS"
     fi
@@ -151,7 +149,11 @@ main() {
     COMMAND=$*
     local steps=(debian venv companions build)
     case $1 in
-        test | check) steps=(debian venv test_tools companions build) ;;
+        test)
+            steps=(debian venv test_tools companions build)
+            [[ " $* " == *" --fast "* ]] || steps+=(extras)
+            ;;
+        check) steps=(debian venv test_tools companions build) ;;
         extras) steps=(debian venv extras companions build) ;;
         rviz) steps=(debian rviz venv companions build) ;;
     esac
@@ -168,11 +170,11 @@ main() {
 }
 
 run() {
-    # Of itself it takes port 11311, where nobody else in this workspace looks for a master.
+    # roscore would take port 11311, where nothing in this workspace looks for a master.
     if [[ $1 == roscore && $ROS_MASTER_URI =~ :([0-9]+)/?$ ]]; then
         set -- roscore -p "${BASH_REMATCH[1]}" "${@:2}"
     fi
-    # exec, so that CMD gets the signals and its exit code is ours.
+    # exec, so that CMD gets the signals and ws ends with its exit code.
     if ! type -P -- "$1" >/dev/null; then
         echo "ws: no such command: $1" >&2
         return 127

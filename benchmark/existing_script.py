@@ -26,9 +26,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rl_workbench.plotting.curves import learning_curve
-from rl_workbench.plotting.figure import as_png
-from rl_workbench.training.run.files import write_file
+from rl_workbench.plotting import as_png, learning_curve
+from rl_workbench.storage import write_file
 
 ROOT = Path(__file__).resolve().parent.parent
 SCRIPT = ROOT.parent / "shared" / "pg_script" / "launch_robot_test.py"

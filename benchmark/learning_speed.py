@@ -18,10 +18,10 @@ import reporting
 import torch
 from stable_baselines3 import DQN
 
+from rl_workbench.starting import Interrupt
 from rl_workbench.training.algorithms import algorithm
-from rl_workbench.training.options.training_options import choose
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.training import Training
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.training import Training
 
 ENV_ID = "CartPole-v1"
 # What both know, by our names; the first is the tutorial's, the second the tuned one's.

@@ -19,10 +19,10 @@ from typing import NamedTuple
 import reporting
 
 import cartpole  # noqa: F401 - registers the environments
+from rl_workbench.starting import Interrupt
 from rl_workbench.training.algorithms import algorithm
-from rl_workbench.training.options.training_options import choose
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.training import Training
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.training import Training
 
 FLAGS = ["--env-id=cartpole/Balance-v0", "--train-env-kwargs=backend=ros-own", "--stop-at-length=0",
          "--eval-env-kwargs=backend=bullet", "--eval-episodes=1", "--episodes=0"]  # fmt: skip

@@ -18,7 +18,7 @@ import gymnasium
 import reporting
 
 import cartpole  # noqa: F401 - registers the environments
-from robot_envs.backends.side_by_side import side_by_side
+from robot_envs.backends.backend import side_by_side
 
 MEGA = 1e6
 

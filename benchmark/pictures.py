@@ -14,7 +14,7 @@ import reporting
 
 from cartpole.environment import CAMERA
 from cartpole.robot import CART_JOINT, POLE_JOINT, ROBOT
-from robot_envs.pictures.picture import RobotPicture
+from robot_envs.pictures.drawn import RobotPicture
 
 SIZES = ((320, 240), (640, 320), (640, 480))
 

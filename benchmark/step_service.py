@@ -24,9 +24,8 @@ from std_srvs.srv import Empty
 from cartpole.environment import CartPoleEnv
 from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
-from robot_envs.backends.ros.bringup.objects import Objects
 from robot_envs.backends.ros.lockstep import LockstepWorld
-from robot_envs.backends.ros.turn import Turn
+from robot_envs.backends.ros.shared_world import SharedWorld
 from robot_envs.scene import Scene
 from ros_utils.simulation import Simulation
 from ros_utils.step_client import StepClient
@@ -68,7 +67,7 @@ def environment_rate(count: int, rounds: int) -> float:
     """Environment steps a second, resets included."""
     with Simulation(lockstep=True) as simulation, simulation.active():
         add_cartpole()
-        env = CartPoleEnv(BalanceTask(), LockstepWorld(Scene([ROBOT]), TICKS, Turn(Objects())))
+        env = CartPoleEnv(BalanceTask(), LockstepWorld(Scene([ROBOT]), TICKS, SharedWorld()))
         env.reset(seed=0)
 
         def step(index: int) -> None:

@@ -11,5 +11,5 @@ if __name__ == "__main__":
 
         require(ALL)
         from cartpole.robot import ROBOT
-        from robot_envs.backends.ros.bringup.robots import spawn_command
+        from robot_envs.backends.ros.bringup import spawn_command
     sys.exit(spawn_command(ROBOT, sys.argv[1:]))

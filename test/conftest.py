@@ -1,11 +1,10 @@
-"""What all tests share: rostest files as test items, progress, and the extras that a test asks for."""
+"""What all tests share: rostest files as test items, fixtures, and skips where an extra is missing."""
 
 from __future__ import annotations
 
 import importlib.util
 import os
 import signal
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.plugins import progress_plugin, stress_plugin
+from support.plugins import stress_plugin
 from support.plugins.rostest_plugin import pytest_collect_file
 from support.plugins.stress_plugin import (
     pytest_addoption,
@@ -36,11 +35,11 @@ collect_ignore_glob = ["ros/**/*.py"]
 ROOT = Path(__file__).resolve().parent.parent
 
 
-# Networks this small only lose by more threads: on a busy machine a test of seconds takes a minute.
+# Such small networks only lose by more threads: on a busy machine seconds become a minute.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# Under nohup a closed terminal is ignored, and in a script's background Ctrl-C, by whatever a test starts,
-# too; the tests are as from a terminal.
+# nohup ignores SIGHUP and a script's background job SIGINT, and so would whatever a test starts.
+# Run the tests as if from a terminal.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -50,7 +49,7 @@ ENGINES = ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
 
 @pytest.fixture
 def other_master() -> Iterator[Any]:
-    """What answers as a ROS master does, and as a node, without ROS's servers: a `FakeMaster`."""
+    """A `FakeMaster`: answers as a ROS master and as a node, without ROS's servers."""
     from support.ros.ros_fakes import FakeMaster
 
     fake = FakeMaster()
@@ -60,7 +59,7 @@ def other_master() -> Iterator[Any]:
 
 @pytest.fixture
 def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    """Another one, which is this process's."""
+    """A `FakeMaster` that ROS_MASTER_URI names."""
     from support.ros.ros_fakes import FakeMaster
 
     fake = FakeMaster()
@@ -71,7 +70,7 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 
 @pytest.fixture(params=ENGINES)
 def new_engine(request: pytest.FixtureRequest) -> Callable:
-    """Makes a physics engine; a test that asks for it runs with each of them."""
+    """Make a physics engine; a test with this fixture runs once for each of them."""
     from bullet_gazebo.physics.engines import make_engine
 
     return partial(make_engine, request.param)
@@ -79,7 +78,7 @@ def new_engine(request: pytest.FixtureRequest) -> Callable:
 
 @pytest.fixture
 def signals() -> Iterator[None]:
-    """Gives signals back after a command that takes them over, as if in a process of its own."""
+    """Restore the signal handlers after a command that replaces them."""
     taken = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
     before = {number: signal.getsignal(number) for number in taken}
     yield
@@ -89,7 +88,7 @@ def signals() -> Iterator[None]:
 
 @pytest.fixture
 def server() -> Iterator[Any]:
-    """A page of viser's, an empty one."""
+    """An empty viser page."""
     import viser  # most tests have none
 
     server = viser.ViserServer("127.0.0.1", 0, verbose=False)
@@ -104,23 +103,21 @@ def root() -> Path:
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Install the extra packages once a selected test needs them; ws says so on stderr."""
-    wanted = [name for marker in item.iter_markers("extras") for name in marker.args]
-    if all(importlib.util.find_spec(name) for name in wanted):
-        return
-    subprocess.run([ROOT / "ws", "extras"], check=True)
-    importlib.invalidate_caches()
+    """Skip a test whose extra packages are missing; `ws test` installs them, but for --fast."""
+    wanted = {name for marker in item.iter_markers("extras") for name in marker.args}
+    missing = sorted(name for name in wanted if importlib.util.find_spec(name) is None)
+    if missing:
+        pytest.skip(f"{', '.join(missing)} missing: ./ws extras installs requirements/extras.txt")
 
 
 def pytest_runtest_teardown(item: pytest.Item) -> None:
-    """A test that makes its process a node changes what all later ones see: it takes another one."""
+    """A test that makes this process a ROS node would change what all later tests see."""
     core = sys.modules.get("rospy.core")
     assert core is None or not core.is_initialized(), f"{item.nodeid} made this process a node"
 
 
 @pytest.hookimpl(trylast=True)  # the reporter has to be there
 def pytest_configure(config: pytest.Config) -> None:
-    progress_plugin.pytest_configure(config)
     stress_plugin.prepare(config)
 
 

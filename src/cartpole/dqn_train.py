@@ -2,10 +2,9 @@
 
 import sys
 
-from cartpole.ros_options import ros_options
-from cartpole.workbench import PROGRAM
+from cartpole.workbench import PROGRAM, ros_options
 from rl_workbench.starting import ended_by_ctrl_c
-from rl_workbench.training import cli
+from rl_workbench.training import train as cli
 from robot_envs.errors import RobotEnvError
 
 NODE = "dqn_train"

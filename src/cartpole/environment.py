@@ -1,19 +1,24 @@
-"""The cart-pole's environments and their manual page, the docstring of `CartPoleEnv`."""
+"""The cart-pole's environments: their manual page, the docstring of `CartPoleEnv`, and how they are made."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from cartpole.robot import CART_JOINT, POLE_JOINT, ROBOT
-from cartpole.tasks import CartPoleTask
+from cartpole.robot import CART_JOINT, CART_LINK, POLE_JOINT, POLE_LINK, ROBOT
+from cartpole.tasks import TASKS, CartPoleTask
 from robot_envs.backends.backend import RobotBackend
 from robot_envs.environment import RobotEnv
-from robot_envs.pictures.drawn import Viewer
-from robot_envs.pictures.picture import Camera
+from robot_envs.making import check_options
+from robot_envs.pictures.drawn import Camera
+from robot_envs.variation import LinkScale, Variation
+from robot_envs.vector import RobotVectorEnv
 
 CAMERA = Camera(target=(0.0, 0.0, 0.19), distance=1.65, yaw=14.0, pitch=-9.0)
-WINDOW_CAMERA = (1.3, 0.0, -5.0, (0.0, 0.0, 0.2))  # [m], yaw and pitch [degrees], looks at [m]
+MOST_CHANGE = 0.9  # of a mass or length, either way
+MOST_CART_FRICTION = 20.0  # [N s/m]; far more would be too stiff for the physics step
+MOST_POLE_FRICTION = 0.5  # [N m s/rad]
 
 
 class CartPoleEnv(RobotEnv):
@@ -61,34 +66,34 @@ class CartPoleEnv(RobotEnv):
     ## Arguments of `gymnasium.make`
     | name             | default    | meaning                                                  |
     |------------------|------------|----------------------------------------------------------|
-    | `backend`        | `"bullet"` | the robot: in this process, ...                          |
+    | `backend`        | `"bullet"` | in this process, ...                                     |
     |                  | `"mujoco"` | ... on MuJoCo instead of PyBullet (`./ws extras`), ...     |
-    |                  | `"ros"`    | ... over ROS in lock-step, with the bits of `"bullet"`, ... |
+    |                  | `"ros"`    | ... over ROS in lock-step, bit-identical to `"bullet"`, ... |
     |                  | `"ros-own"` | ... the same in a simulator of its own, ...               |
     |                  | `"ros-realtime"` | ... or over ROS in real time, by Gazebo's own services alone |
     | `control_period` | 0.008      | simulated time of an action [s], whole physics steps;    |
     |                  |            | 0 in real time: the newest joint state, without waiting  |
-    | `deadline`       | 5, 30      | wall time of a simulator's answer over ROS in lock-step [s] |
+    | `deadline`       | 5, 30      | wall time for a simulator's answer over ROS in lock-step [s] |
     | `noise`          | the task's | of the starting state                                    |
     | `max_steps`      | the task's | length at which an episode is cut off                    |
     | `sensor_noise`   | 0          | standard deviation; one or four numbers, in the state's units |
     | `sensor_delay`   | 0          | age of an observation [control steps]                    |
     | `encoder_step`, `action_delay`, `actuator_limit`, `actuator_lag` | none | see docs/sim_to_real.md |
     | `randomisation`  | none       | a dict of `mass`, `length`, `cart_friction`, `pole_friction`, see |
-    |                  |            | `cartpole.variation.Randomisation`; each episode gets its own |
-    |                  |            | robot, which stands in the reset's `info["variation"]`;  |
+    |                  |            | `CartPoleRandomisation`; each episode gets its own robot, |
+    |                  |            | which the reset's `info["variation"]` reports;           |
     |                  |            | or of the options in docs/sim_to_real.md                 |
-    | `render_mode`    | none       | `"rgb_array"`: pictures, (height, width, 3); `"human"`: a window |
+    | `render_mode`    | none       | `"rgb_array"`: pictures, (height, width, 3); `"human"`: a page |
     | `width`, `height` | 640, 320  | of the pictures [pixels]                                  |
 
     Args:
         task: what is to be learned.
-        backend: see above, or one that is made already; the environment closes it.
+        backend: see above, or a backend, which the environment closes.
         sensor_noise: see above.
         options: the others of the table, as `RobotEnv` has them.
 
     Raises:
-        RobotEnvError: if the robot can't be brought up; for a window where there is no display.
+        RobotEnvError: if the robot can't be brought up.
         ValueError: for an option that makes no sense.
     """
 
@@ -100,19 +105,12 @@ class CartPoleEnv(RobotEnv):
         sensor_noise: float | Sequence[float] | np.ndarray | Mapping[str, Any] = 0.0,
         **options: Any,
     ) -> None:
-        super().__init__(
-            ROBOT,
-            task,
-            backend,
-            sensor_noise=_by_joint(sensor_noise),
-            camera=CAMERA,
-            window=_open_window,
-            **options,
-        )
+        noise = _by_joint(sensor_noise)
+        super().__init__(ROBOT, task, backend, sensor_noise=noise, camera=CAMERA, **options)
 
 
 def _by_joint(noise: float | Sequence[float] | np.ndarray | Mapping[str, Any]) -> Any:
-    """Noise as `CartPoleState` has its numbers, by the name of the joint."""
+    """Noise in the order of `CartPoleState`, by the name of the joint."""
     if isinstance(noise, Mapping):
         return noise
     sizes = np.ravel(noise).tolist() * (1 if np.ndim(noise) else 4)
@@ -121,7 +119,110 @@ def _by_joint(noise: float | Sequence[float] | np.ndarray | Mapping[str, Any]) -
     return {CART_JOINT: tuple(sizes[:2]), POLE_JOINT: tuple(sizes[2:])}
 
 
-def _open_window(period: float) -> Viewer:
-    from robot_envs.pictures.window import Window  # loads PyBullet, which nothing over ROS needs
+class CartPoleVariation(NamedTuple):
+    """Factors of the nominal robot's properties, and viscous friction of its joints."""
 
-    return Window(ROBOT, period, WINDOW_CAMERA)
+    cart_mass: float = 1.0
+    pole_mass: float = 1.0
+    pole_length: float = 1.0  # along z of its link, from the hinge
+    cart_friction: float = 0.0  # [N s/m]
+    pole_friction: float = 0.0  # [N m s/rad]
+
+    def of_robot(self) -> Variation:
+        """The same, by names of links and joints."""
+        return Variation(
+            {
+                CART_LINK: LinkScale(self.cart_mass),
+                POLE_LINK: LinkScale(self.pole_mass, self.pole_length),
+            },
+            damping={CART_JOINT: self.cart_friction, POLE_JOINT: self.pole_friction},
+        )
+
+
+@dataclass(frozen=True)
+class CartPoleRandomisation:
+    """The ranges from which a `CartPoleVariation` is drawn for each episode, uniformly.
+
+    Args:
+        mass: half-width of the factor on each mass, e.g. 0.2 for 0.8 to 1.2.
+        length: half-width of the factor on the pole's length.
+        cart_friction: largest viscous friction between cart and rail [N s/m].
+        pole_friction: largest viscous friction in the hinge [N m s/rad].
+
+    Raises:
+        ValueError: if one of them is negative or too large.
+    """
+
+    mass: float = 0.0
+    length: float = 0.0
+    cart_friction: float = 0.0
+    pole_friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, most in (
+            ("mass", MOST_CHANGE),
+            ("length", MOST_CHANGE),
+            ("cart_friction", MOST_CART_FRICTION),
+            ("pole_friction", MOST_POLE_FRICTION),
+        ):
+            value = getattr(self, name)
+            if not 0.0 <= value <= most:
+                raise ValueError(f"randomisation of {name} must lie in [0, {most}], not {value}")
+
+    def draw(self, rng: np.random.Generator) -> tuple[Variation, np.ndarray]:
+        """Draws one robot; the array, (5,), is its `CartPoleVariation`.
+
+        Always draws five numbers, so that later draws don't depend on what is varied.
+        """
+        cart, pole, length, rail, hinge = (float(value) for value in rng.random(5))
+        drawn = CartPoleVariation(
+            1.0 + self.mass * (2.0 * cart - 1.0),
+            1.0 + self.mass * (2.0 * pole - 1.0),
+            1.0 + self.length * (2.0 * length - 1.0),
+            self.cart_friction * rail,
+            self.pole_friction * hinge,
+        )
+        return drawn.of_robot(), np.array(drawn)
+
+
+def make_environment(
+    task: str,
+    backend: str | None = None,
+    *,
+    noise: float | None = None,
+    randomisation: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> CartPoleEnv:
+    """Makes an environment for Gymnasium; `CartPoleEnv` explains the options.
+
+    Raises:
+        ValueError: if an option makes no sense.
+        RobotEnvError: if the robot can't be brought up.
+    """
+    check_options(options, ("noise",))
+    varied: CartPoleRandomisation | Mapping[str, Any] | None = randomisation
+    own = {each.name for each in fields(CartPoleRandomisation)}
+    if randomisation and set(randomisation) <= own:
+        varied = CartPoleRandomisation(**randomisation)
+    return CartPoleEnv(make_task(task, noise), backend, randomisation=varied, **options)
+
+
+def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
+    """Makes a vector of environments for Gymnasium; see `RobotVectorEnv`.
+
+    Raises:
+        ValueError: if an option makes no sense.
+        RobotEnvError: if a robot can't be brought up.
+    """
+    return RobotVectorEnv(num_envs, make_environment, **options)
+
+
+def make_task(name: str, noise: float | None = None) -> CartPoleTask:
+    """Makes a task; None stands for its default noise.
+
+    Raises:
+        ValueError: if there is no such task, or the noise makes no sense.
+    """
+    if name not in TASKS:
+        raise ValueError(f"there is no task {name!r}; there are {', '.join(TASKS)}")
+    return TASKS[name]() if noise is None else TASKS[name](noise=noise)  # type: ignore[call-arg]

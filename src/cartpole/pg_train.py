@@ -8,19 +8,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from cartpole.registration import NAMESPACE
-from cartpole.ros_options import ros_options
-from cartpole.workbench import PROGRAM
+from cartpole import NAMESPACE
+from cartpole.workbench import PROGRAM, ros_options
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.option import check_options, option
-from rl_workbench.output import reader_may_go
-from rl_workbench.training.cli import choose_training, shown, train
-from rl_workbench.training.options.command_line import USAGE, flag
-from rl_workbench.training.options.options import Options
-from rl_workbench.training.options.training_options import TrainingOptions
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.progress import tell
-from robot_envs.backends.choice import has_ros, need_ros
+from rl_workbench.option import Options, check_options, option
+from rl_workbench.starting import Interrupt, reader_may_go
+from rl_workbench.training.command_line import USAGE, choose_training, flag
+from rl_workbench.training.options import TrainingOptions
+from rl_workbench.training.progress import tell
+from rl_workbench.training.train import shown, train
+from robot_envs.backends import has_ros, need_ros
 from robot_envs.errors import RobotEnvError
 
 NODE = "pg_train"

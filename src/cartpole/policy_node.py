@@ -11,18 +11,15 @@ from typing import Any, NamedTuple
 import gymnasium
 from gymnasium import spaces
 
-from cartpole.ros_options import ros_options
-from rl_workbench.errors import WorkbenchError
-from rl_workbench.output import reader_may_go
-from rl_workbench.tools.commands.shared import env_options, number
-from rl_workbench.tools.runs.exported import described, open_exported
-from rl_workbench.tools.runs.policies import WHICH, load_learned
-from rl_workbench.tools.runs.runs import open_run
-from rl_workbench.training.environments.answers import as_float32
-from rl_workbench.training.environments.checked import told
-from rl_workbench.training.environments.making import make_environment
-from rl_workbench.training.run.interrupt import Interrupt
-from robot_envs.backends.choice import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
+from cartpole.workbench import ros_options
+from rl_workbench.errors import WorkbenchError, error_line
+from rl_workbench.starting import Interrupt, reader_may_go
+from rl_workbench.tools.flags import WHICH, env_options, number
+from rl_workbench.tools.policies import load_learned
+from rl_workbench.tools.runs import open_run
+from rl_workbench.tools.torchscript import described, open_exported
+from rl_workbench.training.environments import as_float32, make_environment
+from robot_envs.backends import IN_PROCESS, LOCKSTEP, REALTIME, need_ros
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
@@ -62,7 +59,7 @@ def main(argv: list[str] | None = None) -> int:
         arguments = parse(flags, parameters)
         need_ros("it")
         with interrupt.reading():
-            from robot_envs.backends.deployment.policy_node import PolicyNode, run_node
+            from robot_envs.deployment.policy_node import PolicyNode, run_node
 
             robot, task, act, period = load(
                 arguments.run, arguments.checkpoint, env_options(arguments)
@@ -93,7 +90,9 @@ def _told_in_one_line() -> Iterator[None]:
     except RobotEnvError:
         raise
     except Exception as error:
-        raise RobotEnvError(f"the robot is stopped, the task failed: {told(error)}") from error
+        raise RobotEnvError(
+            f"the robot is stopped, the task failed: {error_line(error)}"
+        ) from error
 
 
 def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:

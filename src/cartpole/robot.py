@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from robot_envs.description.files import own_file
+from robot_envs.files import own_file
 from robot_envs.robot import Robot
 
 CONTROL_PERIOD = 0.008  # [s] of simulated time for each action

@@ -1,13 +1,18 @@
 """The command workbench.py: rl_workbench's command line, with all environments of this project."""
 
+import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import robot_envs.robots  # noqa: F401 - registers its environments, as importing cartpole does its own
 from rl_workbench import cli
 from rl_workbench.starting import program
+from robot_envs.backends import need_ros
+from robot_envs.errors import RobotEnvError
 
 PROGRAM = program("cartpole.workbench")  # knows the same environments
+REMAPPING = ":="  # in every argument of ROS's: __name:=pg_train, _gamma:=0.9, old:=new
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -15,6 +20,41 @@ def main(argv: list[str] | None = None) -> int:
     argv = sys.argv[1:] if argv is None else argv
     plain = [each for each in argv if not (each.startswith("__") and ":=" in each)]  # roslaunch's
     return cli.main(plain, Path(sys.argv[0]).name, PROGRAM)
+
+
+def ros_options(argv: list[str], default_name: str) -> tuple[list[str], dict[str, Any], str]:
+    """Splits a command's arguments into its own and ROS's.
+
+    Without an argument in ROS's form nothing of ROS is imported, and no master is asked; roslaunch always
+    passes `__name:=`.
+
+    Args:
+        argv: the arguments, without the command itself.
+        default_name: of the node, if ROS gives it no other one.
+
+    Returns:
+        The command's own flags; its private parameters, where those of the command line override those of the
+        master; the node's full name.
+
+    Raises:
+        RobotEnvError: if ROS isn't installed, a private parameter isn't YAML, or the master doesn't answer a
+            node that roslaunch started.
+    """
+    if not any(REMAPPING in argument for argument in argv):
+        namespace = os.environ.get("ROS_NAMESPACE", "").strip("/")
+        return list(argv), {}, "/".join(["", *filter(None, [namespace, default_name])])
+    need_ros(f"an argument with {REMAPPING}")
+    from robot_envs.backends.ros import node
+
+    name = node.full_name(argv, default_name)
+    own = node.command_line_parameters(argv)
+    try:
+        of_master = node.private_parameters(name)
+    except RobotEnvError:
+        if any(argument.startswith("__name:=") for argument in argv):
+            raise
+        of_master = {}  # started by hand, perhaps for an environment that needs no master
+    return node.plain_arguments(argv), {**of_master, **own}, name
 
 
 if __name__ == "__main__":

@@ -17,8 +17,7 @@ from package_writing.errors import CannotWrite
 from package_writing.ground import height_told, standing_height
 from package_writing.survey import Survey, look_at, root_link
 from package_writing.urdf_files import Copied, copy_urdf, expanded
-from robot_envs import Robot, RobotEnvError
-from robot_envs.description import controllers, files
+from robot_envs import Robot, RobotEnvError, controllers, files
 
 TREE = Path(__file__).resolve().parents[2]  # the source tree
 IS_CHECKOUT = (TREE / "ws").is_file()

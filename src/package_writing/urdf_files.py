@@ -10,8 +10,8 @@ from pathlib import Path, PurePath
 
 from files.expansion import CannotExpand, expand, included_files
 from package_writing.errors import CannotWrite
-from robot_envs.description.files import PACKAGE, locate
 from robot_envs.errors import RobotEnvError
+from robot_envs.files import PACKAGE, locate
 
 FOUND = re.compile(r"\$\(find\s+([\w.-]+)\s*\)([^\"'<>]*)")  # $(find PACKAGE)/PLACE
 NAMED = re.compile(r"package://([\w.-]+)/")

@@ -3,13 +3,12 @@
 import argparse
 import sys
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.output import reader_may_go
-from rl_workbench.training import cli as training
-from rl_workbench.training.options.options import unknown
-from rl_workbench.training.run.interrupt import Interrupt
+from rl_workbench.option import unknown
+from rl_workbench.starting import Interrupt, reader_may_go
+from rl_workbench.training import train as training
 
 PROG = "rl-workbench"
 DESCRIPTION = """\
@@ -19,37 +18,21 @@ RUN is a run folder, as runs/CartPole-v1__dqn__0__1700000000. No ROS master is n
 Exit codes: 0 done, 1 failed, 2 wrong arguments; 130 after Ctrl-C."""
 
 
-class _Command(NamedTuple):
-    """A subcommand: the module with its add_flags and run, and a line of help."""
-
-    module: str
-    help: str
-
-
 TRAIN = "train"
+# Each has a module of its name in rl_workbench.tools, with add_flags and run; and a line of help.
 COMMANDS = {
-    "eval": _Command("watching", "greedy episodes of a run: mean, deviation, every episode"),
-    "enjoy": _Command("watching", "watch greedy episodes in a window"),
-    "view": _Command(
-        "viewing", "a page in the browser: curves, and episodes, also while it trains"
-    ),
-    "record": _Command(
-        "watching", "episodes as GIF, MP4 or a page that plays them, without a display"
-    ),
-    "plot": _Command("drawing", "the training curves of runs as PNG"),
-    "export": _Command(
-        "exporting", "a policy as TorchScript, which torch runs without this package"
-    ),
-    "policy": _Command("drawing", "the policy over the pole's angle and velocity as PNG"),
-    "compare": _Command("comparing", "groups of runs: table per seed, IQM, intervals, curves"),
-    TRAIN: _Command("", "train by DQN, REINFORCE or Stable-Baselines3"),
-    "sweep": _Command("searching", "search options with Optuna"),
-    "benchmark": _Command(
-        "benchmarking", "train several seeds, or a suite; table per seed, curves"
-    ),
-    "jobs": _Command("listing", "how the trainings of a benchmark or a sweep are getting on"),
+    "eval": "greedy episodes of a run: mean, deviation, every episode",
+    "enjoy": "watch greedy episodes in a window, or on a page in the browser",
+    "view": "a page in the browser: curves, and episodes, also while it trains",
+    "record": "episodes as GIF, MP4 or a page that plays them; needs no display",
+    "plot": "the training curves of runs as PNG",
+    "export": "a policy as TorchScript, which torch runs without this package",
+    "compare": "groups of runs: table per seed, IQM, intervals, curves",
+    TRAIN: "train with DQN, REINFORCE or Stable-Baselines3",
+    "sweep": "search options with Optuna",
+    "benchmark": "train several seeds, or a suite; table per seed, curves",
+    "jobs": "how the trainings of a benchmark or a sweep are getting on",
 }
-PACKAGE = "rl_workbench.tools.commands"
 
 
 @reader_may_go()
@@ -99,14 +82,12 @@ def parse(argv: list[str], prog: str = PROG) -> argparse.Namespace:
     if named is not None and named not in COMMANDS:
         parser.error(unknown("command", named, list(COMMANDS)))
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, command in COMMANDS.items():
-        own = commands.add_parser(
-            name, help=command.help, description=command.help, allow_abbrev=False
-        )
-        if name == named != TRAIN:  # the others needn't be read
-            _module(name).add_flags(own, name)
+    for name, text in COMMANDS.items():
+        own = commands.add_parser(name, help=text, description=text, allow_abbrev=False)
+        if name == named != TRAIN:  # the others needn't be imported
+            _module(name).add_flags(own)
     return parser.parse_args(argv)
 
 
 def _module(command: str) -> Any:
-    return import_module(f"{PACKAGE}.{COMMANDS[command].module}")
+    return import_module(f"rl_workbench.tools.{command}")

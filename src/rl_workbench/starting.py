@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import select
 import signal
 import sys
 from collections.abc import Iterator
@@ -48,3 +49,87 @@ def search_path() -> str:
     standard = sysconfig.get_path("stdlib")
     found = sys.path.index(standard) if standard in sys.path else len(sys.path)
     return os.pathsep.join(dict.fromkeys(map(os.path.abspath, sys.path[:found])))
+
+
+@contextlib.contextmanager
+def reader_may_go() -> Iterator[None]:
+    """Ends what runs inside without a word once nobody reads, also what is left to write at the end."""
+    try:
+        yield
+        if sys.stdout is not None:  # it may have been closed by >&-
+            sys.stdout.flush()
+    except BrokenPipeError:
+        if not _nobody_reads():  # it was another pipe
+            raise
+    finally:
+        if _nobody_reads():
+            with open(os.devnull, "wb") as nowhere:  # Python flushes it once more
+                os.dup2(nowhere.fileno(), sys.stdout.fileno())
+
+
+def _nobody_reads() -> bool:
+    """Whether standard output is a pipe without a reader."""
+    try:
+        descriptor = sys.stdout.fileno()
+    except (AttributeError, OSError, ValueError):  # closed, or a test's
+        return False
+    looking = select.poll()
+    looking.register(descriptor, 0)
+    return any(events & select.POLLERR for _, events in looking.poll(0))
+
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
+
+
+class Interrupt:
+    """Takes over these signals from `install()` on, until the process ends.
+
+    Before `defer()` a signal raises KeyboardInterrupt, so any wait ends at once. After it, a
+    signal only makes `requested` true: the loop ends at its next step, and saving and
+    cleaning up run to their end however often Ctrl-C is pressed.
+    """
+
+    def __init__(self) -> None:
+        self.signal: int | None = None
+        self._deferred = False
+
+    def install(self) -> "Interrupt":
+        for number in _SIGNALS:
+            # Under nohup a closed terminal is no reason to end.
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+                signal.signal(number, self._handle)
+        return self
+
+    def defer(self) -> None:
+        """From now on signals only set `requested`."""
+        self._deferred = True
+
+    def at_once(self) -> None:
+        """From now on signals raise KeyboardInterrupt again; one that was deferred does so here."""
+        self._deferred = False
+        if self.requested():
+            raise KeyboardInterrupt
+
+    @contextlib.contextmanager
+    def reading(self) -> Iterator[None]:
+        """While modules are imported signals wait: what is interrupted there may be left half done."""
+        self.defer()
+        try:
+            yield
+        finally:
+            self.at_once()
+
+    def requested(self) -> bool:
+        return self.signal is not None
+
+    @property
+    def exit_code(self) -> int:
+        """The shell's convention: 128 + the signal's number, 130 for Ctrl-C; 0 without one."""
+        return 0 if self.signal is None else 128 + self.signal
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        self.signal = number
+        if number == signal.SIGXCPU:  # it comes once a second from now on, also while Python ends
+            signal.signal(number, signal.SIG_IGN)
+        if not self._deferred:
+            raise KeyboardInterrupt

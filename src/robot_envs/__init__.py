@@ -2,26 +2,32 @@
 
     from robot_envs import InitialState, Robot, RobotEnv, Task, register
 
-A `Robot` (robot.py) says what it is made of, a `Task` (task.py) what is to be learned, a backend
-(backends/) moves it, and `RobotEnv` (environment.py) puts them together. Knows no robot by name.
+A `Robot` (robot.py) describes what it is made of, a `Task` (task.py) what is to be learned, a backend
+(backends/) moves it, and `RobotEnv` (environment.py) combines them. `register` gives that a Gymnasium id.
+
+Importing this is cheap; a name's module is imported when the name is first used.
 """
 
-from bullet_gazebo.pictures.camera import Camera
-from robot_envs.environment import RobotEnv
-from robot_envs.errors import RobotEnvError, SimulatorError
-from robot_envs.making import register
-from robot_envs.robot import EMPTY, Robot
-from robot_envs.task import GoalTask, Object, Task
-from robot_envs.world_state import (
-    Commands,
-    InitialState,
-    JointState,
-    LinkQuery,
-    Motion,
-    Pose,
-    StateQuery,
-    WorldState,
-)
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bullet_gazebo.pictures.camera import Camera
+    from robot_envs.environment import RobotEnv
+    from robot_envs.errors import RobotEnvError, SimulatorError
+    from robot_envs.registration import register
+    from robot_envs.robot import EMPTY, Robot
+    from robot_envs.task import GoalTask, Object, Task
+    from robot_envs.world_state import (
+        Commands,
+        InitialState,
+        JointState,
+        LinkQuery,
+        Motion,
+        Pose,
+        StateQuery,
+        WorldState,
+    )
 
 __all__ = [
     "EMPTY",
@@ -43,3 +49,25 @@ __all__ = [
     "WorldState",
     "register",
 ]
+
+_MODULES = {
+    "bullet_gazebo.pictures.camera": ("Camera",),
+    "robot_envs.environment": ("RobotEnv",),
+    "robot_envs.errors": ("RobotEnvError", "SimulatorError"),
+    "robot_envs.registration": ("register",),
+    "robot_envs.robot": ("EMPTY", "Robot"),
+    "robot_envs.task": ("GoalTask", "Object", "Task"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'robot_envs' has no attribute '{name}'")
+    modules = (module for module, names in _MODULES.items() if name in names)
+    found = getattr(import_module(next(modules, "robot_envs.world_state")), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *__all__]

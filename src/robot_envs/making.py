@@ -1,57 +1,19 @@
-"""Environments of robots and tasks by name: what stands behind `gymnasium.make`."""
+"""Makes environments from the names of a robot and a task: Gymnasium's entry points."""
 
 import importlib
 import inspect
 from collections.abc import Callable, Iterable
 from typing import Any
 
-import gymnasium
-
 from bullet_gazebo.state import did_you_mean
-from robot_envs.checks.task_checks import short
+from robot_envs.checks import short
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.task import Task
+from robot_envs.vector import RobotVectorEnv
 
-ENTRY_POINT = "robot_envs.making:make_environment"
-VECTOR_ENTRY_POINT = "robot_envs.vector:make_vector"
-OWN = ("robot", "task")  # of RobotEnv's options, that have another form here
-
-
-def register(
-    identifier: str,
-    robot: str,
-    task: str,
-    *,
-    reward_threshold: float | None = None,
-    **options: Any,
-) -> None:
-    """Registers an environment with Gymnasium; again does no harm, and with other options replaces it.
-
-        register("my_arm/Reach-v0", "my_arm.robot:ARM", "my_arm.tasks:Reach")
-        env = gymnasium.make("my_arm/Reach-v0", backend="ros")
-        eight = gymnasium.make_vec("my_arm/Reach-v0", 8, backend="ros")
-
-    Robot and task are named, so that other processes can make them: workers, resumed trainings.
-
-    Args:
-        identifier: as Gymnasium has it: "namespace/Name-v0".
-        robot: "module:attribute": a `Robot`, a list of them, or a function that returns one.
-        task: "module:attribute": a class of `Task`, or a function that returns one.
-        reward_threshold: the return from which on the task counts as solved.
-        options: of `RobotEnv` or of the task; `gymnasium.make` may override them.
-    """
-    kwargs = {"robot": robot, "task": task, **options}
-    known = gymnasium.registry.get(identifier)
-    if known is None or (known.kwargs, known.reward_threshold) != (kwargs, reward_threshold):
-        gymnasium.register(
-            identifier,
-            entry_point=ENTRY_POINT,
-            vector_entry_point=VECTOR_ENTRY_POINT,
-            reward_threshold=reward_threshold,
-            kwargs=kwargs,
-        )
+NAMED = ("robot", "task")  # options of RobotEnv that are given by name here
 
 
 def make_environment(robot: str, task: str, backend: str | None = None, **options: Any) -> RobotEnv:
@@ -61,10 +23,10 @@ def make_environment(robot: str, task: str, backend: str | None = None, **option
         robot: see `register`.
         task: see `register`.
         backend: see `RobotEnv`.
-        options: those of `RobotEnv`; others are the task's.
+        options: of `RobotEnv`; all others are the task's.
 
     Raises:
-        RobotEnvError: if robot or task aren't found, or nobody knows an option.
+        RobotEnvError: if robot or task aren't found, or an option is unknown.
         ValueError: if an option makes no sense.
     """
     make_task = named(task)
@@ -80,6 +42,16 @@ def make_environment(robot: str, task: str, backend: str | None = None, **option
     return RobotEnv(_robots(robot), made, backend, **own)
 
 
+def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
+    """Makes a vector of environments; see `make_environment`.
+
+    Raises:
+        RobotEnvError: if robot or task aren't found, or an option is unknown.
+        ValueError: if an option makes no sense.
+    """
+    return RobotVectorEnv(num_envs, make_environment, **options)
+
+
 def _robots(name: str) -> Any:
     found = named(name)
     robots = found() if _takes_nothing(found) else found
@@ -93,7 +65,7 @@ def _robots(name: str) -> Any:
 
 
 def _takes_nothing(found: Any) -> bool:
-    """Whether it is a function to be called without arguments."""
+    """Whether it is a function that can be called without arguments."""
     if not callable(found):
         return False
     try:
@@ -104,11 +76,11 @@ def _takes_nothing(found: Any) -> bool:
 
 
 def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
-    """Makes sure that options are known.
+    """Checks that options are known.
 
     Args:
         given: their names.
-        known: those that there are beside `RobotEnv`'s.
+        known: names beside `RobotEnv`'s.
 
     Raises:
         RobotEnvError: if one isn't.
@@ -121,15 +93,15 @@ def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
 
 
 def option_names(make: Callable[..., Any]) -> list[str]:
-    """Names of the keyword arguments that a class or function takes; of `RobotEnv` without robot and task."""
+    """Names of the keyword arguments of a class or function, without a robot and a task."""
     parameters = inspect.signature(make).parameters.values()
     return [
-        each.name for each in parameters if each.kind != each.VAR_KEYWORD and each.name not in OWN
+        each.name for each in parameters if each.kind != each.VAR_KEYWORD and each.name not in NAMED
     ]
 
 
 def named(name: str) -> Any:
-    """What "module:attribute" stands for.
+    """Imports "module:attribute".
 
     Raises:
         RobotEnvError: if there is no such module, or it has no such attribute.
@@ -141,7 +113,7 @@ def named(name: str) -> Any:
         found = importlib.import_module(module)
     except ModuleNotFoundError as error:
         if error.name is None or not f"{module}.".startswith(f"{error.name}."):
-            raise  # one that it imports itself
+            raise  # the module exists, and imports one that doesn't
         raise RobotEnvError(
             f"there is no module '{module}' (of '{name}'); ./ws --with FOLDER finds those of a folder"
         ) from error

@@ -15,10 +15,10 @@ from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.state import did_you_mean
-from robot_envs.description import controllers, files
-from robot_envs.description.controllers import CommandPort
-from robot_envs.description.files import Source
+from robot_envs import controllers, files
+from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError
+from robot_envs.files import Source
 
 logger = logging.getLogger(__name__)
 

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from bullet_gazebo.state import did_you_mean
-from robot_envs.description.controllers import CommandPort
+from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError, TaskError
 from robot_envs.robot import Robot, unfit_pose
 from robot_envs.task import Object

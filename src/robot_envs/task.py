@@ -11,7 +11,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from robot_envs.description.files import Source
+from robot_envs.files import Source
 from robot_envs.world_state import Commands, InitialState, Pose, StateQuery, WorldState
 
 

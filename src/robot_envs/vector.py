@@ -9,11 +9,10 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.vector.utils import iterate
 
-from robot_envs.backends.choice import LOCKSTEP, OWN, REALTIME
-from robot_envs.backends.side_by_side import side_by_side
-from robot_envs.checks.spaces import action_reader
+from robot_envs.backends import LOCKSTEP, OWN, REALTIME
+from robot_envs.backends.backend import side_by_side
+from robot_envs.checks import action_reader
 from robot_envs.environment import RobotEnv
-from robot_envs.making import make_environment
 
 Results = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
 
@@ -136,16 +135,6 @@ class RobotVectorEnv(SyncVectorEnv[Any, Any]):
                 closing.callback(robot.close)
 
 
-def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
-    """Makes environments of robots and tasks by name; see `robot_envs.making.make_environment`.
-
-    Raises:
-        RobotEnvError: if robot or task aren't found, or nobody knows an option.
-        ValueError: if an option makes no sense.
-    """
-    return RobotVectorEnv(num_envs, make_environment, **options)
-
-
 def _check(num_envs: Any, backend: str | None, render_mode: str | None) -> None:
     if type(num_envs) is not int or num_envs < 1:
         raise ValueError(f"num_envs must be a whole number of 1 and more, not {num_envs!r}")
@@ -154,4 +143,4 @@ def _check(num_envs: Any, backend: str | None, render_mode: str | None) -> None:
             f"many robots need the backend 'ros', or one in this process; {REALTIME!r} has a single robot"
         )
     if render_mode == "human":
-        raise ValueError("many robots have no window; use render_mode 'rgb_array'")
+        raise ValueError("many robots can't be shown on one page; use render_mode 'rgb_array'")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from ros_calls import master
-from ros_calls.xmlrpc import NoAnswer, Refused
+from ros_calls.master import NoAnswer, Refused
 
 START = "roslaunch gazebo_ros empty_world.launch"
 WORLD = "get_world_properties"  # every simulator has it
-LOCKSTEP = ("step_world", "advance_world", "set_link_friction")
+LOCKSTEP = ("step_world", "prepare_step", "prepared_step", "advance_world", "set_link_friction")
 MANAGER = "controller_manager"
 OF_A_WORLD = (
     *(WORLD, "pause_physics", "unpause_physics", "reset_world", "reset_simulation", "delete_model"),

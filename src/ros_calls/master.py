@@ -1,22 +1,102 @@
-"""The ROS master that calls go to: ROS_MASTER_URI's, unless a block says otherwise.
+"""Calls of the ROS master and of nodes, with a time limit.
 
-rospy knows one master for each process; here each thread may turn to another one for a while.
+rospy's own XML-RPC proxies have none: behind a dead network they hang their callers for minutes. rospy knows
+one master for each process; here each thread may turn to another one for a while.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
+import http.client
 import socket
+import xmlrpc.client
 from contextvars import ContextVar
 from typing import Any
 from urllib.parse import urlsplit
+from xml.parsers.expat import ExpatError
 
 import rosgraph
 
-from ros_calls import xmlrpc
+CALLER = "/ros_calls"  # whom a master or node notes; nothing depends on it
+TIMEOUT = 2.0  # [s] for one question to a master or node; a live one answers in milliseconds
 
 _chosen: ContextVar[str | None] = ContextVar("ros_master", default=None)
+
+
+class NoAnswer(Exception):
+    """Nothing usable came back; the text says why."""
+
+
+class NobodyListens(NoAnswer):
+    """The connection was refused."""
+
+
+class BadAnswer(NoAnswer):
+    """Somebody answers, but not in ROS's way, or doesn't know the method."""
+
+
+class Refused(Exception):
+    """The other side answered, and its answer is no."""
+
+
+class _Transport(xmlrpc.client.Transport):
+    """XML-RPC over HTTP with a time limit on every socket operation."""
+
+    def __init__(self, timeout: float) -> None:
+        super().__init__()
+        self._timeout = timeout
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        connection = super().make_connection(host)
+        connection.timeout = self._timeout
+        return connection
+
+
+def call_node(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> Any:
+    """Calls a method of a master or node, which want the caller's name as first argument.
+
+    See `call_plain`.
+    """
+    return call_plain(uri, method, CALLER, *args, timeout=timeout)
+
+
+def call_plain(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> Any:
+    """Calls a method of something that answers in ROS's way, ``[code, text, value]``.
+
+    Args:
+        uri: its ``http://`` address.
+        method: the method's name.
+        args: all of its arguments.
+        timeout: wall time [s] that connecting, sending and each part of the answer may take.
+
+    Returns:
+        The value.
+
+    Raises:
+        NoAnswer: nothing usable came back.
+        Refused: the answer's code is not 1.
+    """
+    try:
+        with xmlrpc.client.ServerProxy(uri, transport=_Transport(timeout)) as proxy:
+            code, text, value = getattr(proxy, method)(*args)
+    except TimeoutError as fault:
+        raise NoAnswer(f"no answer within {timeout:g} s") from fault
+    except ConnectionRefusedError as fault:
+        raise NobodyListens(fault.strerror or str(fault)) from fault
+    except OSError as fault:
+        raise NoAnswer(fault.strerror or str(fault)) from fault
+    except (
+        http.client.HTTPException,
+        xmlrpc.client.Error,
+        ExpatError,
+        TypeError,
+        ValueError,
+    ) as fault:
+        raise BadAnswer(f"an answer that is not ROS's: {type(fault).__name__}") from fault
+    if code != 1:
+        raise Refused(text)
+    return value
 
 
 class MasterDown(Exception):
@@ -54,12 +134,12 @@ def using(master_uri: str | None) -> contextlib.AbstractContextManager[None]:
     return contextlib.nullcontext() if master_uri is None else _Chosen(master_uri)
 
 
-def call(method: str, *args: Any, timeout: float = xmlrpc.TIMEOUT) -> Any:
-    """Calls a method of the master. See `xmlrpc.call_plain` for what it raises."""
-    return xmlrpc.call(uri(), method, *args, timeout=timeout)
+def call(method: str, *args: Any, timeout: float = TIMEOUT) -> Any:
+    """Calls a method of the master. See `call_plain` for what it raises."""
+    return call_node(uri(), method, *args, timeout=timeout)
 
 
-def require(timeout: float = xmlrpc.TIMEOUT) -> None:
+def require(timeout: float = TIMEOUT) -> None:
     """Returns if the master answers within `timeout` [s].
 
     Raises:
@@ -68,12 +148,12 @@ def require(timeout: float = xmlrpc.TIMEOUT) -> None:
     host_and_port()
     try:
         call("getPid", timeout=timeout)
-    except (xmlrpc.NoAnswer, xmlrpc.Refused) as fault:
+    except (NoAnswer, Refused) as fault:
         down = MasterDown(
             f"no ROS master at {uri()} ({fault}): start roscore or launch a simulator,"
             " or mend ROS_MASTER_URI"
         )
-        down.port_is_free = isinstance(fault, xmlrpc.NobodyListens)
+        down.port_is_free = isinstance(fault, NobodyListens)
         raise down from fault
 
 
@@ -159,3 +239,34 @@ def _same_machine(one: str, other: str) -> bool:
         return socket.gethostbyname(one) == socket.gethostbyname(other)
     except OSError:
         return False
+
+
+def living_address(name: str, timeout: float = TIMEOUT) -> str | None:
+    """The XML-RPC address of the node of that full name; None if there is none that answers.
+
+    Args:
+        name: the node's.
+        timeout: bound of each question [s]. Where a node was killed, nobody listens, which takes no time.
+
+    Raises:
+        NoAnswer: the master doesn't.
+    """
+    try:
+        address = str(call("lookupNode", name))
+    except Refused:
+        return None
+    if _answer(address, "getPid", timeout) is None:
+        return None
+    # A dead node's port may have been given to another one, even to one of that name at another master.
+    theirs = _answer(address, "getMasterUri", timeout)
+    if _answer(address, "getName", timeout) not in (None, name):
+        return None
+    return address if theirs is None or is_at(theirs) else None
+
+
+def _answer(address: str, question: str, timeout: float) -> Any:
+    """A node's answer; None if it has none, as roscpp's have for all but getPid."""
+    try:
+        return call_node(address, question, timeout=timeout)
+    except (NoAnswer, Refused):
+        return None

@@ -12,8 +12,8 @@ import rospy
 
 from ros_calls import master
 from ros_calls.absence import why_not_up
+from ros_calls.master import CALLER, NoAnswer, Refused
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceMissing
-from ros_calls.xmlrpc import CALLER, NoAnswer, Refused
 
 POLL = 0.05  # [s] between two looks at something that is being waited for
 TIMEOUT = 30.0  # [s] for a service to come up

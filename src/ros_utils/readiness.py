@@ -18,10 +18,10 @@ from gazebo_msgs.srv import GetWorldProperties
 from ros_calls import master as _master
 from ros_calls.absence import LOCKSTEP, WORLD, why_absent
 from ros_calls.absence import is_offered as _is_offered
+from ros_calls.master import NoAnswer
 from ros_calls.service import TIMEOUT as _CALL_TIMEOUT
 from ros_calls.service import ServiceClient, ServiceFailed
 from ros_calls.waiting import TIMEOUT, wait_until
-from ros_calls.xmlrpc import NoAnswer
 
 RUNNING = "running"
 

@@ -113,9 +113,8 @@ def serve(address: Address, title: str, camera: Point, look_at: Point) -> viser.
         raise PortInUse(f"another process has just taken port {address.port}; start again")
     for message in (messages.ShareUrlRequest, messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(message)
-    server.gui.configure_theme(
-        control_layout="fixed", control_width="medium", show_logo=False, show_share_button=False
-    )
+    server.gui.main_panel.dock_right()
+    server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
     server.initial_camera.position = camera
     server.initial_camera.look_at = look_at
     return server

@@ -1,4 +1,4 @@
-"""Forty clients with garbage, half-open and vanishing connections: the good client goes on being served."""
+"""Forty clients send garbage, stop halfway or vanish: a good client is served all the while."""
 
 import random
 import time

@@ -1,4 +1,4 @@
-"""kill -9 of trainings at random moments: resumed, each ends as if nothing had been."""
+"""kill -9 of trainings at random moments: once resumed, each ends as if never killed."""
 
 import contextlib
 import os

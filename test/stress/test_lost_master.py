@@ -1,4 +1,4 @@
-"""A master that is killed and started again under a simulator, which new clients find again."""
+"""A master is killed and started again under a simulator; new clients find it."""
 
 import contextlib
 import os

@@ -1,4 +1,4 @@
-"""Many simulators of one's own on few cores, whose processes get signals: no bit differs, none is left."""
+"""Many own simulators on few cores get signals: bit-identical results, no process left."""
 
 import os
 import random
@@ -11,7 +11,7 @@ import pytest
 from support.stress.scenario import Scenario
 
 import cartpole  # noqa: F401 - registers the environments
-from robot_envs.backends.side_by_side import side_by_side
+from robot_envs.backends.backend import side_by_side
 
 MANY = 16
 STEPS = 400  # of each case, by each

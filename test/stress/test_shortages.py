@@ -1,4 +1,4 @@
-"""Full disks, low limits of memory and file descriptors: one line, and later the same result."""
+"""Full disks and low limits of memory and files: one line of error, and later the same result."""
 
 import random
 import resource

@@ -1,4 +1,4 @@
-"""Every signal at random moments: a clean end to go on from, or none; nothing is left, no traceback."""
+"""Every signal at random moments: a resumable end or none, no process left, no traceback."""
 
 import random
 import resource

@@ -1,4 +1,4 @@
-"""A simulator that is stopped, whose clock jumps, that runs out of files, memory or disk: it serves again."""
+"""A simulator is stopped, its clock jumps, it runs out of files, memory or disk: it serves again."""
 
 import contextlib
 import os
@@ -20,7 +20,7 @@ from support.stress.scenario import Scenario
 from support.stress.worlds import World, world
 
 from cartpole.robot import ROBOT
-from robot_envs.backends.ros.bringup.robots import bring_up
+from robot_envs.backends.ros.bringup import bring_up
 from robot_envs.scene import Scene
 from ros_calls import master
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceHangs

@@ -1,4 +1,4 @@
-"""Thousands of resets, spawns and deletions: the same bits each time, and nothing that grows."""
+"""Thousands of resets, spawns and deletions: the same bits each time, and nothing grows."""
 
 import random
 
@@ -8,7 +8,7 @@ from support.stress.scenario import Case, Row, Scenario
 from support.stress.worlds import Usage, World, world
 
 from cartpole.robot import ROBOT
-from robot_envs.backends.ros.bringup.robots import bring_up
+from robot_envs.backends.ros.bringup import bring_up
 from robot_envs.scene import Scene
 from ros_utils.step_client import StepClient
 

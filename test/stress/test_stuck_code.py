@@ -1,4 +1,4 @@
-"""A user's code that never returns, or keeps the world's lock: told by name, and Ctrl-C ends the node."""
+"""A user's code never returns, or keeps the world's lock: it is named, and Ctrl-C ends the node."""
 
 import contextlib
 import random

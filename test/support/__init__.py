@@ -1,1 +1,1 @@
-"""What tests share, by subject: `from support.robots.cartpole import cartpole_urdf`."""
+"""Helpers that tests share, by subject: `from support.robots.cartpole import cartpole_urdf`."""

@@ -1,4 +1,4 @@
-"""A locale that writes 0,5 for one half, whatever locales the machine has: a category's file of glibc's."""
+"""A locale that writes 0,5 for one half, whatever locales the machine has."""
 
 import struct
 from pathlib import Path

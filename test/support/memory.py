@@ -1,4 +1,4 @@
-"""How much memory a process keeps: resident pages, after what is free was given back."""
+"""The memory that a process keeps: resident pages after free ones were given back."""
 
 import ctypes
 import gc

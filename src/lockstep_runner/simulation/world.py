@@ -10,7 +10,7 @@ from bullet_gazebo_msgs.msg import TopicMessage
 from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldRequest, AdvanceWorldResponse
 
 from lockstep_runner import originals
-from ros_calls import master, xmlrpc
+from ros_calls import master
 from ros_calls.service import ServiceClient, ServiceGone, ServiceHangs
 
 NODE = "/gazebo"
@@ -80,9 +80,7 @@ class World:
             self._next_look = originals.monotonic() + LOOK
             if not is_running():
                 return False
-            self._call = ServiceClient(
-                SERVICE, AdvanceWorld, persistent=True, timeout=TIMEOUT, polls=True
-            )
+            self._call = ServiceClient(SERVICE, AdvanceWorld, persistent=True, timeout=TIMEOUT)
             self._pending.clear()
             self._physics = AdvanceWorldRequest.AS_IT_IS
             self._seeded = self._seed is None
@@ -201,15 +199,15 @@ def is_running() -> bool:
     """
     try:
         master.call("lookupService", SERVICE)
-    except xmlrpc.Refused:
+    except master.Refused:
         pass
-    except xmlrpc.NoAnswer:
+    except master.NoAnswer:
         return False
     else:
         return _lives()
     try:
         master.call("lookupService", f"{NODE}/pause_physics")
-    except (xmlrpc.Refused, xmlrpc.NoAnswer):
+    except (master.Refused, master.NoAnswer):
         return False
     if not _lives():
         return False
@@ -223,7 +221,7 @@ def _is_registered() -> bool:
     """Whether the master knows of the service: of what ended by itself, or was ended, it doesn't."""
     try:
         master.call("lookupService", SERVICE)
-    except (xmlrpc.Refused, xmlrpc.NoAnswer):
+    except (master.Refused, master.NoAnswer):
         return False
     return True
 
@@ -231,7 +229,7 @@ def _is_registered() -> bool:
 def _lives() -> bool:
     """Whether the simulator's node answers: a killed one stays registered."""
     try:
-        xmlrpc.call(master.call("lookupNode", NODE), "getPid")
-    except (xmlrpc.Refused, xmlrpc.NoAnswer):
+        master.call_node(master.call("lookupNode", NODE), "getPid")
+    except (master.Refused, master.NoAnswer):
         return False
     return True

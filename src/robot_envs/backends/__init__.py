@@ -1,5 +1,75 @@
 """What moves a robot: this process's own physics, or a simulator over ROS, in lock-step or in real time.
 
-Nothing else of `robot_envs` imports rospy, and here `backend.py`, `choice.py` and `in_process.py` don't:
-these work where no ROS is installed.
+Importing this is cheap: a backend's modules are imported when one is made. Only `ros/` needs ROS.
 """
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from robot_envs.errors import RobotEnvError
+
+if TYPE_CHECKING:
+    from robot_envs.backends.backend import RobotBackend
+    from robot_envs.scene import Scene
+
+__all__ = ["BACKENDS", "IN_PROCESS", "LOCKSTEP", "MUJOCO", "OWN", "REALTIME",
+           "has_ros", "make_backend", "need_ros"]  # fmt: skip
+
+IN_PROCESS, MUJOCO, LOCKSTEP, REALTIME = "bullet", "mujoco", "ros", "ros-realtime"
+OWN = "ros-own"  # lock-step in a simulator that nobody else uses
+BACKENDS = (IN_PROCESS, MUJOCO, LOCKSTEP, OWN, REALTIME)
+
+
+def has_ros() -> bool:
+    """Whether ROS's Python packages can be imported."""
+    return find_spec("rospy") is not None
+
+
+def need_ros(what: str) -> None:
+    """Raises RobotEnvError if ROS isn't installed; call it before importing what needs ROS."""
+    if not has_ros():
+        raise RobotEnvError(f"{what} needs ROS, and there is no rospy: ./ws installs and finds it")
+
+
+def make_backend(
+    scene: "Scene", backend: str | None, control_period: float, deadline: float | None = None
+) -> "RobotBackend":
+    """Makes what moves a scene's robots; over ROS it starts what isn't running.
+
+    Args:
+        scene: the robots and objects.
+        backend: one of `BACKENDS`; None: in this process, with the first robot's engine.
+        control_period: simulated time of one action [s]; in real time 0 takes the newest joint state without
+            waiting.
+        deadline: wall time that a simulator in lock-step may take for an answer, beside 10 ms for each
+            tick [s]; None: the backend's default.
+
+    Raises:
+        ValueError: for an unknown backend, or a control period that isn't a whole number of physics steps.
+        RobotEnvError: if ROS isn't installed, or the robots can't be brought up.
+    """
+    from bullet_gazebo.state import did_you_mean
+    from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action
+    from robot_envs.robot import EMPTY
+
+    name = scene.robots[0].engine if backend is None else backend
+    if name not in BACKENDS:
+        near = did_you_mean(str(name), BACKENDS) or f"; there are {', '.join(BACKENDS)}"
+        raise ValueError(f"there is no backend {name!r}{near}")
+    if deadline is not None and not (isinstance(deadline, (int, float)) and deadline > 0.0):
+        raise ValueError(f"deadline is a time above 0 [s], not {deadline!r}")
+    plain = scene.robots[0].world in (None, EMPTY)  # other worlds may have another physics step
+    if plain and (control_period != 0.0 or name != REALTIME):
+        ticks_per_action(control_period, PHYSICS_STEP)  # an error before any simulator is started
+    if name in (IN_PROCESS, MUJOCO):
+        from robot_envs.backends.in_process import InProcessWorld
+
+        return InProcessWorld(scene, control_period, name)
+    need_ros(f"the backend {name}")
+    if name == OWN:
+        from robot_envs.backends.ros.own_world import OwnWorld
+
+        return OwnWorld(scene, control_period, deadline)
+    from robot_envs.backends.ros.session import running_session
+
+    return running_session(scene, name == REALTIME).connect(scene, control_period, deadline)

@@ -1,14 +1,17 @@
 """What an environment needs of a world, be it simulated here, over ROS, or real."""
 
-from collections.abc import Sequence
-from typing import Protocol
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
 
-PHYSICS_STEP = 0.001  # [s]; Gazebo's, and of a world in this process
+PHYSICS_STEP = 0.001  # [s]; Gazebo's default, and that of a world in this process
 
 
 class RobotBackend(Protocol):
@@ -19,22 +22,22 @@ class RobotBackend(Protocol):
     shared: bool  # whether all backends of its kind in a process move the same robots
 
     def look(self, query: StateQuery) -> None:
-        """Has states tell what a query names, beside the joints."""
+        """Adds to all later states what a query names, beside the joints."""
         ...
 
     def reset(self, initial: InitialState) -> WorldState:
         """Begins an episode; returns the state reached.
 
-        A backend that can't set velocities puts joints at rest, and says so in what it returns.
-        `initial.commands` are the environment's to send.
+        A backend that can't set velocities puts joints at rest, and its state says so. The environment sends
+        `initial.commands`.
         """
         ...
 
     def begin(self, commands: Commands) -> None:
-        """Sends what `act` with the same commands is to wait for, and returns at once.
+        """Sends commands whose result `act` with the same commands will wait for, and returns at once.
 
-        `act` alone does the same; one in this process, or in real time, begins nothing. Whatever else is
-        called before `act` takes the answer first; a reset drops it.
+        Calling it is optional, and does nothing in this process and in real time. Any other call before
+        `act` takes the answer first; a reset drops it.
         """
         ...
 
@@ -43,15 +46,15 @@ class RobotBackend(Protocol):
         ...
 
     def vary(self, variation: Variation) -> None:
-        """Gives robots and world other figures, see `Variation`; to be called before a reset."""
+        """Changes properties of robots and world, see `Variation`; call it before a reset."""
         ...
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
-        """Where the frames of links are, each named model::link, in the world."""
+        """Poses of link frames in the world, each link named model::link."""
         ...
 
     def close(self) -> None:
-        """Gives back what the backend holds; may be called twice."""
+        """Frees what the backend holds; may be called twice."""
         ...
 
 
@@ -68,3 +71,89 @@ def ticks_per_action(control_period: float, physics_step: float) -> int:
             f"control period {control_period} s is no multiple of the physics step {physics_step} s"
         )
     return ticks
+
+
+class StartingWorld(Protocol):
+    """A world whose simulator is starting."""
+
+    def connect(self) -> None:
+        """Waits until the simulator can be used."""
+        ...
+
+    def close(self) -> None:
+        """Ends the simulator."""
+        ...
+
+
+class Slot(NamedTuple):
+    """Which of the simulators that start together one is, from 1 on."""
+
+    number: int = 1
+    of: int = 1
+
+    def __str__(self) -> str:
+        return "the simulator" if self.of == 1 else f"simulator {self.number} of {self.of}"
+
+
+@dataclass
+class _Group:
+    """The simulators of a `side_by_side` block."""
+
+    count: int
+    starting: list[StartingWorld] = field(default_factory=list)
+    ends: list[Callable[[], object]] = field(default_factory=list)
+
+
+_group: ContextVar[_Group | None] = ContextVar("simulators", default=None)
+
+
+@contextlib.contextmanager
+def side_by_side(count: int) -> Iterator[None]:
+    """Starts, or ends, several simulators of the backend "ros-own" at the same time.
+
+    Environments that are made or closed in the block don't wait for their simulators; the end of the block
+    waits for all. If one doesn't start, all are ended, and the first error is raised.
+
+    Args:
+        count: how many will start; they are refused at once if there isn't the memory for all.
+    """
+    group = _Group(count)
+    token = _group.set(group)
+    try:
+        try:
+            yield
+            for world in group.starting:
+                world.connect()
+        except BaseException:  # Ctrl-C, too
+            for world in group.starting:
+                world.close()
+            raise
+        finally:
+            for wait in group.ends:
+                wait()
+    finally:
+        _group.reset(token)
+
+
+def next_slot() -> Slot:
+    """The slot of the simulator that starts now."""
+    group = _group.get()
+    return Slot() if group is None else Slot(len(group.starting) + 1, group.count)
+
+
+def connect_in_turn(world: StartingWorld) -> None:
+    """Connects a world whose simulator is starting: now, or at the end of the block."""
+    group = _group.get()
+    if group is None:
+        world.connect()
+    else:
+        group.starting.append(world)
+
+
+def join_in_turn(join: Callable[[], object]) -> None:
+    """Waits for a simulator that was asked to end: now, or at the end of the block."""
+    group = _group.get()
+    if group is None:
+        join()
+    else:
+        group.ends.append(join)

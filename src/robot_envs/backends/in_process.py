@@ -1,8 +1,9 @@
-"""Robots in a physics world of this process: no ROS, and the same bits as over ROS in lock-step."""
+"""Robots in a physics world of this process: no ROS, and bit-identical to a simulator in lock-step."""
 
 import contextlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from operator import attrgetter
 from typing import Any
 
@@ -10,26 +11,34 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.manager import STRICT
-from bullet_gazebo.physics.description import DescriptionError, ModelDescription
+from bullet_gazebo.physics.description import DescriptionError, Inertia, ModelDescription
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.model import Model
-from bullet_gazebo.physics.pose import Pose, normalized
+from bullet_gazebo.physics.pose import Pose, Vector, normalized
+from bullet_gazebo.physics.properties import (
+    JointProperties,
+    PropertyError,
+    link_inertia,
+    set_joint_properties,
+    set_link_friction,
+    set_link_properties,
+)
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 from bullet_gazebo.state import NOTHING, StateReader, UnknownName, find_link, find_model
 from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action
-from robot_envs.backends.in_process_variation import InProcessChanges
 from robot_envs.backends.world_files import fill, spawn
-from robot_envs.description.controllers import Loaded, load
-from robot_envs.description.files import resources
+from robot_envs.controllers import Loaded, load
 from robot_envs.errors import RobotEnvError, SimulatorError
+from robot_envs.files import resources
 from robot_envs.robot import DRIVES, Robot
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
-from robot_envs.variation.applying import Applier
+from robot_envs.variation.applying import Applier, JointFigures, PidFigures
+from robot_envs.variation.parts import RobotPart
 from robot_envs.world_state import (
     Commands,
     InitialState,
@@ -240,3 +249,65 @@ def control_tick(description: ModelDescription) -> float:
             with contextlib.suppress(ValueError):
                 return max(0.0, float(plugin.element.findtext("controlPeriod") or 0.0))
     return 0.0
+
+
+class InProcessChanges:
+    """What can be changed of robots; see `robot_envs.variation.applying.Changeable`.
+
+    Args:
+        sim: of the world that they are in.
+    """
+
+    def __init__(self, sim: Simulator) -> None:
+        self._sim = sim
+        self._robots = {each.model.name: each for each in sim.robots}
+
+    def _model(self, part: RobotPart) -> Model:
+        return self._robots[part.robot.model].model
+
+    def link(self, link: RobotPart) -> Inertia:
+        return link_inertia(self._model(link), link.name)
+
+    def set_link(self, link: RobotPart, inertia: Inertia) -> None:
+        model = self._model(link)
+        gravity = model.body.link_gravity(link.name)
+        try:
+            set_link_properties(self._sim.world, model, link.name, inertia, gravity)
+        except (PropertyError, DescriptionError) as error:
+            raise SimulatorError(f"link {link.name} can't be changed: {error}") from error
+
+    def set_joint(self, joint: RobotPart, figures: JointFigures) -> None:
+        wanted = JointProperties(damping=figures.damping, motor_effort=figures.friction)
+        step = self._sim.world.time_step
+        try:
+            set_joint_properties(self._model(joint), joint.name, wanted, step)
+        except PropertyError as error:
+            raise SimulatorError(f"joint {joint.name} can't be changed: {error}") from error
+
+    def set_surface(self, link: RobotPart, factor: float) -> None:
+        try:
+            set_link_friction(self._model(link), link.name, factor)
+        except PropertyError as error:
+            raise SimulatorError(
+                f"surfaces of link {link.name} can't be changed: {error}"
+            ) from error
+
+    def pids(self, controller: RobotPart) -> Mapping[str, PidFigures]:
+        pids = self._robots[controller.robot.model].manager.get(controller.name).pids.items()
+        return {place: PidFigures(pid.gains.p, pid.gains.i, pid.gains.d) for place, pid in pids}
+
+    def set_pid(self, controller: RobotPart, place: str, gains: PidFigures) -> None:
+        manager = self._robots[controller.robot.model].manager
+        pid = manager.get(controller.name).pids[place]
+        pid.gains = replace(pid.gains, **gains._asdict())
+        manager.loops_changed()
+
+    def gravity(self) -> Vector:
+        return self._sim.world.gravity
+
+    def set_gravity(self, gravity: Vector) -> None:
+        """As set_physics_properties does it, which sets the step and the solver, too."""
+        world = self._sim.world
+        world.set_gravity(gravity)
+        self._sim.set_time_step(world.time_step)
+        world.set_solver(world.solver)

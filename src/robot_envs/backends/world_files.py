@@ -14,8 +14,8 @@ from bullet_gazebo.physics.files.world_file import (
 )
 from bullet_gazebo.physics.world import NameTaken, World
 from bullet_gazebo.simulator import Simulator
-from robot_envs.description.files import Source, is_text, locate, need_file, read_text, resources
 from robot_envs.errors import RobotEnvError
+from robot_envs.files import Source, is_text, locate, need_file, read_text, resources
 from robot_envs.robot import EMPTY
 from robot_envs.task import Object
 

@@ -1,60 +1,134 @@
-"""What is seen of an environment: its pictures, its page, its window."""
+"""An environment's pictures, its page in the browser, and its render modes."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
 
-from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.pose import Pose, add
 from bullet_gazebo.pictures.camera import Camera
 from robot_envs.backends.backend import RobotBackend
-from robot_envs.pictures.picture import RobotPicture
-from robot_envs.pictures.surroundings import Surroundings
+from robot_envs.pictures.placement import Placement, Surroundings
+from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.world_state import InitialState, WorldState
-from viewer.display import hindrance
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
-    from robot_envs.pictures.page import RobotOnPage
+    from robot_envs.pictures.page import LivePage, RobotOnPage
+
+__all__ = ["HEIGHT", "WIDTH", "Camera", "DrawnEnv", "RobotPicture"]
+
+WIDTH, HEIGHT = 640, 320  # [pixels], by default
+LARGEST = 4096  # [pixels]
+RENDER_MODES = ("human", "rgb_array")
 
 
-class Viewer(Protocol):
-    """A window that shows the robot."""
+class RobotPicture:
+    """Draws a robot and a ground, without a display; loads what it needs with the first picture.
 
-    def show(self, positions: Mapping[str, float]) -> None:
-        """Shows joints at their positions [rad, m], by name."""
-        ...
+    Args:
+        robot: the robot.
+        width: of the pictures [pixels].
+        height: of the pictures [pixels].
+        camera: for the robot as it is spawned; None: one that sees all that the joints can reach.
+        base: returns the pose of its root link, which the camera follows; None: where it is spawned.
+        beside: what else is in its world; None: nothing.
+
+    Raises:
+        ValueError: for an impossible size.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        width: int = WIDTH,
+        height: int = HEIGHT,
+        *,
+        camera: Camera | None = None,
+        base: Callable[[], Pose] | None = None,
+        beside: Surroundings | None = None,
+    ) -> None:
+        for side in (width, height):
+            if not 1 <= side <= LARGEST or side != int(side):
+                raise ValueError(f"a picture's width and height lie in [1, {LARGEST}], not {side}")
+        self._size = (int(width), int(height))
+        self._camera = camera
+        self._placement = lambda: Placement(robot, base, beside)
+        self._drawn: _DrawnRobot | None = None
+
+    def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
+        """The robot with its joints at these positions [rad, m], by name: (height, width, 3) of uint8.
+
+        Raises:
+            RobotEnvError: if the robot's file can't be read.
+        """
+        if self._drawn is None:
+            self._drawn = _DrawnRobot(self._placement(), self._camera, self._size)
+        return self._drawn(positions)
+
+    def draw_on(
+        self, server: "ViserServer", positions: Callable[[], Mapping[str, float]], beside: int = 0
+    ) -> "RobotOnPage":
+        """Draws the robot on a viser page, where `positions` puts it; see `RobotEnv.draw_on`.
+
+        Raises:
+            RobotEnvError: if the robot's file can't be read.
+        """
+        from robot_envs.pictures.page import RobotOnPage
+
+        return RobotOnPage(server, self._placement(), positions, self._camera, self._size, beside)
 
     def close(self) -> None:
-        """Closes the window; may be called twice."""
-        ...
+        """Frees what it has loaded; may be called twice."""
+        if self._drawn is not None:
+            self._drawn.scene.close()
+            self._drawn = None
+
+
+class _DrawnRobot:
+    """A robot in a scene, and a camera."""
+
+    def __init__(self, placement: Placement, camera: Camera | None, size: tuple[int, int]) -> None:
+        from bullet_gazebo.pictures.scene import Scene  # loads PyBullet
+
+        self._placement, self._size = placement, size
+        self._camera = placement.camera(camera, size[0] / size[1])
+        self.scene = Scene()
+        for name, shapes in placement.models.items():
+            self.scene.add(name, shapes)
+
+    def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
+        base = self._placement.base()
+        for name, poses in self._placement.poses(positions, base).items():
+            self.scene.place(name, poses)
+        camera = self._camera
+        if camera.follows:
+            camera = camera.at(add(camera.target, self._placement.travelled(positions, base)))
+        return self.scene.picture(camera, *self._size)
 
 
 class DrawnEnv(gymnasium.Env[Any, Any]):
-    """The half of an environment that draws it; the other half moves it, and says where it is."""
+    """The half of an environment that draws the robot; `RobotEnv` moves it."""
 
     scene: Scene
     backend: RobotBackend
     _initial: InitialState  # of the episode
     _state: WorldState | None
 
-    def _draw(
-        self,
-        period: float,
-        camera: Camera | None,
-        size: tuple[int, int],
-        window: Callable[[float], Viewer] | None,
-        render_mode: str | None,
+    def _prepare_drawing(
+        self, period: float, camera: Camera | None, size: tuple[int, int], render_mode: str | None
     ) -> None:
-        """Makes ready what draws; see `RobotEnv`. The period is that of control [s]."""
+        """Checks the options; see `RobotEnv`. The period is that of control [s]."""
+        if render_mode not in (None, *RENDER_MODES):
+            raise ValueError(f'render_mode is "human" or "rgb_array", not {render_mode!r}')
         self.metadata = {
-            "render_modes": ["human", "rgb_array"] if window and not hindrance() else ["rgb_array"],
+            "render_modes": list(RENDER_MODES),
             "render_fps": max(1, round(1.0 / period)),
         }
-        self.render_mode = _known_mode(render_mode, window is not None)
+        self.render_mode = render_mode
         self._picture = RobotPicture(
             self.scene.robots[0],
             *size,
@@ -62,38 +136,44 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             base=self._base,
             beside=Surroundings(self.scene, self._poses),
         )
-        self._window = window(period) if window and render_mode == "human" else None
+        self._shown_for = period  # [s] of wall time, of each state in the render mode "human"
+        self._page: LivePage | None = None
 
     def _show(self) -> None:
-        """In the window, if there is one."""
-        if self._window is not None:
-            self._window.show(self._positions())
+        """Shows the state on a page, in the render mode "human"."""
+        if self.render_mode != "human":
+            return
+        if self._page is None:
+            from robot_envs.pictures.page import LivePage
+
+            self._page = LivePage(self.scene.robots[0].model, self.draw_on, self._shown_for)
+        self._page.show()
 
     def _end_drawing(self) -> None:
         """Frees what draws; may be called twice."""
-        if self._window is not None:
-            self._window.close()
+        if self._page is not None:
+            self._page.close()
+            self._page = None
         self._picture.close()
 
     def _positions(self) -> dict[str, float]:
-        """Of the joints [rad, m], of the first robot, by plain name."""
+        """Positions of the first robot's joints [rad, m], by plain name."""
         robot, joints = self.scene.robots[0], self._state.joints if self._state else {}
         names = {name: self.scene.joint(robot, name) for name in robot.joints}
         return {plain: joints[name].position for plain, name in names.items() if name in joints}
 
     def _base(self) -> Pose:
-        """Where the first robot's root link is."""
+        """The pose of the first robot's root link."""
         robot = self.scene.robots[0]
         if robot.links.fixed_base:
             return self.scene.stand(self._initial, robot).compose(robot.links.root_pose)
         return self.backend.poses([f"{robot.model}::{robot.links.root}"])[0]
 
     def _poses(self, links: Sequence[str]) -> Sequence[Pose]:
-        """Where links are, each named model::link."""
         return self.backend.poses(links)
 
     def render(self) -> np.ndarray | None:
-        """A picture of the robot as it is, (height, width, 3). A window shows it by itself.
+        """A picture of the robot, (height, width, 3) of uint8; None in the render mode "human".
 
         Raises:
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
@@ -101,9 +181,9 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         return self._picture(self._positions()) if self.render_mode == "rgb_array" else None
 
     def draw_on(self, server: "ViserServer", beside: int = 0) -> "RobotOnPage":
-        """Draws the robot on a page of viser's: its visuals, a ground and lights, seen as in the pictures.
+        """Draws the robot on a viser page: its visuals, a ground and lights, as in the pictures.
 
-        Needs no render mode, with any backend:
+        Needs no render mode, and works with any backend:
 
             server = viser.ViserServer()
             robot = env.unwrapped.draw_on(server)
@@ -111,23 +191,15 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
             robot()
 
         Args:
-            server: the page's.
-            beside: so many robots of this kind are on the page already; it is drawn beside them.
+            server: of the page.
+            beside: how many robots of this kind are on the page already; it is drawn beside them.
 
         Returns:
-            What moves the robot on the page to where it is in that moment: a function, which takes a
-            caption to show below the robot, or nothing, and may raise `SimulatorError`. Its two halves
-            are `look()`, which tells where the robot is, and `show()`, which moves it there, then or later.
+            What moves the robot on the page to where it is now: a function, which takes a caption to show
+            below the robot, and may raise `SimulatorError`. Its two halves are `look()`, which returns where
+            the robot is, and `show()`, which moves it there, then or later.
 
         Raises:
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
         """
         return self._picture.draw_on(server, self._positions, beside)
-
-
-def _known_mode(mode: str | None, has_window: bool) -> str | None:
-    known = ("human", "rgb_array") if has_window else ("rgb_array",)
-    if mode is not None and mode not in known:
-        names = " or ".join(f'"{name}"' for name in known)
-        raise ValueError(f"render_mode is {names}, not {mode!r}")
-    return mode

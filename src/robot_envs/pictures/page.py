@@ -1,6 +1,7 @@
-"""A robot on a page of viser's: as the simulator's window shows it, without a simulator."""
+"""A robot on a viser page, as the simulator's window shows it, without a simulator."""
 
 import logging
+import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -15,6 +16,8 @@ from bullet_gazebo.pictures.camera import Camera, overview
 from bullet_gazebo.pictures.page.picture import Picture
 from bullet_gazebo.pictures.page.seen import SeenLink, SeenModel, seen_model
 from robot_envs.pictures.placement import Placement
+from viewer.address import LOOPBACK, find_address
+from viewer.server import serve, stop
 
 WORLD = "/world"  # node
 GAP = 0.15  # between robots, as a share of what one of them can reach
@@ -24,25 +27,25 @@ logger = logging.getLogger(__name__)
 
 
 class Placed(NamedTuple):
-    """Where a robot was in a moment."""
+    """Where a robot was at one moment."""
 
     links: np.ndarray  # (N, 7): positions [m] and quaternions xyzw, in the world
-    strayed: np.ndarray  # (3,) [m]: what a robot that drives has gone from where it started
+    travelled: np.ndarray  # (3,) [m]: the way of a robot that drives from where it started
 
 
 class RobotOnPage:
-    """A robot, and for the first one of a page a ground, lights, and where the page is seen from.
+    """A robot on a page; the first one brings a ground, lights and the initial camera.
 
-    The first one stays where it is on the page, and the world goes by: so all cameras follow it, wherever
-    somebody has turned them to, and those of a recording, too.
+    The first robot stays in place on the page, and the world moves instead. So all cameras follow it, however
+    somebody has turned them, and so does a recording's.
 
     Args:
         server: of the page.
         placement: of the robot.
-        positions: tells where its joints are [rad, m], by name.
-        camera: where pictures of it are taken from.
-        size: of these pictures [pixels].
-        beside: so many robots of its kind are on the page already.
+        positions: returns its joints' positions [rad, m], by name.
+        camera: of its pictures.
+        size: of its pictures [pixels].
+        beside: how many robots of its kind are on the page already.
 
     Raises:
         SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
@@ -70,7 +73,9 @@ class RobotOnPage:
             aside = (1.0 + GAP) * np.ptp(reach @ right) * right
             row = [reach + number * aside for number in range(beside + 1)]
             looking = overview(np.concatenate(row), aspect, looking)
-        _look(server.initial_camera, looking)
+        x, y, z = looking.eye.tolist()
+        server.initial_camera.position, server.initial_camera.look_at = (x, y, z), looking.target
+        server.initial_camera.fov = float(np.radians(looking.view))
         self._foot = low + beside * aside
         scene = server.scene
         if self._is_first:
@@ -86,7 +91,7 @@ class RobotOnPage:
         """Moves it to where it is now.
 
         Args:
-            caption: a line of text below it; empty: the one that is there stays.
+            caption: a line of text below it; empty: the present one stays.
 
         Raises:
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
@@ -94,7 +99,7 @@ class RobotOnPage:
         self.show(self.look(), caption)
 
     def look(self) -> Placed:
-        """Where it is now, to be shown later; the page stays as it is.
+        """Where it is now, to be shown later; doesn't change the page.
 
         Raises:
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.
@@ -103,18 +108,18 @@ class RobotOnPage:
         found = self._placement.poses(positions, base)
         poses = [found[model.name][link.name] for model in self._seen for link in model.links]
         rows = [[*pose.position, *pose.orientation] for pose in poses]
-        return Placed(np.array(rows), np.array(self._placement.strayed(positions, base)))
+        return Placed(np.array(rows), np.array(self._placement.travelled(positions, base)))
 
     def show(self, placed: Placed, caption: str = "") -> None:
-        """Moves it to where it was in another moment; asks nobody."""
+        """Moves it to where it was at another moment."""
         with self._server.atomic():
             self._picture.move(placed.links)
             if self._is_first:
-                self._world.position = -placed.strayed
+                self._world.position = -placed.travelled
             if caption:
-                self._tell(caption)
+                self._write(caption)
 
-    def _tell(self, caption: str) -> None:
+    def _write(self, caption: str) -> None:
         if self._caption is None:
             self._caption = self._server.scene.add_label(
                 self._caption_node,
@@ -125,6 +130,36 @@ class RobotOnPage:
             )
         elif caption != self._caption.text:
             self._caption.text = caption
+
+
+class LivePage:
+    """A page of this machine that shows a robot's states at about the pace of real time.
+
+    Prints its address once.
+
+    Args:
+        title: of the page.
+        draw_on: see `RobotEnv.draw_on`.
+        period: wall time for which each state is shown [s].
+    """
+
+    def __init__(
+        self, title: str, draw_on: Callable[[viser.ViserServer], RobotOnPage], period: float
+    ) -> None:
+        address = find_address(LOOPBACK, None)
+        self._server = serve(address, title, (1.0, 1.0, 1.0), ZERO)
+        self._move, self._period, self._due = draw_on(self._server), period, time.monotonic()
+        print(f"the robot is shown on the page {address.url}", flush=True)
+
+    def show(self) -> None:
+        """Shows the robot as it is, once the state before has been shown long enough."""
+        self._due = max(time.monotonic(), self._due + self._period)
+        time.sleep(max(0.0, self._due - time.monotonic()))
+        self._move()
+
+    def close(self) -> None:
+        """Closes the page."""
+        stop(self._server)
 
 
 def _draw_ground(server: viser.ViserServer) -> None:
@@ -139,7 +174,7 @@ def _draw_ground(server: viser.ViserServer) -> None:
 
 
 def _seen(placement: Placement) -> list[SeenModel]:
-    """The robot with all of its links, and of what is beside it those that are seen."""
+    """The robot with all of its links, and the visible links of what is beside it."""
     models = []
     for number, (name, shapes) in enumerate(placement.models.items()):
         links: dict[str, list[Shape]] = defaultdict(list)
@@ -149,9 +184,3 @@ def _seen(placement: Placement) -> list[SeenModel]:
             links[link].append(shape)
         models.append(SeenModel(number, name, [SeenLink(*each) for each in links.items()]))
     return models
-
-
-def _look(page: viser.InitialCameraConfig, camera: Camera) -> None:
-    x, y, z = camera.eye.tolist()
-    page.position, page.look_at = (x, y, z), camera.target
-    page.fov = float(np.radians(camera.view))

@@ -1,4 +1,4 @@
-"""Robots that come along; importing this registers them with Gymnasium. docs/robots.md tells about them.
+"""The robots that come with the library; importing this registers their environments with Gymnasium.
 
 | id | what is to be learned |
 |---|---|
@@ -8,43 +8,25 @@
 | `robot_envs/Furuta-v0` | a Furuta pendulum swings up and stays up |
 | `robot_envs/DoublePendulum-v0` | a cart keeps two rods upright, one on top of the other |
 | `robot_envs/Hopper-v0` | a one-legged robot hops forward |
+
+docs/robots.md describes them.
 """
 
-from robot_envs.making import register
+from robot_envs.registration import register
 
-register(
-    "robot_envs/TwoLinkReach-v0",
-    "robot_envs.robots.two_link_arm:ROBOT",
-    "robot_envs.robots.two_link_arm:Reach",
-    reward_threshold=15.0,
+_ENVIRONMENTS = (  # name, module and class of the task, the return from which on it counts as solved
+    ("TwoLinkReach", "two_link_arm", "Reach", 15.0),
+    ("TwoLinkReachGoal", "two_link_arm", "ReachGoal", -20.0),
+    ("SixJointReach", "six_joint_arm", "ReachInSpace", 30.0),
+    ("Furuta", "furuta", "SwingUp", 240.0),
+    ("DoublePendulum", "double_pendulum", "Balance", 475.0),
+    ("Hopper", "hopper", "HopForward", 450.0),
 )
-register(
-    "robot_envs/TwoLinkReachGoal-v0",
-    "robot_envs.robots.two_link_arm:ROBOT",
-    "robot_envs.robots.two_link_arm:ReachGoal",
-    reward_threshold=-20.0,
-)
-register(
-    "robot_envs/SixJointReach-v0",
-    "robot_envs.robots.six_joint_arm:ROBOT",
-    "robot_envs.robots.six_joint_arm:Reach",
-    reward_threshold=30.0,
-)
-register(
-    "robot_envs/Furuta-v0",
-    "robot_envs.robots.furuta:ROBOT",
-    "robot_envs.robots.furuta:SwingUp",
-    reward_threshold=240.0,
-)
-register(
-    "robot_envs/DoublePendulum-v0",
-    "robot_envs.robots.double_pendulum:ROBOT",
-    "robot_envs.robots.double_pendulum:Balance",
-    reward_threshold=475.0,
-)
-register(
-    "robot_envs/Hopper-v0",
-    "robot_envs.robots.hopper:ROBOT",
-    "robot_envs.robots.hopper:HopForward",
-    reward_threshold=450.0,
-)
+
+for _name, _module, _task, _solved in _ENVIRONMENTS:
+    register(
+        f"robot_envs/{_name}-v0",
+        f"robot_envs.robots.{_module}:ROBOT",
+        f"robot_envs.robots.{_module}:{_task}",
+        reward_threshold=_solved,
+    )

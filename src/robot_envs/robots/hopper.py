@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from robot_envs.description.files import own_file
+from robot_envs.files import own_file
 from robot_envs.robot import Robot
 from robot_envs.robots import spaces
 from robot_envs.task import Task

@@ -9,8 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import SyncVectorEnv, VectorEnv
 
-from robot_envs.testing.rollouts import differences, rollout, same
-from robot_envs.testing.subject import Subject, expect, expect_error
+from robot_envs.testing.rollouts import Subject, differences, expect, expect_error, rollout, same
 
 WORLDS, SEED = 3, 11
 TRIES = 20  # actions, to find another one

@@ -8,9 +8,9 @@ from typing import Any
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 
-from robot_envs.backends.choice import IN_PROCESS, MUJOCO, REALTIME
-from robot_envs.testing import episodes, goals, repetition
-from robot_envs.testing.subject import Make, Subject, expect
+from robot_envs.backends import IN_PROCESS, MUJOCO, REALTIME
+from robot_envs.testing import episodes, repetition
+from robot_envs.testing.rollouts import Make, Subject, expect
 
 STEPS = 100
 # What Gymnasium's checker says of robots whose places have no bounds, and of those that have no id.
@@ -101,7 +101,7 @@ CHECKS: tuple[Callable[[Subject], None], ...] = (
     episodes.wrong_options,
     episodes.closed,
     episodes.pictures,
-    goals.goals,
+    episodes.goals,
     repetition.seeding,
     repetition.two_phases,
     repetition.specification,

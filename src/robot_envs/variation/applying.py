@@ -6,9 +6,8 @@ from typing import NamedTuple, Protocol
 from bullet_gazebo.physics.description import Inertia
 from bullet_gazebo.physics.pose import Vector, scale
 from robot_envs.scene import Scene
-from robot_envs.variation.inertia import scaled
-from robot_envs.variation.parts import Part, Parts
-from robot_envs.variation.variation import Variation
+from robot_envs.variation.parts import Parts, RobotPart
+from robot_envs.variation.variation import Variation, scaled
 
 
 class JointFigures(NamedTuple):
@@ -33,27 +32,27 @@ class Changeable(Protocol):
         SimulatorError: by each of them, if the world refuses, or doesn't answer.
     """
 
-    def link(self, link: Part) -> Inertia:
+    def link(self, link: RobotPart) -> Inertia:
         """What a link has now."""
         ...
 
-    def set_link(self, link: Part, inertia: Inertia) -> None:
+    def set_link(self, link: RobotPart, inertia: Inertia) -> None:
         """Gives a link other figures; its axes stay."""
         ...
 
-    def set_joint(self, joint: Part, figures: JointFigures) -> None:
+    def set_joint(self, joint: RobotPart, figures: JointFigures) -> None:
         """Gives a joint other figures."""
         ...
 
-    def set_surface(self, link: Part, factor: float) -> None:
+    def set_surface(self, link: RobotPart, factor: float) -> None:
         """Gives a link's surfaces so many times the friction of their file."""
         ...
 
-    def pids(self, controller: Part) -> Mapping[str, PidFigures]:
+    def pids(self, controller: RobotPart) -> Mapping[str, PidFigures]:
         """The gains of a controller's PIDs now, by their place below the controller."""
         ...
 
-    def set_pid(self, controller: Part, place: str, gains: PidFigures) -> None:
+    def set_pid(self, controller: RobotPart, place: str, gains: PidFigures) -> None:
         """Gives a PID other gains."""
         ...
 
@@ -110,7 +109,7 @@ class Applier:
                 self._gravity = self._world.gravity()
             self._world.set_gravity(scale(self._gravity, variation.gravity))
 
-    def _rub(self, name: str, joint: Part, variation: Variation) -> None:
+    def _rub(self, name: str, joint: RobotPart, variation: Variation) -> None:
         own = joint.robot.links.joints[joint.name]  # Gazebo's services don't tell it
         damping, friction = variation.damping.get(name), variation.friction.get(name)
         self._world.set_joint(
@@ -121,7 +120,7 @@ class Applier:
             ),
         )
 
-    def _tune(self, name: str, controller: Part, factor: float) -> None:
+    def _tune(self, name: str, controller: RobotPart, factor: float) -> None:
         if name not in self._pids:
             self._pids[name] = self._world.pids(controller)
         for place, gains in self._pids[name].items():

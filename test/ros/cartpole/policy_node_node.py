@@ -1,21 +1,16 @@
 #!/usr/bin/env python3
-"""policy_node.py on the cart-pole, in real time: it balances, stops where states are late, and at Ctrl-C."""
+"""policy_node.py on the cart-pole in real time: it balances, and stops at late states and at Ctrl-C."""
 
 import os
 import signal
-import sys
 import threading
 import unittest
-from pathlib import Path
 
 import rospy
 import rostest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.ros.pg_train_runs import Place, Process
 from support.ros.subscribed import wait_until_heard
 from support.training import training_runs

@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
-"""The robot in RViz: in its colours while no simulated time has passed, and where the simulator has it."""
+"""RViz shows the robot in its colours before time starts, and then where the simulator has it."""
 
 import os
 import signal
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -13,8 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import rostest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from support.ros.virtual_display import missing, virtual_display
 
 from ros_utils.simulation import reserved_port

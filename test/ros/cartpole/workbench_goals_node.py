@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""workbench.py with an arm that reaches for goals: over ROS, where there is one robot, as in this process.
+"""workbench.py with an arm that reaches for goals: the same figures over ROS as in-process.
 
 Evaluations come in the midst of episodes, and move the robot that is learned with. Halfway, in the midst of
 an episode, the training over ROS ends with its simulator, and is gone on with in another one.
@@ -7,14 +7,10 @@ an episode, the training over ROS ends with its simulator, and is gone on with i
 
 import importlib.util
 import json
-import sys
 import unittest
 from pathlib import Path
 
 import rostest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.ros.pg_train_runs import Place
 
 ARM = "robot_envs/TwoLinkReachGoal-v0"

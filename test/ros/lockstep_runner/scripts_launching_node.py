@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Scripts under lockstep.py that start their own simulator, or meet one that isn't as it should be."""
+"""Scripts under lockstep.py that start their own simulator, or meet an unsuitable one."""
 
 import os
 import re
@@ -108,8 +108,8 @@ class LaunchingTest(unittest.TestCase):
         text = (
             "import os, signal, time, rospy\nfrom std_srvs.srv import Empty\nrospy.init_node('script')\n"
             "rospy.ServiceProxy('/gazebo/unpause_physics', Empty)()\ntime.sleep(0.1)\n"
-            "from ros_calls import master, xmlrpc\n"
-            "pid = xmlrpc.call(master.call('lookupNode', '/gazebo'), 'getPid')\n"
+            "from ros_calls import master\n"
+            "pid = master.call_node(master.call('lookupNode', '/gazebo'), 'getPid')\n"
             "os.kill(pid, signal.SIGKILL)\ntime.sleep(0.1)\nprint('went on')\n"
         )
         folder = tempfile.mkdtemp(prefix="lockstep_test_")

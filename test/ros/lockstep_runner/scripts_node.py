@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Scripts under lockstep.py, in a world in lock-step that runs already (docs/lockstep.md)."""
+"""Scripts under lockstep.py in a running lock-step world (docs/lockstep.md)."""
 
 import importlib.util
 import itertools

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
-"""A robot that isn't fixed to the world, over ROS: its pictures are those of the robot in this process."""
+"""A robot that isn't fixed to the world: pictures over ROS equal those in-process."""
 
-import sys
 import tempfile
 import unittest
 from dataclasses import replace
@@ -9,9 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import rostest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.robots.pendulum import FILES, PENDULUM, Upright
 
 from robot_envs.backends.ros.session import RosSession

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The robots that come along, over ROS in lock-step: the bits in this process, and the conformance suite."""
+"""The bundled robots over ROS in lock-step: the bits of the in-process world, and the conformance suite."""
 
 import unittest
 

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
-"""Over ROS in lock-step, one after the other in one process: two arms with a ball, a rover with a crate."""
+"""Scenes over ROS in lock-step, one after the other: two arms with a ball, a rover with a crate."""
 
-import sys
 import tempfile
 import unittest
 from dataclasses import replace
@@ -9,20 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import rostest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.scenes.rover import ROVER, Push
 from support.scenes.two_arms import LEFT, RIGHT, Volley
 
 from robot_envs import InitialState, Pose, RobotEnv, RobotEnvError, SimulatorError
-from robot_envs.backends.ros.bringup import world
+from robot_envs.backends.ros import gazebo
 from robot_envs.testing import check_robot_env, differences, rollout
 
 
 def models():
     """What is in the simulator's world."""
-    return set(world.models())
+    return set(gazebo.models())
 
 
 class Scenes:

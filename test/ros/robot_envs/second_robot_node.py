@@ -1,18 +1,14 @@
 #!/usr/bin/env python3
-"""The pendulum over ROS, by a session that its user starts and ends: in lock-step, or in real time."""
+"""The pendulum over ROS in a session that its user starts and ends, in lock-step or in real time."""
 
 import sys
 import unittest
 import xmlrpc.client
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import rosgraph
 import rostest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.robots.pendulum import MOTOR, PENDULUM, hanging, make_pendulum
 
 from robot_envs.backends.in_process import InProcessWorld

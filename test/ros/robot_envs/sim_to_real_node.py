@@ -1,22 +1,18 @@
 #!/usr/bin/env python3
-"""Imperfect sensors and actuators, and robots that differ, over ROS: the same bits, and given back."""
+"""Sensor and actuator imperfections and varied robots over ROS: the bits of the in-process world."""
 
 import sys
 import unittest
-from pathlib import Path
 
 import numpy as np
 import rospy
 import rostest
 from gazebo_msgs.srv import GetLinkProperties, GetPhysicsProperties
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from gymnasium.utils.env_checker import data_equivalence as same
 from support.robots.rig import MASS, RIG, SLEDGE, make_both, make_rig
 
 from robot_envs import SimulatorError
-from robot_envs.backends.ros.service import ServiceClient
+from robot_envs.backends.ros.gazebo import SimulatorService
 from robot_envs.backends.ros.session import RosSession
 from robot_envs.variation import Variation
 
@@ -55,8 +51,8 @@ def rollout(env, steps=100):
 
 def figures():
     """What Gazebo's services and the parameters tell of the rig."""
-    link = ServiceClient("/gazebo/get_link_properties", GetLinkProperties)("rig::cart")
-    world = ServiceClient("/gazebo/get_physics_properties", GetPhysicsProperties)()
+    link = SimulatorService("/gazebo/get_link_properties", GetLinkProperties)("rig::cart")
+    world = SimulatorService("/gazebo/get_physics_properties", GetPhysicsProperties)()
     gains = {name: rospy.get_param(f"{GAINS}/{name}") for name in ("p", "i", "d", "i_clamp_max")}
     return link.mass, link.com.position.x, link.ixx, link.gravity_mode, world.gravity.z, gains
 

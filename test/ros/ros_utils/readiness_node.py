@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Ready: worlds that are launched and waited for, and what is said of each thing that is missing."""
+"""Ready: launch and wait for worlds; a line for each thing that is missing."""
 
 import contextlib
 import io

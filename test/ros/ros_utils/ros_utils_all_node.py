@@ -1,17 +1,22 @@
 #!/usr/bin/env python3
-"""Two simulators side by side, each with a master of its own, and all that ros_utils asks of them."""
+"""All of ros_utils against simulators: two side by side, and a user's session."""
 
 import math
 import os
 import unittest
 
+import rosgraph
 import rospy
 import rostest
 from gazebo_msgs.msg import ODEPhysics
+from sensor_msgs.msg import JointState
+from support.ros.subscribed import wait_until_heard
 
+from ros_calls.waiting import wait_until
 from ros_utils import ros_controllers, ros_gazebo, ros_launch, ros_node, ros_spawn
 from ros_utils.simulation import CannotSimulate, Simulation
 
+MASTER = rosgraph.Master("/ros_utils_all_test")
 CONTROLLERS = ["joint_state_controller", "stand_cart_position_controller"]
 BALL = """<sdf version="1.6"><model name="ball"><link name="link">
 <inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>
@@ -77,13 +82,10 @@ class All(unittest.TestCase):
         self.assertTrue(ros_gazebo.gazebo_set_default_properties())
 
     def test_models(self):
-        spawned, text = ros_gazebo.gazebo_spawn_urdf_pkg(
-            "cartpole_gazebo", "cartpole_v1.urdf", "/robots", "plain", "/plain", verify=True
-        )
+        robot = ("cartpole_gazebo", "cartpole_v1.urdf", "/robots", "plain", "/plain")
+        spawned, text = ros_gazebo.gazebo_spawn_urdf_pkg(*robot, verify=True)
         self.assertTrue(spawned, text)
-        self.assertIs(
-            ros_gazebo.gazebo_spawn_sdf_string(BALL, "ball", pos_z=2.0, verify=True), True
-        )
+        self.assertTrue(ros_gazebo.gazebo_spawn_sdf_string(BALL, "ball", pos_z=2.0, verify=True))
         self.assertFalse(ros_gazebo.gazebo_spawn_sdf_string(BALL, "ball"))
         self.assertFalse(ros_gazebo.gazebo_spawn_sdf_path("/nix.sdf"))
         self.assertFalse(ros_gazebo.gazebo_spawn_sdf_pkg("nix_pkg", "a.sdf"))
@@ -106,33 +108,6 @@ class All(unittest.TestCase):
             self.assertTrue(ros_gazebo.gazebo_delete_model(name, verify=True))
         self.assertEqual(ros_gazebo.gazebo_get_model_names(), ["ground_plane"])
 
-    def test_robot_with_controllers(self):
-        self.assertTrue(
-            ros_spawn.spawn_model_in_gazebo(
-                "cartpole_gazebo",
-                "cartpole_v1.urdf",
-                "joint_position_control.yaml",
-                CONTROLLERS,
-                model_urdf_folder="/robots",
-                gazebo_name="cartpole",
-                controllers_pkg="cartpole_controller",
-                verify=True,
-            )
-        )
-        states = dict.fromkeys(CONTROLLERS, "running")
-        self.assertEqual(ros_controllers.list_controllers_srv(), states)
-        self.assertIn(
-            "joint_state_controller/JointStateController",
-            ros_controllers.list_controller_types_srv(),
-        )
-        loaded = ros_controllers.load_controller_list_srv(["nix"], max_retries=1)
-        self.assertFalse(loaded)
-        self.assertEqual(loaded.failed, ["nix"])
-        self.assertFalse(ros_controllers.load_controller_srv("nix", max_retries=0))
-        self.assertTrue(ros_controllers.kill_controllers_srv(CONTROLLERS))
-        self.assertTrue(ros_gazebo.gazebo_delete_model("cartpole", verify=True))
-        self.assertTrue(ros_node.ros_kill_node("/rob_st_pub"))
-
     def test_handles(self):
         node = ros_node.ros_node_from_pkg(
             "gazebo_ros", "gzclient", name="window", master_uri=self.simulation.master_uri
@@ -148,6 +123,73 @@ class All(unittest.TestCase):
         self.assertTrue(self.simulation.running)
 
 
+class Session(unittest.TestCase):
+    """What a user calls, in its order, on the test's own master."""
+
+    def test_it(self):
+        self.assertTrue(ros_gazebo.launch_Gazebo(paused=True, gui=True))
+        self.assertTrue(rospy.has_param("/gazebo/pub_clock_frequency"), "the rate has an effect")
+        address = MASTER.lookupNode("/gazebo")
+        self.assertTrue(ros_gazebo.launch_Gazebo(), "the running one is used")
+        self.assertEqual(MASTER.lookupNode("/gazebo"), address)
+        self.spawn()
+        self.put_the_joints()
+        self.start_a_spawner()
+        self.assertTrue(ros_gazebo.gazebo_delete_model("cartpole"))
+        self.assertFalse(ros_gazebo.gazebo_delete_model("cartpole"))
+        self.assertTrue(ros_gazebo.close_Gazebo())
+        kinds = MASTER.getSystemState()
+        self.assertNotIn("/gazebo", {node for kind in kinds for _, nodes in kind for node in nodes})
+        self.assertFalse(ros_gazebo.gazebo_pause_physics(timeout=0.5), "it is gone")
+
+    def spawn(self):
+        self.assertTrue(
+            ros_spawn.spawn_model_in_gazebo(
+                "cartpole_gazebo", "cartpole_v1.urdf", "joint_position_control.yaml", CONTROLLERS,
+                model_urdf_folder="/robots", gazebo_name="cartpole",
+                controllers_pkg="cartpole_controller",
+            )
+        )  # fmt: skip
+        self.assertIn(
+            "joint_state_controller/JointStateController",
+            ros_controllers.list_controller_types_srv(),
+        )
+        spawned, text = ros_gazebo.gazebo_spawn_urdf_param("robot_description", "cartpole")
+        self.assertFalse(spawned)
+        self.assertTrue(text)
+
+    def put_the_joints(self):
+        self.assertTrue(ros_gazebo.gazebo_unpause_physics())
+        self.assertTrue(ros_gazebo.gazebo_pause_physics())
+        self.assertTrue(ros_gazebo.gazebo_reset_world())
+        self.assertTrue(ros_gazebo.gazebo_reset_sim())
+        joints = (["stand_cart", "cart_pole"], [0.1, 0.2])
+        heard = []
+        rospy.Subscriber("/joint_states", JointState, heard.append)
+        self.assertTrue(wait_until_heard("/joint_states"))
+        self.assertTrue(ros_gazebo.gazebo_set_model_configuration("cartpole", *joints))
+        self.assertTrue(wait_until(lambda: heard, 60.0, "joint states"))
+        state = dict(zip(heard[-1].name, heard[-1].position, strict=True))
+        self.assertAlmostEqual(state["stand_cart"], 0.1, places=6)
+        self.assertAlmostEqual(state["cart_pole"], 0.2, places=6)
+        self.assertFalse(ros_gazebo.gazebo_set_model_configuration("nix", *joints))
+        self.assertTrue(ros_controllers.reset_controllers_srv(CONTROLLERS))
+        self.assertTrue(ros_controllers.kill_controllers_srv(CONTROLLERS))
+
+    def start_a_spawner(self):
+        """The executable of package controller_manager; it unloads what it loaded."""
+        started = ros_node.ros_node_from_pkg(
+            "controller_manager", "spawner", name="spawner", args=" ".join(CONTROLLERS)
+        )
+        self.assertTrue(started)
+        for states in (dict.fromkeys(CONTROLLERS, "running"), {}):
+            found = wait_until(
+                lambda s=states: ros_controllers.list_controllers_srv() == s, 60.0, str(states)
+            )
+            self.assertTrue(found, ros_controllers.list_controllers_srv())
+            self.assertTrue(ros_node.ros_kill_node("/spawner"))
+
+
 if __name__ == "__main__":
     rospy.init_node("ros_utils_all_test")
-    rostest.rosrun("cartpole", "ros_utils_all", All)
+    rostest.rosrun("cartpole", "ros_utils_all", "__main__")

@@ -4,8 +4,6 @@
 import subprocess
 import sys
 import tempfile
-import threading
-import time
 import unittest
 from unittest import mock
 
@@ -21,31 +19,23 @@ from controller_manager_msgs.srv import (
 )
 from gazebo_msgs.srv import SpawnModel
 from std_srvs.srv import Empty, EmptyResponse
+from support.ros.calls import BOUND, wait_until
 
 from ros_utils import (
     ros_controllers,
     ros_gazebo,
     ros_launch,
     ros_node,
-    ros_params,
     ros_spawn,
     ros_urdf,
 )
 
-BOUND = 60.0  # [s]
 TRANSIENT = "import rospy; rospy.init_node('stranger'); rospy.spin()"
 
 
 def registered():
     state = rosgraph.Master("/test").getSystemState()
     return {node for kind in state for _, nodes in kind for node in nodes}
-
-
-def wait_until(condition):
-    deadline = time.monotonic() + BOUND
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.02)
 
 
 def load_description(ns="/"):
@@ -90,7 +80,7 @@ class Nodes(unittest.TestCase):
 
     def test_strangers_are_asked_and_own_node_is_spared(self):
         stranger = subprocess.Popen([sys.executable, "-c", TRANSIENT])
-        wait_until(lambda: "/stranger" in registered())
+        self.assertTrue(wait_until(lambda: "/stranger" in registered()))
         self.assertFalse(ros_node.ros_kill_node(rospy.get_name()))
         self.assertTrue(ros_node.ros_kill_all_nodes())
         self.assertEqual(stranger.wait(BOUND), 0)
@@ -108,29 +98,13 @@ class Nodes(unittest.TestCase):
         self.assertTrue({"/c/jsp", "/c/rsp"} <= registered())
         self.assertEqual(rospy.get_param("/c/jsp/rate"), 20)
         self.assertTrue(ros_launch.ros_kill_launch_process())
-        wait_until(lambda: not {"/c/jsp", "/c/rsp"} & registered())
+        self.assertTrue(wait_until(lambda: not {"/c/jsp", "/c/rsp"} & registered()))
 
     def test_a_launch_that_fails(self):
         with tempfile.NamedTemporaryFile("w", suffix=".launch") as file:
             file.write("<launch><node></launch>")
             file.flush()
             self.assertFalse(ros_launch.ros_launch_from_path(file.name))
-
-
-class Parameters(unittest.TestCase):
-    def test_description(self):
-        self.assertTrue(load_description())
-        self.assertIn("stand_cart", rospy.get_param("/robot_description"))
-
-    def test_yaml(self):
-        for ns in ("/", "/d", "d"):
-            with self.subTest(ns):
-                loaded = ros_params.ros_load_yaml_from_pkg(
-                    "cartpole_controller", "joint_position_control.yaml", ns
-                )
-                self.assertTrue(loaded)
-                name = f"/{ns.strip('/')}/stand_cart_position_controller/pid/p"
-                self.assertEqual(rospy.get_param(name), 100.0)
 
 
 class Services(unittest.TestCase):
@@ -153,14 +127,6 @@ class Services(unittest.TestCase):
         self.assertEqual(len(calls), 3)
 
     def test_a_missing_service(self):
-        with mock.patch("rospy.logerr") as told:
-            self.assertFalse(ros_gazebo.gazebo_reset_world(timeout=0.3))
-        self.assertIn("within 0.3 s", str(told.call_args))
-
-    def test_a_service_that_never_answers(self):
-        over = threading.Event()
-        self.addCleanup(over.set)
-        self.offer("/gazebo/reset_world", Empty, lambda _: over.wait(60) and EmptyResponse())
         with mock.patch("rospy.logerr") as told:
             self.assertFalse(ros_gazebo.gazebo_reset_world(timeout=0.3))
         self.assertIn("within 0.3 s", str(told.call_args))
@@ -255,7 +221,7 @@ LAUNCH_TEXT = """
 class Suite(unittest.TestSuite):
     def __init__(self):
         super().__init__()
-        for case in (Nodes, Parameters, Services):
+        for case in (Nodes, Services):
             self.addTests(unittest.defaultTestLoader.loadTestsFromTestCase(case))
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A user's own package through ros_utils: its files lie where the functions look by themselves."""
+"""ros_utils with a user's package, whose files it finds in the usual folders."""
 
 import os
 import subprocess
@@ -10,7 +10,6 @@ from pathlib import Path
 import rospy
 import rostest
 
-from ros_calls import master
 from ros_utils import (
     ros_controllers,
     ros_gazebo,
@@ -20,7 +19,7 @@ from ros_utils import (
     ros_spawn,
     ros_urdf,
 )
-from ros_utils.simulation import Simulation, reserved_port
+from ros_utils.simulation import Simulation
 
 PACKAGE = """<package format="2"><name>my_robot</name><version>0.0.1</version>
 <description>A robot.</description><maintainer email="a@example.com">a</maintainer>
@@ -184,17 +183,6 @@ class Package(unittest.TestCase):
         self.assertTrue(launch)
         self.assertEqual(self.parameter("/number_of_launch"), "5")
         self.assertTrue(launch.close())
-
-    def test_a_master_of_its_own(self):
-        uri = f"http://127.0.0.1:{reserved_port()}"
-        with master.using(uri):
-            self.assertFalse(ros_node.ros_node_from_pkg("gazebo_ros", "gzclient"))
-            self.assertTrue(
-                ros_node.ros_node_from_pkg("gazebo_ros", "gzclient", launch_master=True)
-            )
-            self.assertTrue(ros_node.ros_kill_master())
-            self.assertFalse(ros_node.ros_node_from_pkg("gazebo_ros", "gzclient"))
-            self.assertTrue(ros_node.ros_kill_master(), "there is none any more")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""StepClient against simulators that are there, restarted, stopped, and full of robots."""
+"""StepClient against simulators that run, restart, hang, or hold several robots."""
 
 import os
 import signal

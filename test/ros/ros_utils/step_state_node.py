@@ -1,16 +1,11 @@
 #!/usr/bin/env python3
-"""Links, models and contacts over ROS: bit for bit what the same world tells in this process."""
+"""Links, models and contacts over ROS are bit-identical to those in-process."""
 
 import importlib.util
-import sys
 import unittest
-from pathlib import Path
 
 import rostest
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from support.robots.arm_and_box import (
     ARM,
     ARM_PARAMETERS,

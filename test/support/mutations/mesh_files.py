@@ -1,4 +1,4 @@
-"""One cube in all kinds of mesh files."""
+"""One cube in every kind of mesh file."""
 
 import itertools
 import struct

@@ -1,4 +1,4 @@
-"""A process that spawns mesh files into worlds: an engine that crashes over one fails a test, not all tests.
+"""A process that spawns mesh files: an engine that crashes over one fails one test, not all.
 
 As a program it reads names of files from its standard input, a line each, and answers each by a line of
 JSON.

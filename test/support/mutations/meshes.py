@@ -1,4 +1,4 @@
-"""Mesh files that are damaged the way a writer, a disk or an enemy damages them: Hypothesis strategies.
+"""Hypothesis strategies for damaged mesh files.
 
 A mutation knows the grammar: it puts another index, number, name or element where one stands, and drops,
 doubles and swaps lines and elements. `mesh_files()` draws a suffix and the bytes of a file.

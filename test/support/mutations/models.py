@@ -1,4 +1,4 @@
-"""Models that were changed at random, by somebody who knows their grammar, and what reading one may lead to.
+"""Models with random changes, made with knowledge of the grammar; and what reading one may do.
 
 For `test_mutations.py`, which draws some hundreds, and for the stress suite, which draws thousands: each of
 CASES has a strategy of texts and a reader, which returns "read" or the one line of the refusal, and raises

@@ -1,4 +1,4 @@
-"""Changes of XML trees at random, by somebody who knows what names, numbers and joints are."""
+"""Random changes of XML trees, made with knowledge of names, numbers and joints."""
 
 import copy
 from functools import partial

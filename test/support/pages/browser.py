@@ -1,4 +1,4 @@
-"""A headless Chromium, driven by its DevTools protocol: opens a page, clicks, reads and takes pictures."""
+"""A headless Chromium over its DevTools protocol: opens a page, clicks, reads, takes pictures."""
 
 import base64
 import itertools

@@ -1,4 +1,4 @@
-"""Where a picture has to show something."""
+"""Where in a picture a point must appear."""
 
 import numpy as np
 

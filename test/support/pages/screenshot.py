@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A picture of a web page, by a headless Chromium (apt-get install chromium): those of README and docs.
+"""Takes a picture of a web page with headless Chromium (apt-get install chromium).
 
 ./ws python3 test/support/pages/screenshot.py http://127.0.0.1:8080/ page.png --click World --size 1200x700
 """

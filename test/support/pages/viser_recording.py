@@ -1,4 +1,4 @@
-"""What a recording of viser's holds, read back."""
+"""Reads what a viser recording holds."""
 
 import base64
 import re

@@ -1,4 +1,4 @@
-"""The window's page in a real browser, for tests: what is started, clicked and looked at."""
+"""The window's page in a real browser: start it, click, look."""
 
 import io
 import subprocess

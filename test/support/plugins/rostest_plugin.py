@@ -1,4 +1,4 @@
-"""Lets pytest collect rostest files, so that one command selects and counts all tests alike.
+"""Collects rostest files as pytest items, so that one command runs and counts all tests.
 
 Every `test/ros/*.test` becomes one item. It passes when rostest ends with exit code 0 *and* its
 result files hold at least one test and no failure: rostest alone has been seen to report success
@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 ROSTEST = "/usr/bin/rostest"
+TESTS = str(Path(__file__).resolve().parents[2])
 DEFAULT_TIME_LIMIT = 60.0  # of a <test>, as in rostest [s]
 MARGIN = 60.0  # for the master and the nodes to start and stop [s]
 GRACE = 30.0  # for rostest to end its nodes after an interrupt [s]
@@ -68,6 +69,8 @@ def run(path: Path, folder: Path) -> None:
         "ROS_TEST_RESULTS_DIR": str(results),
         "ROS_LOG_DIR": str(folder / "log"),
         "ROS_HOME": str(folder / "home"),
+        # For support.
+        "PYTHONPATH": os.pathsep.join([TESTS, *filter(None, [os.environ.get("PYTHONPATH")])]),
     }
     limit = time_limit(path)
     with log.open("wb") as output:

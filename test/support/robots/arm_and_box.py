@@ -1,4 +1,4 @@
-"""A two-link arm and a box that falls onto the ground beside it, in a world of this process."""
+"""A two-link arm beside a falling box, in an in-process world."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Robots for the tests: the cart-pole's figures, written down once more as an independent record."""
+"""The cart-pole's figures, written down a second time as an independent record."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Runs of the cart-pole for comparing physics engines with its equations of motion."""
+"""Runs of the cart-pole that compare physics engines with its equations of motion."""
 
 import math
 from collections.abc import Callable

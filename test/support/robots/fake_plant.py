@@ -1,4 +1,4 @@
-"""A cart-pole that needs no physics: a backend for unit tests of environments."""
+"""A cart-pole without physics: a backend for unit tests of environments."""
 
 from bullet_gazebo.physics.pose import Pose
 from cartpole.robot import CART_JOINT, CONTROLLER, POLE_JOINT, ROBOT

@@ -1,4 +1,4 @@
-"""Robots for which new_robot.py writes packages, as text; and whether one does the task that it gets."""
+"""Robots as text for which new_robot.py writes packages."""
 
 import numpy as np
 

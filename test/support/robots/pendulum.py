@@ -1,4 +1,4 @@
-"""A robot that is no cart-pole, as a user would bring one: its description, a task, an environment."""
+"""A robot as a user would bring one: its description, a task, an environment."""
 
 import math
 from pathlib import Path

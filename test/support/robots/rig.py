@@ -1,4 +1,4 @@
-"""Robots on which each option of sim-to-real can be felt alone: a rig of slides and a servo, and a sledge."""
+"""Robots that show each sim-to-real option alone: a rig of slides and a servo, and a sledge."""
 
 from typing import Any
 

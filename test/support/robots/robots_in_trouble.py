@@ -1,4 +1,4 @@
-"""Robots of test/data in a lock-step world, their controllers, and what is told of them."""
+"""Robots of test/data in a lock-step world, their controllers, and what is reported of them."""
 
 import logging
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A JointTrajectoryController on obedient joints, for tests that go tick by tick."""
+"""A JointTrajectoryController on obedient joints, stepped tick by tick."""
 
 from bullet_gazebo.control.controllers import BUILT_IN
 from bullet_gazebo.control.hardware import RobotHardware

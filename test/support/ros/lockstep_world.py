@@ -1,4 +1,4 @@
-"""A world for lockstep_runner that is no more than a counter."""
+"""A world for lockstep_runner that only counts ticks."""
 
 from types import SimpleNamespace
 

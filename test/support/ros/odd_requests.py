@@ -1,4 +1,4 @@
-"""Requests that no client should make, drawn by Hypothesis: fields of the right type, with odd values."""
+"""Hypothesis strategies for requests with fields of the right type and odd values."""
 
 import math
 

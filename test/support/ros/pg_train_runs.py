@@ -1,4 +1,4 @@
-"""Runs of pg_train.py for tests: each on a master of its own, with every process accounted for."""
+"""Programs under test, each on a master of its own, with every process accounted for."""
 
 import contextlib
 import os

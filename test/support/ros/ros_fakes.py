@@ -1,4 +1,4 @@
-"""What looks from outside like a ROS master, and like a node with one service; without ROS's servers."""
+"""A fake ROS master, and a fake node with one service, without ROS's servers."""
 
 import contextlib
 import io

@@ -1,6 +1,7 @@
-"""When a subscriber has every message from now on: its publishers have to know it, not only it them."""
+"""Listeners that miss no message: they wait until each publisher knows them."""
 
 import re
+import threading
 import xmlrpc.client
 
 import rosgraph
@@ -46,3 +47,34 @@ def wait_until_heard(*topics):
             return True
         rospy.rostime.wallsleep(POLL)
     return False
+
+
+class Listener:
+    """Keeps what comes on a topic.
+
+    Args:
+        topic: its name.
+        kind: type of the messages.
+        connected: whether to wait first until its publishers send to this process.
+        read: what is kept of a message.
+    """
+
+    def __init__(self, topic, kind, connected=True, read=lambda message: message):
+        self.messages = []
+        self._news = threading.Condition()
+        self._read = read
+        self._subscriber = rospy.Subscriber(topic, kind, self._receive, tcp_nodelay=True)
+        assert not connected or wait_until_heard(topic), f"nobody publishes {topic}"
+
+    def _receive(self, message):
+        with self._news:
+            self.messages.append(self._read(message))
+            self._news.notify_all()
+
+    def wait_for(self, condition, bound=BOUND):
+        """Wait until `condition` holds of the list of messages, which isn't empty; return its answer."""
+        with self._news:
+            return self._news.wait_for(lambda: self.messages and condition(self.messages), bound)
+
+    def close(self):
+        self._subscriber.unregister()

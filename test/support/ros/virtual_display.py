@@ -1,4 +1,4 @@
-"""A display that nobody sees, and what is on it."""
+"""A virtual display, and what is on it."""
 
 import contextlib
 import shutil

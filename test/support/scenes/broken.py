@@ -1,4 +1,4 @@
-"""Environments and tasks that each break one promise; see robot_envs.testing."""
+"""Environments and tasks that each break one promise (see robot_envs.testing)."""
 
 import numpy as np
 from support.scenes.solo_arm import SOLO, Hold, Reach

@@ -1,4 +1,4 @@
-"""What the scenes' robots are written with: links, joints and transmissions of a URDF."""
+"""Links, joints and transmissions of the scenes' URDFs."""
 
 INERTIA = '<inertia ixx="{0}" ixy="0" ixz="0" iyy="{0}" iyz="0" izz="{0}"/>'
 PLUGIN = """<gazebo><plugin name="control" filename="libgazebo_ros_control.so">

@@ -1,4 +1,4 @@
-"""A rover that rolls over a ground plane: two wheels of a velocity group, and a castor that nobody drives."""
+"""A rover with two driven wheels and a castor on a ground plane."""
 
 import numpy as np
 from gymnasium.spaces import Box

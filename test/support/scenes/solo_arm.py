@@ -1,4 +1,4 @@
-"""One arm, with the simplest tasks: something to take a wrong piece into."""
+"""One arm with the simplest tasks, for tests that put one wrong piece in."""
 
 from dataclasses import replace
 from typing import Any

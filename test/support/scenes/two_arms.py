@@ -1,4 +1,4 @@
-"""Two arms, driven in different ways, in a world with a wall; between them a ball that one of them hits.
+"""Two arms with different drives, a wall, and a ball that one of them hits.
 
 The left one has a group of positions; the right one a position with a PID, and a velocity with one of
 gazebo_ros_control's. A tassel hangs at each, which nobody drives or measures. The ball, and a plinth from

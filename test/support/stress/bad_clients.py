@@ -1,4 +1,4 @@
-"""Clients that no network should have: they send garbage, stop in the middle, vanish, or say nothing."""
+"""Clients that send garbage, stop halfway, vanish, or say nothing."""
 
 from __future__ import annotations
 

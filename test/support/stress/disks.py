@@ -1,4 +1,4 @@
-"""Disks that are too small, and that grow again."""
+"""Small file systems that fill up and can grow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values of Hypothesis's strategies, many and again the same, without its tests."""
+"""Many repeatable values of a Hypothesis strategy, outside of its tests."""
 
 from __future__ import annotations
 

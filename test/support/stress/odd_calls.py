@@ -1,4 +1,4 @@
-"""A node that calls all that a simulator offers with odd values: python3 -m stress.odd_calls SEED COUNT.
+"""Calls all of a simulator's interface with odd values: python3 -m support.stress.odd_calls SEED COUNT.
 
 Types are right, values are not. Each request of a service has to be answered within a time limit: carried out
 or refused. Its last line is a JSON object with the numbers of those that were sent, by kind.
@@ -32,10 +32,10 @@ from support.stress.drawing import drawn
 
 from bullet_gazebo.ros.clients.world_client import METHOD
 from cartpole.robot import ROBOT
-from robot_envs.backends.ros.bringup.robots import bring_up
+from robot_envs.backends.ros.bringup import bring_up
 from robot_envs.scene import Scene
+from ros_calls.master import BadAnswer, Refused, call_node
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceGone
-from ros_calls.xmlrpc import BadAnswer, Refused, call
 
 NODE = "/gazebo"
 OFTEN = 50  # calls, after which the world is completed again
@@ -141,7 +141,7 @@ class OddCalls:
         self.sent["XML-RPC"] += 1
         # An answer, too, or nothing that XML can hold.
         with contextlib.suppress(Refused, BadAnswer, OverflowError, UnicodeEncodeError):
-            call(self._address, method, *arguments, timeout=BOUND)
+            call_node(self._address, method, *arguments, timeout=BOUND)
         self.answered["XML-RPC"] += 1
 
 

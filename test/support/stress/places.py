@@ -1,4 +1,4 @@
-"""Simulators and trainings over ROS, each on a master of its own, with all that they leave accounted for."""
+"""Simulators and trainings over ROS, each on a master of its own, with all leftovers accounted for."""
 
 from __future__ import annotations
 

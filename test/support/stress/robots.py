@@ -1,4 +1,4 @@
-"""Robots drawn at random: chains of links, each of another shape and size than any before."""
+"""Random robots: chains of links of random shapes and sizes."""
 
 import random
 

@@ -1,4 +1,4 @@
-"""A scenario: many cases drawn from one seed, all of them tried, counted, and told in a row of the table."""
+"""A scenario: many cases drawn from one seed, all tried and counted in a row of the table."""
 
 from __future__ import annotations
 

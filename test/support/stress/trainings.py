@@ -1,4 +1,4 @@
-"""Trainings in processes of their own, forked off one that has imported all: that takes longest."""
+"""Trainings in processes forked from one that has imported everything, which takes longest."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ OPTIONS: dict[str, dict[str, Any]] = {
 _ONE_AT_A_TIME = threading.Lock()
 _ANYWHERE = {"env_id": "CartPole-v1", "env_kwargs": None}
 IMPORTED = [
-    "rl_workbench.training.cli",
-    "rl_workbench.training.run.training",
-    "rl_workbench.training.dqn.algorithm",
-    "rl_workbench.training.pg.making",
+    "rl_workbench.training.train",
+    "rl_workbench.training.training",
+    "rl_workbench.training.dqn",
+    "rl_workbench.training.pg",
     "torch._dynamo",
     "torch.utils.tensorboard",
     "matplotlib.pyplot",
@@ -128,7 +128,7 @@ def _forking() -> multiprocessing.context.ForkServerContext:
 
 
 def _command(arguments: list[str], folder: Path, log: Path, limits: dict[int, int]) -> None:
-    from rl_workbench.training.cli import main
+    from rl_workbench.training.train import main
 
     os.chdir(folder)
     with log.open("ab") as output:

@@ -1,4 +1,4 @@
-"""A running simulator for stress tests: what it holds, what it takes of the machine, whether it serves."""
+"""A running simulator for stress tests: its models, its resources, whether it serves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small environments with goals, and of continuous actions, in pure NumPy: quick and deterministic."""
+"""Small, quick, deterministic environments in NumPy, with goals or continuous actions."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""Small robots and environments to learn on in unit tests: quick, and all but one deterministic."""
+"""Small, quick robots and environments to learn on; all but one deterministic."""
 
 import random
 from typing import Any, ClassVar
@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import torch
 
-from rl_workbench.agents.pg.document import PolicyGradientAgent
-from rl_workbench.agents.pg.reinforce import ReinforceAgent
-from rl_workbench.training.pg.episodes import run_episode
+from rl_workbench.agents.document import PolicyGradientAgent
+from rl_workbench.agents.reinforce import ReinforceAgent
+from rl_workbench.training.episodes import run_episode
 
 DT = 0.008  # [s]
 

@@ -1,4 +1,4 @@
-"""Small trainings in this process, and what is left of two of them compared: but for the clock, bits."""
+"""Small in-process trainings, and comparisons of two: bit-identical except for the clock."""
 
 import csv
 import json
@@ -12,15 +12,16 @@ import torch
 from support.training.learning_fakes import POLE
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from rl_workbench.training.algorithms import algorithm, recorded_kind
-from rl_workbench.training.options.training_options import (
+from rl_workbench.starting import Interrupt
+from rl_workbench.training.algorithms import algorithm
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.options import (
     TrainingOptions,
-    choose,
     known_options,
     make_options,
+    recorded_kind,
 )
-from rl_workbench.training.run.interrupt import Interrupt
-from rl_workbench.training.run.training import Training
+from rl_workbench.training.training import Training
 
 EXACT = ("dqn", "reinforce", "reinforce-document")  # our own; they need no extras
 OTHERS = [

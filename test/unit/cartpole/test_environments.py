@@ -79,15 +79,6 @@ def test_options_that_make_no_sense_are_refused(options, text):
         gymnasium.make("cartpole/Balance-v0", **options).close()
 
 
-@pytest.mark.parametrize("display", [None, ":77"])
-def test_a_window_without_a_display_is_an_error_that_says_what_to_do(monkeypatch, display):
-    monkeypatch.delenv("DISPLAY", raising=False)
-    if display:
-        monkeypatch.setenv("DISPLAY", display)
-    with pytest.raises(RobotEnvError, match="needs a display .*rgb_array"):
-        gymnasium.make("cartpole/Balance-v0", render_mode="human")
-
-
 def test_a_backend_that_got_no_environment_is_closed(monkeypatch):
     closed, close = [], InProcessWorld.close
 

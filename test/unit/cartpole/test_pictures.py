@@ -10,7 +10,7 @@ from support.pages.pictures import pixel
 import cartpole  # noqa: F401 - registers the environments
 from cartpole.environment import CAMERA
 from cartpole.robot import CART_JOINT, POLE_JOINT, ROBOT
-from robot_envs.pictures.picture import RobotPicture
+from robot_envs.pictures.drawn import RobotPicture
 
 WIDTH, HEIGHT = 320, 160
 HINGE = 0.18  # [m] above the ground

@@ -65,7 +65,7 @@ def test_an_exported_policy_of_another_task_is_refused(exported: Path, monkeypat
 
 
 def renamed(env_id: str):
-    from rl_workbench.tools.runs.exported import ExportedPolicy, open_exported
+    from rl_workbench.tools.torchscript import ExportedPolicy, open_exported
 
     def opened(path: Path) -> ExportedPolicy:
         act, metadata = open_exported(path)
@@ -103,7 +103,7 @@ def test_private_parameters_are_options_and_flags_count_more() -> None:
 
 
 def test_a_mistake_in_a_task_is_one_line_with_its_place(run: Path, monkeypatch, capsys) -> None:
-    from robot_envs.backends.deployment import policy_node as node
+    from robot_envs.deployment import policy_node as node
 
     def fails(*arguments: object) -> None:
         raise ZeroDivisionError("division by zero")

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from support.robots.cartpole import CartPole
 
+from cartpole.environment import CartPoleRandomisation, CartPoleVariation
 from cartpole.robot import CONTROL_PERIOD, CONTROLLER, ROBOT
 from cartpole.tasks import CartPoleState
-from cartpole.variation import CartPoleVariation, Randomisation
+from robot_envs import files
 from robot_envs.backends.in_process import InProcessWorld
-from robot_envs.description import files
-from robot_envs.description.files import own_file
 from robot_envs.errors import RobotEnvError, TaskError
+from robot_envs.files import own_file
 from robot_envs.scene import Scene
 
 UPRIGHT = CartPoleState(0.0, 0.0, 0.0, 0.0)
@@ -143,7 +143,7 @@ def test_friction_of_the_rail_slows_the_cart(backend):
 
 def test_draws_fill_their_ranges():
     rng = np.random.default_rng(0)
-    drawn = np.array([Randomisation(0.2, 0.1, 2.0, 0.01).draw(rng)[1] for _ in range(1000)])
+    drawn = np.array([CartPoleRandomisation(0.2, 0.1, 2.0, 0.01).draw(rng)[1] for _ in range(1000)])
     assert drawn.min(axis=0) == pytest.approx([0.8, 0.8, 0.9, 0.0, 0.0], abs=0.01)
     assert drawn.max(axis=0) == pytest.approx([1.2, 1.2, 1.1, 2.0, 0.01], abs=0.01)
 
@@ -162,10 +162,10 @@ def test_a_blow_up_is_contained_and_leaves_nothing_behind(backend, caplog):
 
 
 def test_what_is_drawn_is_what_is_told_of_it():
-    variation, told = Randomisation(0.2, 0.1, 2.0, 0.01).draw(np.random.default_rng(0))
+    variation, told = CartPoleRandomisation(0.2, 0.1, 2.0, 0.01).draw(np.random.default_rng(0))
     assert CartPoleVariation(*told).of_robot() == variation
     assert not variation.is_nominal
-    assert Randomisation().draw(np.random.default_rng(0))[0].is_nominal
+    assert CartPoleRandomisation().draw(np.random.default_rng(0))[0].is_nominal
 
 
 def test_the_robot_is_found_from_anywhere_without_ros(tmp_path, root: Path):

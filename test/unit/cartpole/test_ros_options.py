@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from cartpole.ros_options import ros_options
+from cartpole.workbench import ros_options
 from robot_envs.backends.ros import node
 from robot_envs.errors import RobotEnvError
 
@@ -26,7 +26,7 @@ def test_ross_options_without_ros_are_an_error_in_one_line(monkeypatch):
 
 def test_without_ross_options_the_arguments_are_the_flags_and_ros_is_not_loaded():
     script = (
-        "import sys; from cartpole.ros_options import ros_options;"
+        "import sys; from cartpole.workbench import ros_options;"
         "print(ros_options(['--seed=3', 'x'], 'learner'),"
         " [m for m in ('rospy', 'rosgraph', 'roslib', 'genpy', 'ros_utils') if m in sys.modules])"
     )

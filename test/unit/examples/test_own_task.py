@@ -1,4 +1,4 @@
-"""examples/own_task.py: short, an environment like any other, and a workbench that knows it."""
+"""examples/own_task.py is short, a regular environment, and known to the workbench."""
 
 import importlib
 import subprocess

@@ -1,4 +1,4 @@
-"""The single files of examples/: what they may be, that they run, and that they are the library's algorithms.
+"""The single-file examples run, stay within their bounds, and equal the library's algorithms bit for bit.
 
 The same options, given to a file and to `workbench.py train`, have to lead to the same weights, bit for bit.
 """

@@ -12,7 +12,7 @@ import pytest
 
 from files import expansion
 from files.expansion import LIMITS, CannotExpand, expand, included_files
-from robot_envs.description import files as descriptions
+from robot_envs import files as descriptions
 from robot_envs.errors import RobotEnvError
 from ros_utils import ros_gazebo, ros_urdf
 

@@ -1,4 +1,4 @@
-"""What the tests of `ws` share."""
+"""Fixtures for the tests of `ws`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The arrows of the architecture: who may import whom (docs/architecture.md), and no circles."""
+"""The architecture (docs/architecture.md): who may import whom, no circles, one name for one thing."""
 
 import ast
 import subprocess
@@ -16,6 +16,10 @@ MODULES = sorted(SRC.rglob("*.py"))
 FOLDERS = sorted({path.parent for path in MODULES} | {SRC})
 OURS = {"bullet_gazebo", "cartpole", "rl_workbench", "robot_envs", "ros_calls", "ros_utils",
         "files", "lockstep_runner", "package_writing", "viewer"}  # fmt: skip
+LEARNING = {"gymnasium", "torch", "stable_baselines3", "matplotlib"}
+MOST_ENTRIES = 25
+MOST_DOUBLE_CLASSES = 26
+MOST_DOUBLE_MODULES = 29
 ROS = ("rospy", "rosgraph", "rosnode", "roslib", "rosparam", "roslaunch", "rosservice")
 ROS_ROOMS = (
     "bullet_gazebo/ros",
@@ -23,6 +27,7 @@ ROS_ROOMS = (
     "ros_calls",
     "ros_utils",
     "robot_envs/backends",
+    "robot_envs/deployment",
 )
 
 # A library, and which of ours it may import.
@@ -50,11 +55,9 @@ FORBIDDEN = [
     ("cartpole", ("pybullet", "torch")),
     ("rl_workbench/agents", ("gymnasium", "rl_workbench.tools", "rl_workbench.training")),
     ("rl_workbench/training", ("rl_workbench.tools",)),
-    ("rl_workbench/training/options", tuple(f"rl_workbench.training.{each}" for each in
-                                            ("run", "dqn", "pg", "sb3"))),
     *((f"rl_workbench/training/{room}", tuple(f"rl_workbench.training.{each}" for each in
-                                              ("dqn", "pg", "sb3") if each != room))
-      for room in ("run", "dqn", "pg", "sb3")),
+                                              ("dqn", "pg", "sb3") if not room.startswith(each)))
+      for room in ("training.py", "dqn.py", "pg.py", "sb3")),
 ]  # fmt: skip
 WITHOUT_ROS = (
     "bullet_gazebo.physics.world",
@@ -63,7 +66,7 @@ WITHOUT_ROS = (
     "cartpole.pg_train",
     "cartpole.workbench",
     "rl_workbench.cli",
-    "rl_workbench.training.run.training",
+    "rl_workbench.training.training",
     "robot_envs.backends.in_process",
     "robot_envs.environment",
 )
@@ -134,10 +137,52 @@ for name in {WITHOUT_ROS!r}:
     assert done.returncode == 0, done.stderr
 
 
-def test_folders_are_small_enough_to_be_seen_at_a_glance() -> None:
-    crowds = {
-        str(folder.relative_to(SRC)): len(entries)
-        for folder in FOLDERS
-        if len(entries := [each for each in folder.iterdir() if each.name[:2] != "__"]) > 15
-    }
-    assert not crowds
+def loaded_by(*names: str) -> set[str]:
+    """The top-level packages that a fresh Python has after importing modules."""
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys, {', '.join(names)}; print(*sys.modules)"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return {name.partition(".")[0] for name in done.stdout.split()}
+
+
+@pytest.mark.parametrize(
+    ("module", "absent"),
+    [
+        ("bullet_gazebo.ros.node.gzserver", LEARNING),
+        ("bullet_gazebo.ros.clients.gz", {"rospy", *LEARNING}),
+        ("bullet_gazebo.simulator", LEARNING),
+    ],
+)
+def test_an_import_leaves_out_what_takes_seconds(module: str, absent: set[str]) -> None:
+    assert not loaded_by(module) & absent
+
+
+def test_no_folder_is_crowded() -> None:
+    entries: dict[Path, set[str]] = defaultdict(set)
+    for path in (each for each in MODULES if each.name[:2] != "__"):
+        for folder in path.relative_to(SRC).parents:  # a folder that git has left behind is none
+            entries[folder].add(path.relative_to(SRC / folder).parts[0])
+    assert {
+        str(each): len(names) for each, names in entries.items() if len(names) > MOST_ENTRIES
+    } == {}
+
+
+def test_a_name_means_one_class() -> None:
+    places: dict[str, set[str]] = defaultdict(set)
+    for path in MODULES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places[node.name].add(str(path.relative_to(SRC)))
+    doubles = {name: sorted(found) for name, found in places.items() if len(found) > 1}
+    assert len(doubles) <= MOST_DOUBLE_CLASSES, doubles
+
+
+def test_a_name_means_one_module_of_a_library() -> None:
+    places: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for path in MODULES:
+        name = str(path.relative_to(SRC))
+        if not path.name.startswith("__"):
+            places[name.split("/", maxsplit=1)[0], path.stem].append(name)
+    doubles = {"/".join(key): found for key, found in places.items() if len(found) > 1}
+    assert len(doubles) <= MOST_DOUBLE_MODULES, doubles

@@ -1,4 +1,4 @@
-"""Whoever follows a citation of the contract finds the section (docs/contract/README.md)."""
+"""Citations such as docs/contract/gazebo.md 2.1 lead to a section (docs/contract/README.md)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ ROOT = Path(__file__).resolve().parents[3]
 CONTRACT = ROOT / "docs" / "contract"
 ROOMS = ("src", "test", "companions", "docs", "benchmark", "examples", "scripts", "launch")
 SUFFIXES = {"", ".py", ".md", ".launch", ".test", ".xml", ".yaml", ".msg", ".srv", ".action"}
-FEWEST = 50
 
 NUMBER = r"\d+(?:\.\d+)?"
 NUMBERS = rf"{NUMBER}(?:(?:, | and | to ){NUMBER})*"
@@ -20,11 +19,6 @@ CITATION = re.compile(rf"docs/contract/([\w.]+\.md)\b(?: ({NUMBERS}))?")
 LINK = re.compile(rf"\]\((\w+\.md)\)(?: ({NUMBERS}))?")  # from one page of the contract to another
 OWN = re.compile(rf"\((\d+\.\d+(?:(?:, | and | to ){NUMBER})*)\)")  # within a page
 HEADING = re.compile(rf"^#{{2,3}} ({NUMBER}) \S", re.MULTILINE)
-# What the citations were before the contract was part of the repository.
-OLD = re.compile(
-    r"gazebo_api\.md|reference/|\.md,? sections? \d|\(sections? \d|[Cc]ontract: \w+\.md"
-)
-OLD_IN_CODE = re.compile(r"(?<![\w/])(?:ros_control|ros_utils)\.md")
 
 
 def read(path: Path) -> str:
@@ -33,11 +27,10 @@ def read(path: Path) -> str:
 
 
 def files() -> Iterator[Path]:
-    """All text files of the rooms but this one, which has the old forms in it."""
+    """All text files of the rooms."""
     for room in ROOMS:
         for path in sorted((ROOT / room).rglob("*")):
-            wanted = path.is_file() and path.suffix in SUFFIXES and "__pycache__" not in path.parts
-            if wanted and path != Path(__file__).resolve():
+            if path.is_file() and path.suffix in SUFFIXES and "__pycache__" not in path.parts:
                 yield path
 
 
@@ -82,39 +75,8 @@ def test_what_is_cited_exists(where: str, name: str, numbers: str) -> None:
     assert missing(name, numbers) == []
 
 
-def test_the_citations_are_found() -> None:
-    assert len([each for each in CITED if each[2]]) >= FEWEST
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_a_page_refers_to_what_exists(page: Path) -> None:
     links = [found for found in LINK.findall(TEXTS[page]) if found[0] != "README.md"]
     within = [(page.name, numbers) for numbers in OWN.findall(TEXTS[page])]
     assert [each for each in links + within if missing(*each)] == []
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_a_number_is_used_once(page: Path) -> None:
-    found = sections(page)
-    assert sorted(set(found)) == sorted(found)
-    assert found or page.name == "README.md"
-
-
-def test_no_citation_of_the_old_form() -> None:
-    found = {}
-    for path, text in TEXTS.items():
-        old = OLD.findall(text)
-        if not path.is_relative_to(ROOT / "docs"):  # there ros_utils.md is a page
-            old += OLD_IN_CODE.findall(text)
-        if old:
-            found[str(path.relative_to(ROOT))] = old
-    assert found == {}
-
-
-def test_ranges_lists_and_gaps() -> None:
-    assert expanded("2.18 and 2.19") == ["2.18", "2.19"]
-    assert expanded("1.9 to 1.11, 3 and 4.2") == ["1.9", "1.10", "1.11", "3", "4.2"]
-    assert missing("gazebo.md", "2.20 to 2.23") == ["2.22", "2.23"]
-    assert missing("nobody.md", "1") == ["nobody.md"]
-    with pytest.raises(ValueError, match="different chapters"):
-        expanded("1.2 to 2.3")

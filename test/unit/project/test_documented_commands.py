@@ -1,7 +1,7 @@
-"""Every command of the documentation is one that its program takes: flags, files, arguments, requests.
+"""Every command in the documentation is one that its program takes: flags, files, arguments, requests.
 
-Those of the tutorials are run by test_tutorial.py and test_tutorial_robot.py, those of docs/catkin.md by
-test_catkin_workspace.py. A command that nothing here knows how to look at is a fault.
+test_tutorial.py, test_tutorial_robot.py and test_catkin_workspace.py run those of their pages. A command
+that no test here knows how to check is a fault.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from bullet_gazebo.ros.clients import gzclient
 from cartpole import dqn_train, pg_train, policy_node, workbench
 from lockstep_runner import launcher as lockstep_launcher
 from package_writing import cli as new_robot
-from rl_workbench.training import cli as training_cli
+from rl_workbench.training import train as training_cli
 from rl_workbench.training.algorithms import ALGORITHMS
 
 pytestmark = pytest.mark.usefixtures("signals")

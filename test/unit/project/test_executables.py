@@ -1,4 +1,4 @@
-"""The executables that launch files start, where there is no master to talk to."""
+"""The executables of launch files when there is no master to talk to."""
 
 import os
 import signal

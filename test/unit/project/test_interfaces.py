@@ -1,4 +1,4 @@
-"""Every interface is the one that Gazebo's and ros_control's clients were built with.
+"""Every interface has the md5 sum that clients of Gazebo and ros_control were built with.
 
 See docs/contract/interfaces.md 3.
 """

@@ -1,4 +1,4 @@
-"""A rostest that didn't prove anything must not pass."""
+"""A rostest that proved nothing must not pass."""
 
 from __future__ import annotations
 
@@ -46,31 +46,21 @@ def test_success_passes(probe):
 
 
 @pytest.mark.parametrize(
-    ("body", "text"),
+    ("body", "options", "text"),
     [
-        ("self.assertEqual(1, 2)", "1 != 2"),
-        ("raise OSError('no such thing')", "no such thing"),
-        ("os.kill(os.getpid(), signal.SIGKILL)", "probe.test"),
+        ("self.assertEqual(1, 2)", {}, "1 != 2"),
+        ("os.kill(os.getpid(), signal.SIGKILL)", {}, "probe.test"),
+        ("pass", {"launch": ""}, "no test was executed"),
     ],
-    ids=["failure", "error", "death"],
+    ids=["failure", "death", "no test"],
 )
-def test_failure_fails(probe, body, text):
+def test_failure_fails(probe, body, options, text):
     with pytest.raises(rostest_plugin.RostestFailure, match=text):
-        probe(body)
-
-
-def test_no_test_fails(probe):
-    with pytest.raises(rostest_plugin.RostestFailure):
-        probe("pass", launch="")
-
-
-def test_time_limit_fails(probe):
-    with pytest.raises(rostest_plugin.RostestFailure):
-        probe("signal.pause()", limit=2)
+        probe(body, **options)
 
 
 def test_hang_is_ended(probe, monkeypatch):
-    """When rostest's own time limit doesn't end it, the plugin does, and leaves nothing behind."""
+    """The plugin ends it where rostest's own time limit doesn't, and leaves nothing behind."""
     monkeypatch.setattr(rostest_plugin, "time_limit", lambda path: 3.0)
     ours = os.getpid()
     before = set(rostest_plugin.descendants(ours))

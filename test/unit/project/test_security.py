@@ -1,4 +1,4 @@
-"""What docs/security.md says of files, imports and folders."""
+"""What docs/security.md promises about files, imports and folders."""
 
 import ast
 import stat

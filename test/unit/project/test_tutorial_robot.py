@@ -1,4 +1,4 @@
-"""Every command of docs/tutorial_robot.md, in order, with shorter trainings: a package of one's own.
+"""Every command of docs/tutorial_robot.md in order, with shorter trainings: a user's own package.
 
 A block `sh skip` is another way to begin. One of Python that names a file is put at that file's end.
 Simulations are started, seen to be there, and ended; with RViz their launch files are read.
@@ -86,6 +86,8 @@ class Reader:
 
     def do(self, words: list[str]) -> None:
         assert words[0] == "./ws", words
+        if words[1] == "extras":  # a test installs nothing; `ws test` has done so
+            return
         words = [
             each.replace("../my_arm", str(self.folder.parent / "my_arm")) for each in words[1:]
         ]
@@ -117,7 +119,7 @@ class Reader:
                 stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
             )  # fmt: skip
             code = (
-                "from robot_envs.backends.ros.bringup.robots import ready;"
+                "from robot_envs.backends.ros.bringup import ready;"
                 "from robot_envs.scene import Scene; from my_arm.robot import ROBOT;"
                 "from ros_calls.waiting import wait_until;"
                 "import rosgraph; assert wait_until(rosgraph.is_master_online, 180, 'master');"
@@ -187,9 +189,3 @@ def test_both_languages_have_the_same_commands() -> None:
         return [re.sub(r" *#.*", "", block.text) for block in page]
 
     assert code(mine) == code(other)
-
-
-@pytest.mark.parametrize("page", [ENGLISH, CHINESE], ids=lambda page: page.name)
-def test_links_are_there(page: Path) -> None:
-    for target in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
-        assert (page.parent / target).exists(), target

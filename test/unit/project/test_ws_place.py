@@ -1,4 +1,4 @@
-"""Where `ws` builds: in the checkout, wherever that lies, or elsewhere where it can't be written."""
+"""Where `ws` builds: in the checkout, wherever that lies, or elsewhere if it can't be written."""
 
 from __future__ import annotations
 
@@ -13,18 +13,7 @@ from pathlib import Path
 import pytest
 
 NOBODY = 65534
-STRANGE = [
-    "a b",
-    "ü",
-    "new\nline",
-    "end\n",
-    "semi;colon",
-    "co:lon",
-    "$HOME",
-    'quo"te',
-    "ta\tb",
-    "l" * 99,
-]
+STRANGE = ["ü a b", "new\nline\n", "semi;co:lon", "$HOME", 'quo"te\t', "l" * 99]
 only_root = pytest.mark.skipif(
     os.geteuid() != 0, reason="only root can become a user without rights"
 )
@@ -158,25 +147,9 @@ def test_a_strange_path_gets_a_plain_name(ws, strange):
     assert links_to(strange) == []
 
 
-def test_links_of_checkouts_that_are_gone_are_swept(ws, root, tmp_path):
-    made = []
-    for name in ("gone away", "left alone"):
-        copy = tmp_path / name
-        shutil.copytree(root / "tools", copy / "tools")
-        shutil.copy(root / "ws", copy)
-        assert ws("--help", script=copy / "ws").returncode == 0
-        made += links_to(copy)
-    gone, left = made
-    shutil.rmtree(tmp_path / "gone away")
-    assert ws("--help", script=copy / "ws").returncode == 0
-    assert not gone.is_symlink() and left.is_symlink()
-    ws("clean", script=copy / "ws")
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ü b:c$d(e&f%g", "a;b\"c'd#e\\f\ng\n"], ids=ascii)
-def test_all_works_below_a_strange_path(ws, root, tmp_path, tmp_path_factory, name):
-    copy = tmp_path / name
+def test_all_works_below_a_strange_path(ws, root, tmp_path, tmp_path_factory):
+    copy = tmp_path / "ü b:c$d(e&f%g;h\"i'j#k\\l\nm\n"
     hidden = shutil.ignore_patterns(".*", "__pycache__", "runs", "docs", "*_msgs")
     shutil.copytree(
         root, copy, ignore=hidden

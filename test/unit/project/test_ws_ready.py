@@ -1,4 +1,4 @@
-"""`ws` makes a checkout ready: what it says before and meanwhile, and when that fails."""
+"""`ws` makes a checkout ready: what it prints before, meanwhile and on failure."""
 
 from __future__ import annotations
 

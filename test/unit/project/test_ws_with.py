@@ -1,11 +1,10 @@
-"""Folders of the user's in `ws`: --with, CARTPOLE_WITH, ROS_PACKAGE_PATH; their packages and modules."""
+"""The user's folders in `ws`: --with, CARTPOLE_WITH, ROS_PACKAGE_PATH; their packages and modules."""
 
 from __future__ import annotations
 
 import os
 import re
 import shutil
-import socket
 import subprocess
 import tempfile
 from pathlib import Path
@@ -123,11 +122,6 @@ def test_the_commands_of_the_page(ws, root, workspace, tmp_path):
         assert done.returncode == 0, (line, done.stderr)
 
 
-def test_launch_files(ws, workspace):
-    done = ws("--with", str(workspace), "roslaunch", "--nodes", "my_arm", "arm.launch")
-    assert (done.returncode, done.stdout) == (0, "/n\n"), done.stderr
-
-
 def test_names_of_ours_do_not_hide_theirs(ws, workspace):
     for environment in ({}, {"ROS_PACKAGE_PATH": str(workspace / "src")}):
         options = [] if environment else ["--with", str(workspace)]
@@ -140,20 +134,6 @@ def test_names_of_ours_do_not_hide_theirs(ws, workspace):
         code = "import roslib.packages as p; print(p.find_resource('cartpole_gazebo', 'whose')[0])"
         found = ws(*options, "python3", "-c", code, **environment).stdout.strip()
         assert Path(found).resolve().is_relative_to(workspace)
-
-
-def test_ours_over_ros_needs_no_package_that_is_theirs(ws, tmp_path):
-    package(tmp_path, "cartpole_gazebo")
-    package(tmp_path, "cartpole_controller")
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        master = f"http://127.0.0.1:{free.getsockname()[1]}"
-    done = ws(
-        *("--with", ".", "rosrun", "cartpole", "pg_train.py", "--episodes=2", "--eval-episodes=1"),
-        *("--env-kwargs=max_steps=20", "--run-dir=run"), cwd=tmp_path, ROS_MASTER_URI=master,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    for name in ("cartpole_gazebo", "cartpole_controller"):
-        assert f"ws: {name} is yours" in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -229,17 +209,6 @@ def test_what_failed_is_built_once_it_can_be(ws, tmp_path):
     mended = ws("--with", str(tmp_path), "true").stderr
     assert "waiting: done" in mended and "after: done" in mended and "isn't built" not in mended
     assert ws("--with", str(tmp_path), "true").stderr == ""
-
-
-def test_an_empty_folder_is_said(ws, tmp_path):
-    done = ws("--with", str(tmp_path), "true")
-    assert done.stderr == f"ws: {tmp_path} holds neither catkin packages nor Python modules\n"
-
-
-def test_this_checkout_is_none_of_theirs(ws, root):
-    done = ws("--with", str(root), "rospack", "find", "cartpole")
-    assert done.returncode == 0
-    assert done.stdout.strip() == ws("rospack", "find", "cartpole").stdout.strip()
 
 
 def test_what_changes_is_built_anew_and_what_goes_is_gone(ws, tmp_path):

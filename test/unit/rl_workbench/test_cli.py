@@ -11,7 +11,7 @@ from support.training import workbench_runs
 from support.training.training_runs import SMALL, flags, summary
 
 from rl_workbench.cli import COMMANDS, main
-from rl_workbench.training.cli import PROGRAM
+from rl_workbench.training.train import PROGRAM
 
 pytestmark = pytest.mark.usefixtures("signals")
 

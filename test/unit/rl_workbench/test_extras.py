@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rl_workbench.extras import installing, replaying, watching
+from rl_workbench.errors import installing, replaying, watching
 
 
 @pytest.fixture(params=["ws", "beside", "elsewhere"])

@@ -1,6 +1,9 @@
 """A robot's environment on a page of viser's."""
 
 import math
+import time
+import urllib.error
+import urllib.request
 
 import gymnasium
 import pytest
@@ -9,7 +12,7 @@ from support.robots.bodies import ROVER_ROBOT
 
 import cartpole  # noqa: F401 - registers its environments
 from bullet_gazebo.physics.pose import Pose
-from robot_envs.pictures.picture import Camera, RobotPicture
+from robot_envs.pictures.drawn import Camera, RobotPicture
 
 
 def shapes(nodes, kind):
@@ -88,3 +91,22 @@ def test_several_stand_beside_each_other_with_captions_and_are_all_seen(server):
     assert server.initial_camera.look_at[0] == pytest.approx(apart[1][0], abs=0.1)
     seen = server.initial_camera.position[1]
     assert seen < -1.5 * apart[1][0]  # far enough away for all of them
+
+
+def test_the_render_mode_human_shows_the_robot_on_a_page_in_real_time(capsys):
+    env = gymnasium.make("cartpole/Classic-v0", render_mode="human")
+    assert env.metadata["render_modes"] == ["human", "rgb_array"]
+    begin = time.monotonic()
+    for _ in range(2):
+        env.reset(seed=0)
+        for _ in range(10):
+            env.step(1)
+    assert time.monotonic() - begin >= 20 * 0.008
+    assert env.render() is None
+    (line,) = capsys.readouterr().out.splitlines()
+    address = line.removeprefix("the robot is shown on the page ")
+    with urllib.request.urlopen(address) as page:
+        assert page.status == 200
+    env.close()
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(address)

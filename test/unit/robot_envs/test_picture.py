@@ -10,7 +10,7 @@ from support.robots.pendulum import PENDULUM
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from robot_envs.errors import RobotEnvError
-from robot_envs.pictures.picture import RobotPicture
+from robot_envs.pictures.drawn import RobotPicture
 from robot_envs.robots.hopper import ROBOT as HOPPER
 
 

@@ -164,11 +164,3 @@ def test_nothing_of_the_cart_pole_nor_of_ros_is_loaded():
 def test_a_description_that_cannot_work_is_an_error_that_says_what_to_mend(changes, text):
     with pytest.raises(RobotEnvError, match=text):
         make_pendulum(robot=dataclasses.replace(PENDULUM, **changes))
-
-
-def test_there_is_no_window_that_nobody_has_described():
-    env = make_pendulum()
-    assert env.metadata == {"render_modes": ["rgb_array"], "render_fps": 100}
-    env.close()
-    with pytest.raises(ValueError, match="render_mode is \"rgb_array\", not 'human'"):
-        make_pendulum(render_mode="human")

@@ -13,8 +13,8 @@ from support.scenes.rover import ROVER, Push
 from support.scenes.solo_arm import SOLO, Hold, Reach
 
 from robot_envs import GoalTask, RobotEnv, register
-from robot_envs.testing import check_robot_env, episodes, goals, repetition, suite
-from robot_envs.testing.subject import Subject
+from robot_envs.testing import check_robot_env, episodes, repetition, suite
+from robot_envs.testing.rollouts import Subject
 
 STEPS = 12
 
@@ -127,24 +127,24 @@ FAULTS = {
         "no array of uint8 of the shape \\(64, 96, 3\\)",
     ),
     "miscounts": (
-        goals.goals,
+        episodes.goals,
         of(Reach, broken.Miscounts),
         "step\\(\\) gave the reward -?\\d.5, and compute_reward\\(\\) of its goals gives",
     ),
-    "forgets": (goals.goals, of(Reach, broken.Forgets), "has the desired goal"),
+    "forgets": (episodes.goals, of(Reach, broken.Forgets), "has the desired goal"),
     "one by one": (
-        goals.goals,
+        episodes.goals,
         of(broken.OneByOne),
         "compute_reward\\(\\) of \\d+ goals at once gives the shape \\(\\), and not",
     ),
     "never there": (
-        goals.goals,
+        episodes.goals,
         of(broken.NeverThere),
         "is_success\\(\\) of goals that were achieved as they were desired gives",
     ),
-    "tells nothing": (goals.goals, of(broken.Tells), "an info has is_success=None, and no bool"),
+    "tells nothing": (episodes.goals, of(broken.Tells), "an info has is_success=None, and no bool"),
     "far goals": (
-        goals.goals,
+        episodes.goals,
         of(broken.FarGoals),
         "achieved_goal isn't in the space of goals: entry",
     ),
@@ -222,7 +222,7 @@ def test_a_task_that_says_less_than_it_should_is_no_goal_task():
 
     assert not issubclass(Hold, GoalTask)
     with pytest.raises(AssertionError, match="has compute_reward"):
-        goals.goals(Subject(of(Hold, Claims), steps=STEPS))
+        episodes.goals(Subject(of(Hold, Claims), steps=STEPS))
 
 
 def test_an_environments_own_error_is_told_once_and_is_the_cause():

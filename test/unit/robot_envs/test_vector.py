@@ -95,7 +95,7 @@ def test_pictures_of_all_and_how_it_resets(many):
         ({"num_envs": 2.0}, "num_envs must be a whole number of 1 and more, not 2.0"),
         ({"backend": "ros-realtime"}, "has a single robot"),
         ({"backend": "rose"}, "there is no backend .rose."),
-        ({"render_mode": "human"}, "no window"),
+        ({"render_mode": "human"}, "can't be shown on one page"),
         ({"noise": 3.0}, "noise must lie"),
         ({"autoreset_mode": "later"}, "'later' is not a valid AutoresetMode"),
     ],

@@ -29,7 +29,7 @@ OPTIONS = {
     ),
     "a render mode that doesn't exist": (
         {"render_mode": "rgb"},
-        "render_mode is \"rgb_array\", not 'rgb'",
+        'render_mode is "human" or "rgb_array", not \'rgb\'',
     ),
     "pictures of no size": ({"width": 0}, "width and height lie in"),
     "an action out of its space": (

@@ -6,7 +6,7 @@ import pytest
 
 from ros_calls import master
 from ros_calls.absence import why_absent, why_not_up
-from ros_calls.xmlrpc import Refused
+from ros_calls.master import Refused
 
 WORLD = "/gazebo/get_world_properties"
 LOCKSTEP = "roslaunch gazebo_ros empty_world.launch lockstep:=true"

@@ -5,7 +5,7 @@ import random
 import numpy as np
 import pytest
 
-from rl_workbench.plotting.curves import moving_average
+from rl_workbench.plotting import moving_average
 from viewer.curves import MAX_BUCKETS, Series
 
 

@@ -15,9 +15,8 @@ import rospy
 from bullet_gazebo.ros.wire.names import full_name, one_at_a_time
 from bullet_gazebo.ros.wire.rospy_patches.node import stop_hearing_clock
 from bullet_gazebo.ros.wire.signals import SignalHandler, init_node, wait_for_master
-from ros_calls.nodes import living_address
+from ros_calls.master import NoAnswer, living_address
 from ros_calls.requirements import WINDOW, lack
-from ros_calls.xmlrpc import NoAnswer
 from viewer.address import PortInUse, add_flags, find_address
 
 NAME = "gazebo_gui"

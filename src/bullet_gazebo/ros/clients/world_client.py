@@ -1,6 +1,6 @@
 """The client's side of world_control.py. Imports no rospy, so that `gz` starts at once."""
 
-from ros_calls import xmlrpc
+from ros_calls import master
 
 METHOD = "gazeboWorld"
 CHUNK = 1000  # steps in one call, so that each call is short and an interrupted client stops it
@@ -22,10 +22,10 @@ class RemoteWorld:
         """
         self._node = node
         try:
-            self._address = str(xmlrpc.call(master_uri, "lookupNode", node))
-        except xmlrpc.NoAnswer as fault:
+            self._address = str(master.call_node(master_uri, "lookupNode", node))
+        except master.NoAnswer as fault:
             raise ControlFailed(f"no ROS master at {master_uri}: {fault}") from fault
-        except xmlrpc.Refused as fault:
+        except master.Refused as fault:
             raise ControlFailed(
                 f"no node {node} at the master {master_uri}: is a simulator running?"
             ) from fault
@@ -37,12 +37,12 @@ class RemoteWorld:
             ControlFailed: it doesn't answer, or refuses.
         """
         try:
-            xmlrpc.call(self._address, METHOD, name, count, timeout=TIMEOUT)
-        except xmlrpc.Refused as fault:
+            master.call_node(self._address, METHOD, name, count, timeout=TIMEOUT)
+        except master.Refused as fault:
             raise ControlFailed(f"{self._node}: {fault}") from fault
-        except xmlrpc.BadAnswer as fault:
+        except master.BadAnswer as fault:
             raise ControlFailed(f"{self._node} doesn't know {METHOD}: {fault}") from fault
-        except xmlrpc.NoAnswer as fault:
+        except master.NoAnswer as fault:
             raise ControlFailed(f"{self._node} doesn't answer: {fault}") from fault
 
     def step(self, ticks: int) -> None:

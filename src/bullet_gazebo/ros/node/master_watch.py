@@ -7,7 +7,7 @@ import rospy
 
 from bullet_gazebo.ros.wire.rospy_patches.registration import register_again, witness
 from ros_calls import master
-from ros_calls.xmlrpc import NoAnswer, Refused
+from ros_calls.master import NoAnswer, Refused
 
 PERIOD = 10.0  # [s of wall time] between two questions
 TIMEOUT = 5.0  # [s] of one

@@ -5,8 +5,7 @@ from urllib.parse import urlsplit
 import rospy
 
 from ros_calls import master
-from ros_calls.nodes import living_address
-from ros_calls.xmlrpc import NoAnswer
+from ros_calls.master import NoAnswer, living_address
 
 LIVING = 5.0  # [s] for an answer of one that is busy; of one that was killed nobody waits for it
 MASTERS_REASON = "new node registered with same name"

@@ -1,1 +1,1 @@
-"""Robots over ROS: brought up, commanded and read; the only place of this library where rospy is imported."""
+"""Robots over ROS: brought up, commanded and read."""

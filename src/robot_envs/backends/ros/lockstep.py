@@ -1,22 +1,22 @@
 """Robots in a simulator over ROS that moves in lock-step."""
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
-import genpy
-from bullet_gazebo_msgs.srv import StepWorldRequest, StepWorldResponse
+from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 
 from bullet_gazebo.physics.pose import Pose
-from robot_envs.backends.ros.bringup.robots import full_name, ready
-from robot_envs.backends.ros.bringup.world import STEP_SERVICE
-from robot_envs.backends.ros.running_simulator import RunningSimulator
-from robot_envs.backends.ros.service import ServiceClient
-from robot_envs.backends.ros.turn import Turn
-from robot_envs.backends.ros.variation import RosVariation
-from robot_envs.backends.ros.wire.messages import JointReader, ask_for, place, pose_of, told
-from robot_envs.backends.ros.wire.step_answer import StepKind
-from robot_envs.backends.ros.wire.step_request import StepRequest
+from robot_envs.backends.ros.bringup import full_name, ready
+from robot_envs.backends.ros.gazebo import STEP_SERVICE, RunningSimulator, SimulatorService
+from robot_envs.backends.ros.messages import (
+    JointStateReader,
+    contact_of,
+    fill_models,
+    motions_of,
+)
+from robot_envs.backends.ros.properties import RosVariation
+from robot_envs.backends.ros.shared_world import SharedWorld
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
@@ -24,12 +24,14 @@ from robot_envs.world_state import (
     Commands,
     InitialState,
     LinkQuery,
+    Links,
+    Models,
     StateQuery,
     WorldState,
     link_keys,
 )
 from ros_calls.service import TIMEOUT
-from ros_utils.step_client import time_of
+from ros_utils.step_client import PreparedSteps, StepAnswer, StepNames, StepRefused, time_of
 
 
 class LockstepWorld:
@@ -40,34 +42,34 @@ class LockstepWorld:
     Args:
         scene: the robots and objects; they are there, and the controllers run.
         ticks: physics steps of one action.
-        turn: whose episode is under way, among those that move these robots.
+        world: shared with the other environments of this process.
         timeout: wall time [s] that an answer may take, beside 10 ms for each tick.
     """
 
     deterministic = shared = True
 
-    def __init__(self, scene: Scene, ticks: int, turn: Turn, timeout: float = TIMEOUT) -> None:
-        self.scene, self._turn = scene, turn
+    def __init__(
+        self, scene: Scene, ticks: int, world: SharedWorld, timeout: float = TIMEOUT
+    ) -> None:
+        self.scene, self._ticks, self._world = scene, ticks, world
         self._simulator = RunningSimulator()
-        self._step = ServiceClient(
-            STEP_SERVICE, StepKind(), persistent=True, timeout=timeout, polls=True
+        self._reset = SimulatorService(
+            STEP_SERVICE, StepWorld, persistent=True, timeout=timeout + time_of(ticks)
         )
-        moved = [f"{robot.model}::{name}" for robot, name in scene.moved.values()]
-        self._begin = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=moved)
-        self._advance = StepRequest(ticks)
-        self._look = StepWorldRequest()
-        self._step.timeout += time_of(ticks)
+        self._steps = PreparedSteps(STEP_SERVICE, timeout, SimulatorService)
+        self._moved = [f"{robot.model}::{name}" for robot, name in scene.moved.values()]
         self._full = {
             name: full_name(robot, port.name) for name, (robot, port) in scene.ports.items()
         }
-        self._read = JointReader(scene)
+        self._read = JointStateReader(scene)
         self._query = StateQuery()
-        self._begun = StepWorldResponse()
+        self._names = StepNames()  # of the query, without controllers
+        self._begun = 0  # simulated time at the reset [ns]
         self._held: dict[str, Any] = {}
         self._pending: Commands | None = None  # of a step that was begun
-        self._answer: StepWorldResponse | None = None  # to it, if it was taken before `act`
+        self._answer: StepAnswer | None = None  # to it, if it was taken before `act`
         self._variation = RosVariation(scene, timeout)
-        turn.join(self)
+        world.join(self)
 
     def look(self, query: StateQuery) -> None:
         """See `RobotBackend.look`.
@@ -78,13 +80,12 @@ class LockstepWorld:
         """
         link_keys(query)
         with self._simulator:
-            its_turn = self._turn.take_if_free(self)
-        ask_for(self._look, query)
-        if query != StateQuery() and its_turn:  # otherwise its reset tells what isn't there
-            self._call(self._look)  # no ticks: it only looks
-        ask_for(self._begin, query)
-        self._advance.ask_for(query)
-        self._query = query
+            its_turn = self._world.claim_if_free(self)
+        names = _names(query)
+        if query != StateQuery() and its_turn:  # otherwise the reset finds what isn't there
+            self._take()
+            self._look(names)
+        self._query, self._names = query, names
 
     def reset(self, initial: InitialState) -> WorldState:
         """See `RobotBackend.reset`; the state asked for is the state reached, exactly.
@@ -95,13 +96,18 @@ class LockstepWorld:
         """
         joints = self.scene.placed_joints(initial).values()
         self._drop()
-        self._begin.positions = [position for position, _ in joints]
-        self._begin.velocities = [velocity for _, velocity in joints]
-        place(self._begin, self.scene.placed_models(initial))
+        request = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=self._moved)
+        request.positions = [position for position, _ in joints]
+        request.velocities = [velocity for _, velocity in joints]
+        fill_models(request, self.scene.placed_models(initial))
         with self._simulator:
-            self._turn.take(self)
-        self._begun = answer = self._call(self._begin)
-        state = self._state(answer)
+            self._world.claim(self)
+        answer = self._call(self._reset, request)
+        if not answer.success:
+            raise self._refusal(answer.status_message)
+        begun = self._look(self._names)
+        self._begun = begun.now
+        state = self._state(begun)
         self._held = self.scene.starting_commands(state.joints)
         return state._replace(commands=self._held)
 
@@ -117,16 +123,15 @@ class LockstepWorld:
             raise ValueError(
                 "a step was begun and not taken: act() with the same commands comes next"
             )
-        self._turn.check(self)
+        self._world.check_holder(self)
         numbers: list[float] = []
         for command in commands.values():
             if isinstance(command, float):
                 numbers.append(command)
             else:
                 numbers += command
-        self._advance.command(tuple([self._full[name] for name in commands]), numbers)
-        with self._simulator:
-            self._step.begin(self._advance)
+        names = self._names._replace(controllers=tuple([self._full[name] for name in commands]))
+        self._send(names, self._ticks, numbers)
         self._pending = commands
 
     def act(self, commands: Commands) -> WorldState:
@@ -141,57 +146,82 @@ class LockstepWorld:
             self.begin(commands)
         elif self._pending != commands:
             raise ValueError("the step was begun with other commands")
-        answer = self._end() if self._answer is None else self._answer
+        answer = self._answer or self._receive()
         self._pending = self._answer = None
         self._held = {**self._held, **commands}
-        return self._state(self._checked(answer))
+        return self._state(answer)
 
-    def _state(self, answer: StepWorldResponse) -> WorldState:
-        joints = self._read(answer.joint_states)
-        return told(answer, self._begun, self._query, joints, self._held)
+    def _state(self, answer: StepAnswer) -> WorldState:
+        numbers, count = answer.numbers, len(answer.joints)
+        joints = self._read.read(
+            answer.joints,
+            numbers[:count],
+            numbers[count : 2 * count],
+            numbers[2 * count : 3 * count],
+        )
+        time = (answer.now - self._begun) / 1e9  # [s]
+        if len(numbers) == 3 * count and not answer.contacts:
+            return WorldState(time, joints, self._held)
+        motions = list(motions_of(numbers[3 * count :]))
+        models = len(answer.models)
+        return WorldState(
+            time,
+            joints,
+            self._held,
+            Links(zip(link_keys(self._query), motions[models:], strict=True)),
+            Models(zip(answer.models, motions[:models], strict=True)),
+            [contact_of(each) for each in answer.contacts],
+        )
 
-    def _end(self) -> StepWorldResponse:
-        """Waits for the answer to the step that was begun."""
+    def _send(self, names: StepNames, ticks: int, commands: Sequence[float]) -> None:
+        self._call(self._steps.begin, names, ticks, commands)
+
+    def _receive(self) -> StepAnswer:
+        begun, self._pending = self._pending, None  # nothing is under way after a failure
+        answer: StepAnswer = self._call(self._steps.end)
+        self._pending = begun
+        return answer
+
+    def _call(self, call: Callable[..., Any], *arguments: Any) -> Any:
         try:
             with self._simulator:
-                return self._step.end()
-        except BaseException:
-            self._pending = None
+                return call(*arguments)
+        except StepRefused as error:
+            raise self._refusal(str(error)) from error
+        except SimulatorError:
+            self._reset.close()  # both were to the same simulator
+            self._steps.close()
             raise
 
+    def _look(self, names: StepNames) -> StepAnswer:
+        """Reads the world; no time passes."""
+        self._send(names, 0, ())
+        return self._receive()
+
+    def _refusal(self, fault: str) -> SimulatorError:
+        with self._simulator:
+            return SimulatorError(f"{STEP_SERVICE}: {ready(self.scene).missing() or fault}")
+
     def _take(self) -> None:
-        """Does so if there is one, so that the connection is free for others; `act` finds the answer."""
+        """Takes the answer to a step that was begun, so that others can be sent; `act` finds it."""
         if self._pending is not None and self._answer is None:
-            self._answer = self._end()
+            self._answer = self._receive()
 
     def _drop(self) -> None:
-        """The same, for who won't hear it any more."""
+        """Takes the answer to a step that was begun, and forgets it."""
         with contextlib.suppress(SimulatorError):
             self._take()
         self._pending = self._answer = None
-
-    def _call(self, request: genpy.Message) -> StepWorldResponse:
-        self._take()
-        with self._simulator:
-            answer = self._step(request)
-        return self._checked(answer)
-
-    def _checked(self, answer: StepWorldResponse) -> StepWorldResponse:
-        if not answer.success:
-            with self._simulator:
-                missing = ready(self.scene).missing()
-                raise SimulatorError(f"{STEP_SERVICE}: {missing or answer.status_message}")
-        return answer
 
     def vary(self, variation: Variation) -> None:
         """See `RobotBackend.vary`."""
         self._drop()
         with self._simulator:
-            self._turn.take(self)  # what others have varied isn't this one's to start from
+            self._world.claim(self)  # what others have varied isn't this one's to start from
         self._variation(variation)
 
-    def give_back(self) -> None:
-        """See `Player.give_back`."""
+    def restore(self) -> None:
+        """See `SharedBackend.restore`."""
         self._drop()  # before the next one's reset: the simulator takes requests as they come
         self._variation.undo()
 
@@ -201,20 +231,32 @@ class LockstepWorld:
         Raises:
             SimulatorError: if the simulator doesn't answer, or has no such link.
         """
-        asked = StateQuery(links=tuple(map(LinkQuery, links)))
-        request = StepWorldRequest()  # no ticks: it only looks
-        ask_for(request, asked)
-        return [pose_of(each) for each in self._call(request).link_poses]
+        self._take()
+        answer = self._look(_names(StateQuery(links=tuple(map(LinkQuery, links)))))
+        return [pose for pose, _ in motions_of(answer.numbers[3 * len(answer.joints) :])]
 
     def close(self) -> None:
         """Closes the connection to the simulator; robots and objects are as they were found."""
         self._drop()
-        self._step.close()
+        self._reset.close()
+        self._steps.close()
         self._variation.undo()
         with contextlib.suppress(SimulatorError):  # one that is gone has no objects any more
-            self._turn.release(self)
+            self._world.leave(self)
 
     def disconnect(self) -> None:
         """Closes connections alone, where the simulator has ended, or will, with all that is in it."""
-        self._step.close()
+        self._reset.close()
+        self._steps.close()
         self._variation.disconnect()
+
+
+def _names(query: StateQuery) -> StepNames:
+    return StepNames(
+        all_models=query.all_models,
+        models=tuple(query.models),
+        links=tuple([each.link for each in query.links]),
+        frames=tuple([each.frame for each in query.links]),
+        all_contacts=query.all_contacts,
+        contacts_of=tuple(query.contacts_of),
+    )

@@ -8,8 +8,7 @@ import rospy
 
 from robot_envs.errors import RobotEnvError
 from ros_calls import master
-from ros_calls.nodes import living_address
-from ros_calls.xmlrpc import NoAnswer, Refused
+from ros_calls.master import NoAnswer, Refused, living_address
 
 
 def plain_arguments(argv: list[str]) -> list[str]:

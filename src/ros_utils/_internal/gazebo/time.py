@@ -5,7 +5,6 @@ from __future__ import annotations
 import rospy
 
 from ros_calls import master as _master
-from ros_calls import xmlrpc
 from ros_utils._internal import log as _log
 from ros_utils._internal.gazebo.calls import GAZEBO, TIMEOUT, empty_call
 from ros_utils._internal.processes import nodes as _nodes
@@ -72,8 +71,8 @@ def gazebo_step_physics(
         if address is None:
             raise ValueError(f"no node {node}: is a simulator running?")
         for done in range(0, steps, CHUNK):
-            xmlrpc.call(address, STEP, "step", min(CHUNK, steps - done), timeout=timeout)
-    except (ValueError, _master.MasterDown, xmlrpc.NoAnswer, xmlrpc.Refused) as fault:
+            _master.call_node(address, STEP, "step", min(CHUNK, steps - done), timeout=timeout)
+    except (ValueError, _master.MasterDown, _master.NoAnswer, _master.Refused) as fault:
         _log.error(f"gazebo_step_physics: {fault}")
         return False
     return True

@@ -9,8 +9,8 @@ from urllib.parse import urlsplit
 import rospy
 
 from ros_calls import master as _master
+from ros_calls.master import NoAnswer, NobodyListens, Refused, call_node, call_plain
 from ros_calls.waiting import POLL
-from ros_calls.xmlrpc import NoAnswer, NobodyListens, Refused, call, call_plain
 from ros_utils._internal.processes import procfs as _procfs
 
 CORE_NODES = ("/rosout",)  # lives and dies with the master
@@ -42,7 +42,7 @@ def node_uris() -> dict[str, str]:
 def node_pid(address: str) -> int | None:
     """The process id of the node at an XML-RPC address, or None if it doesn't answer."""
     try:
-        return int(call(address, "getPid", timeout=1.0))
+        return int(call_node(address, "getPid", timeout=1.0))
     except (NoAnswer, Refused):
         return None
 
@@ -58,7 +58,7 @@ def _master_of(address: str) -> str | None:
     roscpp nodes don't offer the question: what their process was started with answers it.
     """
     try:
-        return str(call(address, "getMasterUri", timeout=1.0))
+        return str(call_node(address, "getMasterUri", timeout=1.0))
     except (NoAnswer, Refused):
         pass
     host = urlsplit(address).hostname
@@ -77,7 +77,7 @@ def ask_to_shut_down(address: str) -> bool:
     if theirs is not None and not _master.is_at(theirs):
         return False
     try:
-        call(address, "shutdown", "asked by ros_utils")
+        call_node(address, "shutdown", "asked by ros_utils")
     except (NobodyListens, Refused):
         return False
     except NoAnswer:
@@ -120,7 +120,7 @@ def shut_down_nodes(nodes: dict[str, str], timeout: float = 5.0) -> list[str]:
 def _is_dead(address: str) -> bool:
     """True if nobody listens at a node's XML-RPC address any more."""
     try:
-        call(address, "getPid", timeout=1.0)
+        call_node(address, "getPid", timeout=1.0)
     except NobodyListens:
         return True
     except (NoAnswer, Refused):

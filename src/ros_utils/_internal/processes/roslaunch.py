@@ -6,8 +6,8 @@ import time
 from collections.abc import Mapping, Sequence
 
 from ros_calls import master as _master
+from ros_calls.master import NoAnswer, Refused, call_plain
 from ros_calls.waiting import POLL
-from ros_calls.xmlrpc import NoAnswer, Refused, call_plain
 from ros_utils._internal import log as _log
 from ros_utils._internal.processes import nodes as _nodes
 from ros_utils._internal.processes import processes as _processes

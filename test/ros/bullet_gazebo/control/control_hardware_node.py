@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Limits, control period, and controllers of users that have faults (docs/contract/ros_control.md 5)."""
+"""Limits, control periods and faulty controllers of users (docs/contract/ros_control.md 5)."""
 
 import math
 
@@ -9,9 +9,10 @@ import rostest
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
 from control_msgs.msg import JointControllerState, PidState
 from sensor_msgs.msg import JointState
-from slides_client import SlidesTest, Topic, call
+from slides_client import SlidesTest, listen
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
+from support.ros.calls import call
 
 DESCRIPTION, LIMITS = "/slides/robot_description", "/slides/joint_limits"
 SAFETY = '<safety_controller soft_lower_limit="-0.2" soft_upper_limit="0.2" k_position="20" k_velocity="50"/>'
@@ -71,7 +72,7 @@ class HardwareTest(SlidesTest):
     def test_the_control_period_is_a_whole_number_of_steps(self):
         self.begin("<eStopTopic>", "<controlPeriod>0.0025</controlPeriod><eStopTopic>")
         self.run_controllers("effort_position")
-        topic = Topic("effort_position/state", JointControllerState)
+        topic = listen("effort_position/state", JointControllerState)
         self.step(1)
         self.assertTrue(topic.wait_for(len))
         self.step(30)
@@ -89,7 +90,7 @@ class HardwareTest(SlidesTest):
         self.run_controllers("effort_position")
         self.step(150)
         for reset in ("/gazebo/reset_world", "/gazebo/reset_simulation"):
-            topic = Topic("effort_position/pid/state", PidState)
+            topic = listen("effort_position/pid/state", PidState)
             call(reset, Empty)
             self.step(1)
             self.assertTrue(topic.wait_for(len))
@@ -112,7 +113,7 @@ class HardwareTest(SlidesTest):
         ):
             rospy.set_param(f"/slides/{name}/pid", pid)
             self.run_controllers(name)
-            topic = Topic(f"{name}/state", JointControllerState)
+            topic = listen(f"{name}/state", JointControllerState)
             before = self.step(20, **{name: 0.1})[joint]
             self.step(1)
             self.assertTrue(
@@ -145,7 +146,7 @@ class HardwareTest(SlidesTest):
 
     def start_states(self):
         self.assertTrue(self.load("states"))
-        topic = Topic("joint_states", JointState)
+        topic = listen("joint_states", JointState)
         self.assertTrue(self.switch(["states"]))
         return topic
 
@@ -172,7 +173,7 @@ class HardwareTest(SlidesTest):
         self.run_controllers("effort_position")
         for where in ("update", "report"):
             self.assertTrue(self.load_rude(where))
-            topic = Topic("rude/report", rospy.AnyMsg)
+            topic = listen("rude/report", rospy.AnyMsg)
             self.assertTrue(self.switch(["rude"]))
             joints = self.step(500, effort_position=0.1)
             self.assertEqual(
@@ -185,7 +186,7 @@ class HardwareTest(SlidesTest):
     def test_a_message_that_cannot_be_sent_silences_nobody(self):
         self.begin()
         self.assertTrue(self.load_rude("content"))
-        topic = Topic("rude/report", rospy.AnyMsg)
+        topic = listen("rude/report", rospy.AnyMsg)
         self.assertTrue(self.switch(["rude"]))
         states = self.start_states()
         self.step(200)

@@ -1,7 +1,6 @@
-"""What the tests of the controller manager share: a client of one manager, and robots to spawn."""
+"""A client of one controller manager, and robots to spawn."""
 
 import re
-import threading
 
 import rospy
 from controller_manager_msgs.srv import (
@@ -12,9 +11,8 @@ from controller_manager_msgs.srv import (
     SwitchController,
     UnloadController,
 )
-from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SpawnModel, SpawnModelRequest
+from support.ros.calls import BOUND, call, delete_model, sim_time, spawn_model
 
-BOUND = 60.0  # [s of wall time]
 BEST_EFFORT, STRICT = 1, 2
 POSITION = "effort_controllers/JointPositionController"
 WEAK = {"p": 1e-6}  # so weak that the cart stays where it is
@@ -31,38 +29,13 @@ CONTROLLERS = {
 PLUGIN = re.compile(r"(<plugin [^>]*libgazebo_ros_control[^>]*)/>")
 
 
-def call(name, kind, *args, **kwargs):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)(*args, **kwargs)
-
-
-def wait_until(condition, bound=BOUND):
-    done, pause = False, threading.Event()
-    for _ in range(int(bound / 0.02)):
-        done = condition()
-        if done:
-            break
-        pause.wait(0.02)
-    return done
-
-
 def spawn(name="cartpole", robot_namespace="/", own_namespace=None, y=0.0):
-    """Spawns the cart-pole at `y` [m]; `own_namespace` goes into the plugin of its URDF."""
+    """Spawn the cart-pole at `y` [m]; `own_namespace` goes into the plugin of its URDF."""
     xml = rospy.get_param("/robot_description")
     if own_namespace is not None:
         tag = f"<robotNamespace>{own_namespace}</robotNamespace>"
         xml = PLUGIN.sub(rf"\1>{tag}</plugin>", xml)
-    request = SpawnModelRequest(model_name=name, model_xml=xml, robot_namespace=robot_namespace)
-    request.initial_pose.position.y = y
-    return call("/gazebo/spawn_urdf_model", SpawnModel, request)
-
-
-def delete(name="cartpole"):
-    return call("/gazebo/delete_model", DeleteModel, name)
-
-
-def sim_time():
-    return call("/gazebo/get_world_properties", GetWorldProperties).sim_time
+    return spawn_model(name, xml, robot_namespace, y)
 
 
 class Manager:
@@ -112,7 +85,7 @@ class PausedRobot:
 
     def tearDown(self):
         self.assertEqual(sim_time(), self.began, "the world wasn't paused")
-        delete()
+        delete_model()
 
     def load(self, *names):
         for name in names:

@@ -10,19 +10,11 @@ import unittest
 import rospy
 import rosservice
 import rostest
-from controller_client import (
-    BEST_EFFORT,
-    BOUND,
-    CONTROLLERS,
-    POSITION,
-    STRICT,
-    WEAK,
-    PausedRobot,
-    wait_until,
-)
+from controller_client import BEST_EFFORT, CONTROLLERS, POSITION, STRICT, WEAK, PausedRobot
 from controller_manager_msgs.srv import ListControllers
 from gazebo_msgs.srv import GetWorldProperties
 from std_msgs.msg import Float64
+from support.ros.calls import BOUND, wait_until
 
 MD5 = {
     "list_controllers": "1341feb2e63fa791f855565d0da950d8",

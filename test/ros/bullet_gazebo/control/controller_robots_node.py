@@ -6,16 +6,7 @@ from itertools import pairwise
 
 import rospy
 import rostest
-from controller_client import (
-    BEST_EFFORT,
-    BOUND,
-    STRICT,
-    Manager,
-    call,
-    delete,
-    spawn,
-    wait_until,
-)
+from controller_client import BEST_EFFORT, STRICT, Manager, spawn
 from controller_manager_msgs.utils import (
     ControllerLister,
     ControllerManagerLister,
@@ -27,6 +18,8 @@ from gazebo_msgs.srv import GetJointProperties, SetModelConfiguration
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
+from support.ros.calls import BOUND, call, delete_model, wait_until
+from support.ros.subscribed import Listener
 
 CONTROLLERS = {
     "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 200.0},
@@ -39,27 +32,13 @@ CONTROLLERS = {
 RUNNING = {"states": "running", "cart": "running"}
 
 
-class Joints:
-    """Keeps the messages of a joint_states topic."""
-
-    def __init__(self, topic):
-        self.messages = []
-        self._subscriber = rospy.Subscriber(topic, JointState, self.messages.append)
-
-    def wait_for(self, condition):
-        return wait_until(lambda: condition(list(self.messages)))
-
-    def close(self):
-        self._subscriber.unregister()
-
-
 class RobotsTest(unittest.TestCase):
     def setUp(self):
         call("/gazebo/unpause_physics", Empty)
 
     def tearDown(self):
         for name in ("cartpole", "first", "second"):
-            delete(name)
+            delete_model(name)
 
     def start(self, namespace=""):
         for name, params in CONTROLLERS.items():
@@ -71,7 +50,7 @@ class RobotsTest(unittest.TestCase):
         return manager
 
     def joints(self, topic="/joint_states"):
-        joints = Joints(topic)
+        joints = Listener(topic, JointState)
         self.addCleanup(joints.close)
         self.assertTrue(joints.wait_for(len), f"nothing on {topic}")
         return joints
@@ -107,7 +86,7 @@ class RobotsTest(unittest.TestCase):
         self.assertLess(max(abs(m.effort[1]) for m in still.messages), 0.01)
         self.assertTrue(first.switch([], ["cart"], STRICT))
         self.assertEqual(second.states(), RUNNING)
-        delete("first")
+        delete_model("first")
         self.assertEqual(get_controller_managers(), ["/second/controller_manager"])
         self.assertEqual(second.states(), RUNNING)
 
@@ -160,7 +139,7 @@ class RobotsTest(unittest.TestCase):
             for _ in range(2):
                 self.assertEqual(managers(), ["/controller_manager"])
                 self.assertEqual([each.name for each in controllers()], list(CONTROLLERS))
-            delete()
+            delete_model()
             self.assertEqual((managers(), controllers()), ([], []))
 
     def test_a_manager_has_all_six_services(self):

@@ -9,17 +9,10 @@ import unittest
 import rospy
 import rostest
 from control_msgs.msg import JointControllerState
-from controller_client import (
-    BEST_EFFORT,
-    BOUND,
-    CONTROLLERS,
-    STRICT,
-    PausedRobot,
-    sim_time,
-    wait_until,
-)
+from controller_client import BEST_EFFORT, CONTROLLERS, STRICT, PausedRobot
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
+from support.ros.calls import BOUND, sim_time, wait_until
 
 LOOSE = (BEST_EFFORT, 0)  # 0 is taken for best effort
 # start, stop, ok if strict, states after it, ok if loose, states after it; `cart` runs before

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every type of controller through ROS: parameters, command topic, law, state.
+"""Controllers over ROS: parameters, command topics, control laws, states.
 
 See docs/contract/ros_control.md 3.
 """
@@ -12,9 +12,10 @@ from control_msgs.msg import JointControllerState
 from gazebo_msgs.srv import SetModelConfiguration
 from geometry_msgs.msg import Vector3
 from sensor_msgs.msg import JointState
-from slides_client import SlidesTest, Topic, call, wait_until
+from slides_client import SlidesTest, listen
 from std_msgs.msg import Bool, Float64, Float64MultiArray
 from std_srvs.srv import Empty
+from support.ros.calls import call, wait_until
 
 TYPES = {
     "joint_state_controller/JointStateController",
@@ -56,7 +57,7 @@ class ControllersTest(SlidesTest):
 
     def test_effort_position_with_its_state_topic(self):
         self.run_controllers("effort_position")
-        topic = Topic("effort_position/state", JointControllerState)
+        topic = listen("effort_position/state", JointControllerState)
         joints = self.step(1000, effort_position=0.3)
         self.assertAlmostEqual(joints["effort_a"][0], 0.3, places=3)
         self.assertTrue(
@@ -73,7 +74,7 @@ class ControllersTest(SlidesTest):
 
     def test_effort_velocity_with_its_state_topic(self):
         self.run_controllers("effort_velocity")
-        topic = Topic("effort_velocity/state", JointControllerState)
+        topic = listen("effort_velocity/state", JointControllerState)
         joints = self.step(500, effort_velocity=0.7)
         self.assertAlmostEqual(joints["effort_a"][1], 0.7, places=6)
         self.assertTrue(
@@ -145,7 +146,7 @@ class ControllersTest(SlidesTest):
 
     def test_joint_states_list_all_joints_alphabetically_at_the_rate(self):
         self.assertTrue(self.load("states"))
-        topic = Topic("joint_states", JointState)
+        topic = listen("joint_states", JointState)
         self.assertTrue(self.switch(["states"]))
         self.step(2)  # the queue holds four: one message at a time
         for count in range(1, 7):  # beyond real time topics are thinned
@@ -159,7 +160,7 @@ class ControllersTest(SlidesTest):
 
     def test_joint_states_of_some_joints_and_of_extra_ones(self):
         self.assertTrue(self.load("some_states"))
-        topic = Topic("joint_states", JointState)
+        topic = listen("joint_states", JointState)
         self.assertTrue(self.switch(["some_states"]))
         self.step(2)
         self.assertTrue(topic.wait_for(len))
@@ -203,7 +204,7 @@ class ControllersTest(SlidesTest):
 
     def test_a_users_own_controller(self):
         self.run_controllers("spring")
-        stretch = Topic("spring/stretch", Vector3)
+        stretch = listen("spring/stretch", Vector3)
         joints = self.step(100, spring=0.1)
         self.assertIn("my_controllers/Spring", self.types())
         self.assertEqual(self.listed()[0].type, "my_controllers/Spring")

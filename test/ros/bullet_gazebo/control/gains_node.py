@@ -12,7 +12,8 @@ from dynamic_reconfigure.msg import BoolParameter, Config, ConfigDescription, Do
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
 from gazebo_msgs.srv import SetLinkProperties, SetLinkPropertiesRequest
 from rosgraph_msgs.msg import Log
-from slides_client import SlidesTest, Topic, call
+from slides_client import SlidesTest, listen
+from support.ros.calls import call
 
 PID = "/slides/effort_position/pid"
 NAMES = ["p", "i", "d", "i_clamp_min", "i_clamp_max", "antiwindup"]
@@ -32,7 +33,7 @@ class GainsTest(SlidesTest):
 
     def test_dynparam_of_the_command_line(self):
         self.run_controllers("effort_position")
-        state = Topic("effort_position/state", JointControllerState)
+        state = listen("effort_position/state", JointControllerState)
         command = ["rosrun", "dynamic_reconfigure", "dynparam", "set", PID, "p", "250.0"]
         subprocess.run(command, check=True, timeout=60)
         self.step(1)
@@ -47,7 +48,7 @@ class GainsTest(SlidesTest):
 
     def test_gains_take_effect_are_clamped_and_told(self):
         self.run_controllers("effort_position")
-        updates = Topic("effort_position/pid/parameter_updates", Config)  # latched
+        updates = listen("effort_position/pid/parameter_updates", Config)  # latched
         self.assertTrue(updates.wait_for(len))
         answer = reconfigure(PID, p=1e9, d=-1e9, i_clamp_max=-3.0, i_clamp_min=2.0, i=5.0)
         wanted = {
@@ -82,7 +83,7 @@ class GainsTest(SlidesTest):
         light = SetLinkPropertiesRequest(link_name="slides::effort_a_carriage", mass=0.1)
         light.ixx = light.iyy = light.izz = 0.01
         self.assertTrue(call("/gazebo/set_link_properties", SetLinkProperties, light).success)
-        log = Topic("/rosout", Log)
+        log = listen("/rosout", Log)
         reconfigure(PID, p=400.0, d=800.0)
         wanted = (
             "controller 'effort_position' drives joint 'effort_a' of model 'slides' with d = 800"
@@ -102,7 +103,7 @@ class GainsTest(SlidesTest):
 
     def test_the_descriptions_name_the_six_parameters(self):
         self.assertTrue(self.load("effort_position"))
-        topic = Topic("effort_position/pid/parameter_descriptions", ConfigDescription)
+        topic = listen("effort_position/pid/parameter_descriptions", ConfigDescription)
         self.assertTrue(topic.wait_for(len))
         description = topic.messages[0]
         self.assertEqual([p.name for p in description.groups[0].parameters], NAMES)
@@ -111,7 +112,7 @@ class GainsTest(SlidesTest):
 
     def test_pid_state_is_published_on_each_computation_if_wanted(self):
         self.run_controllers("effort_position")
-        topic = Topic("effort_position/pid/state", PidState)
+        topic = listen("effort_position/pid/state", PidState)
         self.step(1, effort_position=0.1)
         self.assertTrue(topic.wait_for(len))
         message = topic.messages[0]

@@ -1,9 +1,6 @@
-"""The robot `slides` in a lock-step world, as a client of its controller manager sees it."""
+"""A client of the robot `slides` and its controller manager in a lock-step world."""
 
-import sys
-import threading
 import unittest
-from pathlib import Path
 
 import rospy
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
@@ -14,45 +11,17 @@ from controller_manager_msgs.srv import (
     SwitchController,
     UnloadController,
 )
-from gazebo_msgs.srv import DeleteModel, SpawnModel, SpawnModelRequest
 from std_srvs.srv import Empty
+from support.ros.calls import call, delete_model, spawn_model, wait_until
+from support.ros.subscribed import Listener
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
-from support.ros.subscribed import wait_until_heard
-
-BOUND = 60.0  # [s of wall time]
 STRICT = 2
 MANAGER = "/slides/controller_manager/"
 
 
-def call(name, kind, *args):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)(*args)
-
-
-def wait_until(condition, bound=BOUND):
-    pause = threading.Event()
-    for _ in range(int(bound / 0.01)):
-        if condition():
-            return True
-        pause.wait(0.01)
-    return False
-
-
-class Topic:
-    """Keeps what comes on a topic of the robot."""
-
-    def __init__(self, name, kind):
-        self.messages = []
-        topic = rospy.names.ns_join("/slides", name)
-        self._subscriber = rospy.Subscriber(topic, kind, self.messages.append)
-        assert wait_until_heard(topic), name
-
-    def wait_for(self, condition):
-        return wait_until(lambda: condition(self.messages))
-
-    def close(self):
-        self._subscriber.unregister()
+def listen(name, kind):
+    """Listens to a topic of the robot."""
+    return Listener(rospy.names.ns_join("/slides", name), kind)
 
 
 class SlidesTest(unittest.TestCase):
@@ -69,13 +38,11 @@ class SlidesTest(unittest.TestCase):
             publisher.unregister()
 
     def spawn(self):
-        xml = rospy.get_param("/slides/robot_description")
-        request = SpawnModelRequest(model_name="slides", model_xml=xml)
-        answer = call("/gazebo/spawn_urdf_model", SpawnModel, request)
+        answer = spawn_model("slides", rospy.get_param("/slides/robot_description"), "")
         self.assertTrue(answer.success, answer.status_message)
 
     def delete(self):
-        call("/gazebo/delete_model", DeleteModel, "slides")
+        delete_model("slides")
 
     def load(self, name):
         return call(MANAGER + "load_controller", LoadController, name).ok

@@ -1,45 +1,23 @@
 #!/usr/bin/env python3
-"""No step between a model's appearance and its drives, however slowly its plugins load."""
+"""A spawned model takes no step before its drives exist, however slowly its plugins load."""
 
-import importlib.util
 import threading
 import unittest
 
 import rospy
 import rostest
-from gazebo_msgs.srv import (
-    DeleteModel,
-    GetJointProperties,
-    GetPhysicsProperties,
-    GetWorldProperties,
-    SpawnModel,
-    SpawnModelRequest,
-)
+from gazebo_msgs.srv import GetJointProperties, GetPhysicsProperties
 from std_srvs.srv import Empty, EmptyResponse
+from support.ros.calls import BOUND, call, delete_model, sim_time, spawn_model, wait_until
 
-BOUND = 60.0  # [s of wall time]
 CALLS = 100  # while plugins load; each takes as long as several ticks
 FALL = 0.5  # [s of simulated time]
-
-
-def call(name, kind, *args):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)(*args)
-
-
-def sim_time():
-    return call("/gazebo/get_world_properties", GetWorldProperties).sim_time
 
 
 def position(joint):
     return call("/gazebo/get_joint_properties", GetJointProperties, joint).position[0]
 
 
-def can_run():
-    return rospy.get_param("/physics") != "mujoco" or importlib.util.find_spec("mujoco") is not None
-
-
-@unittest.skipUnless(can_run(), "mujoco is not installed")
 class SpawnHoldTest(unittest.TestCase):
     def setUp(self):
         self.loading, self.go_on = threading.Event(), threading.Event()
@@ -48,7 +26,7 @@ class SpawnHoldTest(unittest.TestCase):
 
     def tearDown(self):
         self.go_on.set()
-        call("/gazebo/delete_model", DeleteModel, "lifts")
+        delete_model("lifts")
         self.service.shutdown()
 
     def load(self, request):
@@ -57,20 +35,11 @@ class SpawnHoldTest(unittest.TestCase):
         return EmptyResponse()
 
     def spawn(self):
-        request = SpawnModelRequest(
-            model_name="lifts", model_xml=rospy.get_param("/robot_description"), robot_namespace="/"
-        )
-        answer = call("/gazebo/spawn_urdf_model", SpawnModel, request)
-        self.answers.append(answer.success)
+        self.answers.append(spawn_model("lifts", rospy.get_param("/robot_description")).success)
 
     def pass_time(self, seconds):
         end = sim_time() + seconds
-        pause = threading.Event()
-        for _ in range(int(BOUND / 0.01)):
-            if sim_time() >= end:
-                return
-            pause.wait(0.01)
-        self.fail("time doesn't pass")
+        self.assertTrue(wait_until(lambda: sim_time() >= end), "time doesn't pass")
 
     def test_joints_hold_the_pose_that_they_were_spawned_at(self):
         self.pass_time(0.1)  # it runs

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""spawner and unspawner against the stand-in, through rosrun, with Ctrl-C at the end."""
+"""spawner and unspawner: in launch files, on the command line, and every line they print."""
 
+import re
 import signal
 import subprocess
 import tempfile
@@ -10,123 +11,290 @@ from pathlib import Path
 
 import rospy
 import rostest
-from controller_manager_msgs.srv import ListControllers, SwitchController
-from gazebo_msgs.srv import DeleteModel, SpawnModel, SpawnModelRequest
+from controller_client import STRICT, Manager, spawn
 from std_msgs.msg import Bool
 from std_srvs.srv import Empty
+from support.ros.calls import BOUND, call, delete_model, executable, wait_until
 
-BOUND = 60.0  # [s of wall time]
-STATES, CART = "joint_state_controller", "stand_cart_position_controller"
-EXTRA = """
-another_controller:
+LAUNCH = """
+<launch>
+  <group ns="{namespace}">
+    <rosparam command="load" file="{file}"/>
+    <node name="controllers" pkg="controller_manager" type="spawner" output="screen"
+      args="states cart {options}"/>
+  </group>
+</launch>
+"""
+FIRST = """
+states: {type: joint_state_controller/JointStateController, publish_rate: 100}
+cart:
   type: effort_controllers/JointPositionController
-  joint: cart_pole
+  joint: stand_cart
   pid: {p: 1.0}
 """
-
-
-def call(name, kind, *args):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)(*args)
-
-
-def states():
-    listed = call("/controller_manager/list_controllers", ListControllers).controller
-    return {each.name: each.state for each in listed}
+SECOND = "pole: {type: effort_controllers/JointPositionController, joint: cart_pole, pid: {p: 1.0}}"
+COLOUR, STAMP = re.compile(r"\x1b\[[0-9;]*m"), re.compile(r"^\[(\w+)\] \[[\d., ]+\]: ")
 
 
 class SpawnerTest(unittest.TestCase):
     def setUp(self):
-        xml = rospy.get_param("/robot_description")
-        request = SpawnModelRequest(model_name="cartpole", model_xml=xml, robot_namespace="/")
-        self.assertTrue(call("/gazebo/spawn_urdf_model", SpawnModel, request).success)
+        self.assertTrue(spawn().success)
+        self.manager = Manager()
         self.programs = []
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        for name, text in (("first", FIRST), ("second", SECOND)):
+            (self.folder / f"{name}.yaml").write_text(text, encoding="utf-8")
 
     def tearDown(self):
-        for program in self.programs:
-            self.interrupt(program)
-        call("/gazebo/delete_model", DeleteModel, "cartpole")
+        for program in list(self.programs):
+            self.end(program, signal.SIGINT)
+        delete_model()
+        for name in ("states", "cart", "pole"):
+            if rospy.has_param(f"/{name}"):
+                rospy.delete_param(f"/{name}")
 
-    def run_script(self, name, *args):
-        command = ["rosrun", "controller_manager", name, *args]
+    def file(self, name):
+        return str(self.folder / f"{name}.yaml")
+
+    def start(self, *command):
         program = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
         self.programs.append(program)
         return program
 
-    def interrupt(self, program):
-        """Ctrl-C; returns what the program had printed."""
+    def spawner(self, *arguments):
+        return self.start(executable("controller_manager", "spawner"), *arguments)
+
+    def end(self, program, number):
+        """Returns the lines that the program has printed, without colours and times."""
         if program.poll() is None:
-            program.send_signal(signal.SIGINT)
+            program.send_signal(number)
+        return self.lines(program)
+
+    def lines(self, program):
+        self.programs.remove(program)
         output, _ = program.communicate(timeout=BOUND)
-        self.programs = [each for each in self.programs if each is not program]
-        return output
+        return [STAMP.sub(r"\1: ", line) for line in COLOUR.sub("", output).splitlines()]
 
-    def wait_for(self, wanted):
-        pause = threading.Event()
-        for _ in range(int(BOUND / 0.05)):
-            if states() == wanted:
-                return
-            pause.wait(0.05)
-        self.fail(f"{states()} instead of {wanted}")
+    def expect_states(self, expected, manager=None):
+        manager = manager or self.manager
+        found = wait_until(lambda: list(manager.states().items()) == list(expected.items()))
+        self.assertTrue(found, f"{manager.states()} instead of {expected}")
 
-    def test_spawner_starts_while_paused_and_unloads_on_ctrl_c(self):
-        spawner = self.run_script("spawner", STATES, CART, "__name:=my_spawner")
-        self.wait_for({STATES: "running", CART: "running"})
-        output = self.interrupt(spawner)
-        self.assertIn(f"Started controllers: {STATES}, {CART}", output)
-        self.wait_for({})
+    # in a launch file
+
+    def launch(self, namespace="/", options=""):
+        path = self.folder / "robot.launch"
+        text = LAUNCH.format(namespace=namespace, file=self.file("first"), options=options)
+        path.write_text(text, encoding="utf-8")
+        return self.start("roslaunch", str(path))
+
+    def test_a_launch_file_starts_controllers_and_takes_them_along_when_it_ends(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            launch = self.launch()
+            self.expect_states({"states": "running", "cart": "running"})
+            self.end(launch, number)
+            self.expect_states({})
+            self.assertEqual(launch.returncode, 0)
+
+    def test_in_the_namespace_of_the_launch_file(self):
+        self.addCleanup(delete_model, "second")
+        self.assertTrue(spawn("second", robot_namespace="/my_robot").success)
+        launch = self.launch("my_robot", "--stopped --shutdown-timeout 3")
+        robot = Manager("/my_robot")
+        self.expect_states({"states": "initialized", "cart": "initialized"}, robot)
+        self.assertEqual(self.manager.states(), {})
+        self.end(launch, signal.SIGINT)
+        self.expect_states({}, robot)
+
+    # files, options and lines
+
+    def test_files_and_names_in_any_order(self):
+        spawner = self.spawner(self.file("second"), "--timeout", "-1", self.file("first"))
+        self.expect_states({"pole": "running", "states": "running", "cart": "running"})
+        self.assertEqual(rospy.get_param("/cart/pid/p"), 1.0)
+        self.end(spawner, signal.SIGTERM)
+        self.expect_states({})
         self.assertEqual(spawner.returncode, 0)
+        spawner = self.spawner("pole", self.file("first"))
+        self.expect_states({"pole": "running", "states": "running", "cart": "running"})
 
-    def test_stopped_loads_only(self):
-        self.run_script("spawner", "--stopped", CART)
-        self.wait_for({CART: "initialized"})
+    def test_a_file_goes_into_the_namespace(self):
+        self.addCleanup(delete_model, "second")
+        self.assertTrue(spawn("second", robot_namespace="/my_robot").success)
+        self.spawner("--namespace", "/my_robot", self.file("second"))
+        self.expect_states({"pole": "running"}, Manager("/my_robot"))
+        self.assertTrue(rospy.has_param("/my_robot/pole/type"))
+        self.assertFalse(rospy.has_param("/pole/type"))
 
-    def test_a_yaml_file_is_loaded_and_its_controllers_spawned(self):
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder, "extra controllers.yaml")
-            path.write_text(EXTRA, encoding="utf-8")
-            self.run_script("spawner", str(path))
-            self.wait_for({"another_controller": "running"})
+    def test_files_that_are_none(self):
+        for text in ("a: [", "- a\n- b\n", "just text"):
+            path = self.folder / "bad.yaml"
+            path.write_text(text, encoding="utf-8")
+            with self.subTest(text):
+                spawner = self.spawner(str(path))
+                lines = self.lines(spawner)
+                self.assertEqual(spawner.returncode, 1)
+                self.assertIn(str(path), lines[-1])
+                self.assertNotIn("Traceback", "".join(lines))
+        self.assertEqual(self.manager.states(), {})
+
+    def test_printed_lines(self):
+        rospy.set_param("/cart", {"type": "effort_controllers/JointPositionController",
+                                  "joint": "stand_cart", "pid": {"p": 1.0}})  # fmt: skip
+        spawner = self.spawner("cart", self.file("second"))
+        self.expect_states({"cart": "running", "pole": "running"})
+        lines = self.end(spawner, signal.SIGINT)
+        service = "INFO: Controller Spawner: Waiting for service controller_manager"
+        self.assertEqual(
+            lines,
+            [
+                f"{service}/load_controller",
+                f"{service}/switch_controller",
+                f"{service}/unload_controller",
+                "INFO: Loading controller: cart",
+                "INFO: Loading controller: pole",
+                "INFO: Controller Spawner: Loaded controllers: cart, pole",
+                "INFO: Started controllers: cart, pole",
+                "INFO: Shutting down spawner. Stopping and unloading controllers...",
+                "INFO: Stopping all controllers...",
+                "INFO: Unloading all loaded controllers...",
+                "INFO: Trying to unload pole",
+                "INFO: Succeeded in unloading pole",
+                "INFO: Trying to unload cart",
+                "INFO: Succeeded in unloading cart",
+            ],
+        )
+
+    def test_where_nothing_can_be_loaded_it_stays(self):
+        spawner = self.spawner("nobody", "noone")
+        for line in spawner.stdout:
+            if "Started controllers" in line:
+                break
+        self.assertIn("Started controllers: \n", COLOUR.sub("", line))
+        self.assertIsNone(spawner.poll())
+
+    def test_one_that_somebody_else_stopped_keeps_no_other(self):
+        spawner = self.spawner(self.file("second"), self.file("first"))
+        self.expect_states({"pole": "running", "states": "running", "cart": "running"})
+        self.assertTrue(self.manager.switch([], ["pole"], STRICT))
+        self.end(spawner, signal.SIGINT)
+        self.expect_states({})
+
+    def test_wait_for_goes_on_after_the_timeout(self):
+        gate = rospy.Publisher("/never", Bool, queue_size=1, latch=True)
+        gate.publish(False)
+        self.spawner("--wait-for", "/never", "--timeout", "1", self.file("second"))
+        self.expect_states({"pole": "running"})
 
     def test_wait_for_waits_for_true(self):
         gate = rospy.Publisher("/gate", Bool, queue_size=1, latch=True)
         gate.publish(False)
-        self.run_script("spawner", "--wait-for", "/gate", "--no-timeout", CART)
-        for _ in range(int(BOUND / 0.05)):
-            if gate.get_num_connections():
-                break
-            threading.Event().wait(0.05)
-        self.assertEqual(states(), {})
+        self.spawner("--wait-for", "/gate", "--no-timeout", self.file("second"))
+        self.assertTrue(wait_until(gate.get_num_connections))
+        self.assertEqual(self.manager.states(), {})
         gate.publish(True)
-        self.wait_for({CART: "running"})
+        self.expect_states({"pole": "running"})
 
     def test_an_unknown_controller_does_not_keep_the_others_from_starting(self):
-        spawner = self.run_script("spawner", "nobody", CART)
-        self.wait_for({CART: "running"})
-        self.assertIn("Failed to load nobody", self.interrupt(spawner))
+        spawner = self.spawner("nobody", self.file("second"))
+        self.expect_states({"pole": "running"})
+        self.assertIn("Failed to load nobody", "".join(self.end(spawner, signal.SIGINT)))
 
-    def test_without_a_manager_it_says_so_and_ends(self):
-        # As long as simulated time stands at zero it would wait for the simulator to begin.
+    def test_wait_for_is_interrupted_by_ctrl_c(self):
+        for options in (["--timeout", "0"], ["--no-timeout"], []):
+            spawner = self.spawner("--wait-for", "/never", *options, self.file("second"))
+            listeners = rospy.Publisher("/never", Bool, queue_size=1)
+            self.assertTrue(wait_until(listeners.get_num_connections))
+            self.end(spawner, signal.SIGINT)
+            self.assertEqual(spawner.returncode, 0)
+            self.assertTrue(wait_until(lambda p=listeners: not p.get_num_connections()))
+        self.assertEqual(self.manager.states(), {})
+
+    # ended by others, and unspawner
+
+    def test_rosnode_kill_ends_both_well(self):
+        spawner = self.spawner(self.file("first"), "__name:=my_spawner")
+        self.expect_states({"states": "running", "cart": "running"})
+        unspawner = self.start(
+            executable("controller_manager", "unspawner"), "cart", "__name:=my_unspawner"
+        )
+        self.expect_states({"states": "running", "cart": "stopped"})
+        for program, states in (
+            (unspawner, {"states": "running", "cart": "running"}),
+            (spawner, {}),
+        ):
+            name = "/my_unspawner" if program is unspawner else "/my_spawner"
+            subprocess.run(["rosnode", "kill", name], check=True, stdout=subprocess.DEVNULL)
+            self.lines(program)
+            self.assertEqual(program.returncode, 0)
+            self.expect_states(states)
+
+    def test_unspawner_starts_only_what_it_has_stopped(self):
+        self.spawner(self.file("first"))
+        self.expect_states({"states": "running", "cart": "running"})
+        self.spawner("--stopped", self.file("second"))
+        self.expect_states({"states": "running", "cart": "running", "pole": "initialized"})
+        unspawner = self.start(
+            executable("controller_manager", "unspawner"), "pole", "cart", "nobody"
+        )
+        self.expect_states({"states": "running", "cart": "stopped", "pole": "initialized"})
+        lines = self.end(unspawner, signal.SIGTERM)
+        self.expect_states({"states": "running", "cart": "running", "pole": "initialized"})
+        self.assertEqual(unspawner.returncode, 0)
+        service = "INFO: Unspawner: Waiting for service controller_manager"
+        self.assertEqual(
+            lines,
+            [
+                f"{service}/switch_controller",
+                f"{service}/list_controllers",
+                "INFO: Stopped controllers: cart",
+                "INFO: Started controllers: cart",
+            ],
+        )
+
+    def test_unspawner_gives_back_what_somebody_else_has_started_meanwhile(self):
+        self.spawner(self.file("first"))
+        self.expect_states({"states": "running", "cart": "running"})
+        unspawner = self.start(executable("controller_manager", "unspawner"), "cart")
+        self.expect_states({"states": "running", "cart": "stopped"})
+        self.assertTrue(self.manager.switch(["cart"], [], STRICT))
+        self.expect_states({"states": "running", "cart": "stopped"})
+        self.end(unspawner, signal.SIGINT)
+        self.expect_states({"states": "running", "cart": "running"})
+
+    # without a manager
+
+    def test_z_without_a_manager_it_says_so_and_ends(self):
+        """The last one by its name: from now on simulated time isn't zero any more."""
         call("/gazebo/unpause_physics", Empty)
         self.addCleanup(call, "/gazebo/pause_physics", Empty)
-        spawner = self.run_script("spawner", "--namespace", "/nowhere", "--timeout", "1", CART)
-        output, _ = spawner.communicate(timeout=BOUND)
+        spawner = self.spawner("--namespace", "/nowhere", "--timeout", "1", self.file("second"))
+        lines = self.lines(spawner)
         self.assertEqual(spawner.returncode, 1)
-        self.assertIn("couldn't find the expected controller_manager ROS interface", output)
+        self.assertIn("couldn't find the expected controller_manager ROS interface", lines[-1])
 
-    def test_unspawner_keeps_controllers_stopped_and_gives_them_back(self):
-        self.run_script("spawner", STATES, CART)
-        self.wait_for({STATES: "running", CART: "running"})
-        unspawner = self.run_script("unspawner", CART)
-        self.wait_for({STATES: "running", CART: "stopped"})
-        call("/controller_manager/switch_controller", SwitchController, [CART], [], 2, False, 0.0)
-        self.wait_for({STATES: "running", CART: "stopped"})
-        self.interrupt(unspawner)
-        self.wait_for({STATES: "running", CART: "running"})
+    def test_while_simulated_time_stands_at_zero_the_timeout_begins_anew(self):
+        spawner = self.spawner("--namespace", "/late", "--timeout", "0.2", self.file("second"))
+        # It says so, and the robot comes after several timeouts.
+        for _, line in zip(range(3), filter(is_retry, spawner.stdout), strict=False):
+            self.assertIn("/late/controller_manager/load_controller", line)
+        self.addCleanup(delete_model, "second")
+        self.assertTrue(spawn("second", robot_namespace="/late").success)
+        reader = threading.Thread(target=spawner.stdout.read, daemon=True)
+        reader.start()
+        self.expect_states({"pole": "running"}, Manager("/late"))
+        spawner.send_signal(signal.SIGINT)
+        reader.join(BOUND)
+        self.expect_states({}, Manager("/late"))
+
+
+def is_retry(line):
+    return "still waiting" in line
 
 
 if __name__ == "__main__":
     rospy.init_node("spawner_test")
+    rospy.wait_for_service("/gazebo/get_world_properties", BOUND)
     rostest.rosrun("cartpole", "spawner", SpawnerTest)

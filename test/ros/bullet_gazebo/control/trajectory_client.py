@@ -1,7 +1,4 @@
-"""A client of a trajectory controller, as MoveIt, rqt and rostopic are; waits are in wall time."""
-
-import sys
-from pathlib import Path
+"""A client of a trajectory controller, as MoveIt, rqt and rostopic are; it waits in wall time."""
 
 import actionlib
 import rospy
@@ -12,11 +9,9 @@ from control_msgs.msg import (
     FollowJointTrajectoryGoal,
     JointTrajectoryControllerState,
 )
-from controller_client import wait_until
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+from support.ros.calls import wait_until
 from support.ros.subscribed import is_heard
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 NAMES = {value: name for name, value in vars(GoalStatus).items() if name.isupper()}
 

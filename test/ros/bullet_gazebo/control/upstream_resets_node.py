@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Resets with relatch_on_reset: false: controllers go on as in ros_control, but for their period."""
+"""Resets with relatch_on_reset: false: controllers go on as in ros_control, except for their period."""
 
 import rospy
 import rostest
 from control_msgs.msg import PidState
 from sensor_msgs.msg import JointState
-from slides_client import SlidesTest, Topic, call
+from slides_client import SlidesTest, listen
 from std_srvs.srv import Empty
+from support.ros.calls import call
 
 
 class UpstreamResetsTest(SlidesTest):
@@ -30,8 +31,8 @@ class UpstreamResetsTest(SlidesTest):
         self.run_controllers("effort_position", "states")
         self.step(2000)
         pid, states = (
-            Topic("effort_position/pid/state", PidState),
-            Topic("joint_states", JointState),
+            listen("effort_position/pid/state", PidState),
+            listen("joint_states", JointState),
         )
         for reset in ("/gazebo/reset_world", "/gazebo/reset_simulation"):
             call(reset, Empty)

@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
-"""Gazebo's interface on MuJoCo: spawn, control, reset, place, step, delete; and what is said without it."""
+"""Gazebo's interface on MuJoCo: spawn, control, reset, place, step, delete; and the error without MuJoCo."""
 
 import importlib.util
 import subprocess
 import sys
 import threading
 import unittest
-from pathlib import Path
 
 import rospy
 import rostest
@@ -21,11 +20,9 @@ from gazebo_msgs.srv import (
 )
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+from support.ros.calls import BOUND, call
 from support.ros.subscribed import wait_until_heard
 
-BOUND = 60.0  # [s of wall time]
 STATES, CART = "joint_state_controller", "stand_cart_position_controller"
 WITHOUT = """
 import importlib.util, sys
@@ -34,11 +31,6 @@ importlib.util.find_spec = lambda name, *more: None if name == "mujoco" else fin
 from bullet_gazebo.ros.node.gzserver import main
 sys.exit(main(["gzserver", "-e", "mujoco", "__name:=lonely"]))
 """
-
-
-def call(name, kind, *args):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)(*args)
 
 
 def spawn(name):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Package gazebo_ros as a user has it: own robot, own launch file, spawn_model, gz, gazebo."""
+"""Package gazebo_ros with a user's robot and launch file: spawn_model, gz, gazebo."""
 
 import os
 import signal
@@ -20,8 +20,8 @@ from gazebo_ros import gazebo_interface
 from geometry_msgs.msg import Pose
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
+from support.ros.calls import BOUND, call, executable, sim_time, wait_until
 
-BOUND = 60.0  # [s]
 PACKAGE = """<package format="2"><name>my_arm</name><version>0.0.1</version>
 <description>An arm.</description><maintainer email="a@example.com">a</maintainer>
 <license>BSD</license></package>"""
@@ -110,22 +110,6 @@ def Broken(context):
 """
 
 
-def call(name, kind, *request):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)(*request)
-
-
-def sim_time():
-    return call("/gazebo/get_world_properties", GetWorldProperties).sim_time
-
-
-def wait_until(condition):
-    deadline = time.monotonic() + BOUND
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.05)
-
-
 def write_package(folder):
     files = {"package.xml": PACKAGE, "urdf/arm.urdf": URDF, "config/control.yaml": YAML,
              "launch/arm.launch": LAUNCH, "python/my_plugins.py": PLUGINS, "sdf/arm.sdf": SDF,
@@ -168,16 +152,16 @@ class GazeboRos(unittest.TestCase):
         return result.stdout + result.stderr
 
     def spawn(self, *arguments, **kwargs):
-        return self.run_command("rosrun", "gazebo_ros", "spawn_model", *arguments, **kwargs)
+        return self.run_command(executable("gazebo_ros", "spawn_model"), *arguments, **kwargs)
 
     def models(self):
         return call("/gazebo/get_world_properties", GetWorldProperties).model_names
 
     def test_1_a_users_launch_file(self):
-        wait_until(lambda: "arm" in self.models())
+        self.assertTrue(wait_until(lambda: "arm" in self.models()))
         state = rospy.wait_for_message("/joint_states", JointState, BOUND)
         self.assertEqual(state.name, ["elbow"])
-        wait_until(lambda: abs(self.elbow() - 0.25) < 0.2)
+        self.assertTrue(wait_until(lambda: abs(self.elbow() - 0.25) < 0.2))
 
     def elbow(self):
         return call("/gazebo/get_joint_properties", GetJointProperties, "arm::elbow").position[0]
@@ -185,7 +169,7 @@ class GazeboRos(unittest.TestCase):
     def test_2_joint_state_publisher(self):
         heard = []
         listener = rospy.Subscriber("/listed/joint_states", JointState, heard.append)
-        wait_until(lambda: len(heard) > 20)
+        self.assertTrue(wait_until(lambda: len(heard) > 20))
         self.assertEqual(heard[-1].name, ["elbow", "shoulder"])
         steps = {
             round((b.header.stamp - a.header.stamp).to_sec(), 4)
@@ -201,7 +185,9 @@ class GazeboRos(unittest.TestCase):
         heard.clear()
         call("/gazebo/reset_simulation", Empty)
         call("/gazebo/unpause_physics", Empty)
-        wait_until(lambda: any(message.header.stamp.to_sec() < 0.1 for message in list(heard)))
+        self.assertTrue(
+            wait_until(lambda: any(message.header.stamp.to_sec() < 0.1 for message in list(heard)))
+        )
         listener.unregister()
 
     def test_3_plugins_of_a_user(self):
@@ -209,7 +195,7 @@ class GazeboRos(unittest.TestCase):
 
         self.assertEqual(rospy.wait_for_message("/mine/count", Int32, BOUND).data, 50)
         before = sim_time()
-        wait_until(lambda: sim_time() > before)
+        self.assertTrue(wait_until(lambda: sim_time() > before))
 
     def test_4_spawn_model(self):
         path = f"{self.folder.name}/my_arm/urdf/arm.urdf"
@@ -231,7 +217,7 @@ class GazeboRos(unittest.TestCase):
         self.spawn("-urdf", "-file", path, "-model", "d", "-robot_namespace", "/d", "-wait", "a",
                    "-unpause", "-package_to_model")  # fmt: skip
         before = sim_time()
-        wait_until(lambda: sim_time() > before)
+        self.assertTrue(wait_until(lambda: sim_time() > before))
 
     def test_4_spawn_model_from_sdf(self):
         rospy.set_param("/sdf_arm/robot_description", URDF)
@@ -269,21 +255,21 @@ class GazeboRos(unittest.TestCase):
             waiting = self.start("rosrun", "gazebo_ros", "spawn_model", "-sdf", "-database", "crate",
                                  "-model", "late", "__name:=waiting", *arguments,
                                  stderr=subprocess.PIPE, text=True)  # fmt: skip
-            wait_until(lambda: "/waiting" in rosnode.get_node_names())
+            self.assertTrue(wait_until(lambda: "/waiting" in rosnode.get_node_names()))
             waiting.send_signal(signal.SIGINT)
             self.assertIn("interrupted", waiting.communicate(timeout=BOUND)[1])
             self.assertEqual(waiting.returncode, 1)
-            wait_until(lambda: "/waiting" not in rosnode.get_node_names())
+            self.assertTrue(wait_until(lambda: "/waiting" not in rosnode.get_node_names()))
 
     def test_5_bond(self):
         bond = self.start("rosrun", "gazebo_ros", "spawn_model", "-urdf", "-stdin", "-model", "bond",
                           "-robot_namespace", "/bond", "-b", stdin=subprocess.PIPE)  # fmt: skip
         bond.stdin.write(URDF.encode())
         bond.stdin.close()
-        wait_until(lambda: "bond" in self.models())
+        self.assertTrue(wait_until(lambda: "bond" in self.models()))
         bond.send_signal(signal.SIGINT)
         bond.wait(BOUND)
-        wait_until(lambda: "bond" not in self.models())
+        self.assertTrue(wait_until(lambda: "bond" not in self.models()))
 
     def test_6_gz(self):
         self.run_command("gz", "world", "-p", "1")
@@ -314,7 +300,7 @@ class GazeboRos(unittest.TestCase):
             self.assertEqual(node.gazeboWorld()[0], -1)
         self.assertEqual(sim_time(), 0.0)
         self.run_command("gz", "world", "-p", "0")
-        wait_until(lambda: sim_time() > 0.0)
+        self.assertTrue(wait_until(lambda: sim_time() > 0.0))
 
     def test_7_gazebo_interface(self):
         place = (Pose(), "", "/gazebo")

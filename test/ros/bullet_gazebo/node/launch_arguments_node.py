@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Arguments of empty_world.launch that show when the simulator is killed, fails, or meets another one."""
+"""Arguments of empty_world.launch that matter when the simulator is killed, fails or meets another one."""
 
 import os
 import signal

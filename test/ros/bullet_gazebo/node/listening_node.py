@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The addresses that a master's processes listen at, from the kernel."""
+"""The addresses at which the processes of a launch listen, read from the kernel."""
 
 import os
 import socket

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`record:=FILE`: a video that is whole after Ctrl-C, and one line for what can't be recorded."""
+"""`record:=FILE` leaves a complete video after Ctrl-C; what can't be recorded is one line of error."""
 
 import os
 import re

@@ -1,11 +1,9 @@
 #!/usr/bin/env python3
-"""Gazebo's services and topics as a client sees them (docs/contract/gazebo.md 1 and 2), over real ROS."""
+"""Gazebo's services and topics as a client sees them (docs/contract/gazebo.md 1 and 2)."""
 
-import sys
 import threading
 import unittest
 from itertools import pairwise
-from pathlib import Path
 
 import rospy
 import rostest
@@ -30,55 +28,11 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
+from support.ros.calls import BOUND, call, wait_until
+from support.ros.subscribed import Listener
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
-from support.ros.subscribed import wait_until_heard
-
-BOUND = 60.0  # [s of wall time]
 STRICT = 2
 CONTROLLERS = ["joint_state_controller", "stand_cart_position_controller"]
-MANAGER = ("list_controllers", "list_controller_types", "load_controller", "unload_controller",
-           "switch_controller", "reload_controller_libraries")  # fmt: skip
-
-
-def call(name, kind, *args, **kwargs):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)(*args, **kwargs)
-
-
-class Listener:
-    """Keeps what comes on a topic, and waits for more of it."""
-
-    def __init__(self, topic, kind):
-        self.messages = []
-        self._topic = topic
-        self._news = threading.Condition()
-        self._subscriber = rospy.Subscriber(topic, kind, self._receive)
-
-    def _receive(self, message):
-        with self._news:
-            self.messages.append(message)
-            self._news.notify_all()
-
-    def wait_for(self, condition, bound=BOUND):
-        with self._news:
-            return self._news.wait_for(lambda: condition(self.messages), bound)
-
-    def wait_connected(self):
-        return wait_until_heard(self._topic)
-
-    def close(self):
-        self._subscriber.unregister()
-
-
-def wait_until(condition, bound=BOUND):
-    done, pause = False, threading.Event()
-    for _ in range(int(bound / 0.01)):
-        done = condition()
-        if done:
-            break
-        pause.wait(0.01)
-    return done
 
 
 def spawn(name="cartpole", xml=None, **kwargs):
@@ -101,20 +55,15 @@ class StandInTest(unittest.TestCase):
     def setUp(self):
         call("/gazebo/pause_physics", Empty)
         self.assertTrue(spawn().success)
-        self.listeners = []
 
     def tearDown(self):
-        for listener in self.listeners:
-            listener.close()
         call("/gazebo/pause_physics", Empty)
         for name in ("cartpole", "second"):
             call("/gazebo/delete_model", DeleteModel, name)
 
-    def listen(self, topic, kind, connected=True):
+    def listen(self, topic, kind):
         listener = Listener(topic, kind)
-        self.listeners.append(listener)
-        if connected:
-            self.assertTrue(listener.wait_connected(), f"nobody publishes {topic}")
+        self.addCleanup(listener.close)
         return listener
 
     def start_controllers(self):
@@ -132,21 +81,6 @@ class StandInTest(unittest.TestCase):
         self.assertTrue(world.success)
         self.assertFalse(world.rendering_enabled, "there are no cameras (docs/differences.md)")
         self.assertEqual(world.status_message, "GetWorldProperties: got properties")
-
-    def test_model_state_counts_calls_and_knows_frames(self):
-        first = call("/gazebo/get_model_state", GetModelState, "cartpole", "")
-        second = call("/gazebo/get_model_state", GetModelState, "cartpole", "cartpole::pole")
-        self.assertEqual(second.header.seq, first.header.seq + 1)
-        self.assertEqual(second.header.frame_id, "cartpole::pole")
-        self.assertAlmostEqual(second.pose.position.z, -0.18, places=6)
-        self.assertEqual(second.status_message, "GetModelState: got properties")
-        gone = call("/gazebo/get_model_state", GetModelState, "nobody", "")
-        self.assertEqual(
-            (gone.success, gone.status_message), (False, "GetModelState: model does not exist")
-        )
-        lost = call("/gazebo/get_model_state", GetModelState, "cartpole", "nowhere")
-        self.assertFalse(lost.success)
-        self.assertIn("relative_entity_name not found", lost.status_message)
 
     def test_joint_properties(self):
         place(0.1, 0.2)
@@ -313,23 +247,7 @@ class StandInTest(unittest.TestCase):
         self.assertTrue(states.wait_for(lambda m: len(m) >= first + 24))
         self.assertEqual({m.position for m in states.messages[first:]}, {(0.0, 0.0)})
 
-    def test_reset_world_keeps_time_and_joint_positions(self):
-        place(0.2, 0.1)
-        call("/gazebo/unpause_physics", Empty)
-        self.assertTrue(wait_until(lambda: abs(joint("cart_pole").position[0]) > 0.11))
-        call("/gazebo/pause_physics", Empty)
-        before = joint("cart_pole").position[0]
-        time = call("/gazebo/get_world_properties", GetWorldProperties).sim_time
-        call("/gazebo/reset_world", Empty)
-        after = joint("cart_pole")
-        self.assertEqual((after.position[0], after.rate[0]), (before, 0.0))
-        self.assertEqual(call("/gazebo/get_world_properties", GetWorldProperties).sim_time, time)
-
     # control
-
-    def test_the_manager_offers_its_six_services(self):
-        for name in MANAGER:
-            rospy.wait_for_service(f"/controller_manager/{name}", BOUND)
 
     def test_controllers_start_while_paused_and_hold_then_follow(self):
         self.start_controllers()

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
-"""Beyond real time topics are thinned, and the last message before a pause always comes; else all come."""
+"""Topics are thinned only beyond real time, and the last message before a pause always arrives."""
 
-import threading
 import time
 import unittest
 
@@ -14,67 +13,39 @@ from gazebo_msgs.srv import (
     GetPhysicsProperties,
     GetWorldProperties,
     SetPhysicsProperties,
-    SpawnModel,
-    SpawnModelRequest,
 )
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
+from support.ros.calls import call, spawn_model
+from support.ros.subscribed import Listener
 
 from ros_utils import ros_gazebo
 from ros_utils.service_client import ServiceGone
 from ros_utils.step_client import StepClient
 
-BOUND = 60.0  # [s of wall time]
 MILLISECOND = 1_000_000  # [ns]
 REAL_TIME, UNLIMITED = 1000.0, 0.0  # [Hz]
-
-
-def call(name, kind, *args):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)(*args)
-
-
-class Stamps:
-    """The times [ns] of a topic's messages."""
-
-    def __init__(self, name, kind, read):
-        self.got = []
-        self._news = threading.Condition()
-        self._read = read
-        self._subscriber = rospy.Subscriber(name, kind, self._receive, tcp_nodelay=True)
-
-    def _receive(self, message):
-        with self._news:
-            self.got.append(self._read(message))
-            self._news.notify_all()
-
-    def wait_for(self, condition):
-        with self._news:
-            return self._news.wait_for(lambda: condition(self.got), BOUND)
-
-    def close(self):
-        self._subscriber.unregister()
 
 
 class ThinningTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        xml = rospy.get_param("/robot_description")
-        request = SpawnModelRequest(model_name="cartpole", model_xml=xml, robot_namespace="/")
-        assert call("/gazebo/spawn_urdf_model", SpawnModel, request).success
+        assert spawn_model("cartpole", rospy.get_param("/robot_description")).success
         name = "joint_state_controller"
         assert call("/controller_manager/load_controller", LoadController, name).ok
         assert call(
             "/controller_manager/switch_controller", SwitchController, [name], [], 2, False, 0.0
         ).ok
-        cls.clock = Stamps("/clock", Clock, lambda message: message.clock.to_nsec())
-        cls.joints = Stamps("/joint_states", JointState, lambda m: m.header.stamp.to_nsec())
-        cls.models = Stamps("/gazebo/model_states", ModelStates, lambda message: len(message.name))
+        cls.clock = Listener("/clock", Clock, False, lambda m: m.clock.to_nsec())
+        cls.joints = Listener(
+            "/joint_states", JointState, False, lambda m: m.header.stamp.to_nsec()
+        )
+        cls.models = Listener("/gazebo/model_states", ModelStates, False, lambda m: len(m.name))
         assert ros_gazebo.gazebo_step_physics(
             1
         )  # all three have found their publisher when it shows
-        while not (cls.clock.got and cls.joints.got and cls.models.got):
+        while not (cls.clock.messages and cls.joints.messages and cls.models.messages):
             assert ros_gazebo.gazebo_step_physics(1)
 
     @classmethod
@@ -97,15 +68,15 @@ class ThinningTest(unittest.TestCase):
 
     def assert_last_is(self, time):
         for topic in (self.clock, self.joints):
-            self.assertTrue(topic.wait_for(lambda got: got[-1] == time), (topic.got[-1], time))
+            self.assertTrue(topic.wait_for(lambda got: got[-1] == time), (topic.messages[-1], time))
 
     def run_until(self, time):
-        begin = len(self.clock.got)
+        begin = len(self.clock.messages)
         call("/gazebo/unpause_physics", Empty)
         self.assertTrue(self.clock.wait_for(lambda got: got[-1] >= time))
         call("/gazebo/pause_physics", Empty)
         self.assert_last_is(self.time())
-        return self.clock.got[begin:]
+        return self.clock.messages[begin:]
 
     def test_as_fast_as_it_can_less_comes_but_the_last_before_each_pause(self):
         self.set_rate(UNLIMITED)
@@ -136,7 +107,7 @@ class ThinningTest(unittest.TestCase):
 
     def test_steps_of_gz_world_end_with_their_last_message(self):
         for ticks in (1, 2, 3, 500):
-            begin, models = self.time(), len(self.models.got)
+            begin, models = self.time(), len(self.models.messages)
             self.assertTrue(ros_gazebo.gazebo_step_physics(ticks))
             self.assert_last_is(begin + ticks * MILLISECOND)
             self.assertTrue(self.models.wait_for(lambda got, before=models: len(got) > before))

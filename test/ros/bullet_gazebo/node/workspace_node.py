@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Whether a node that roslaunch starts finds ROS, PyPI's packages and ours."""
+"""A node that roslaunch starts finds ROS, PyPI's packages and ours."""
 
 import importlib
 import os

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A world from a file, and SDF models spawned into it, as a client sees them.
+"""A world from a file, and SDF models spawned into it.
 
 See docs/contract/gazebo.md 2.3 to 2.5.
 """
@@ -26,10 +26,10 @@ from gazebo_msgs.srv import (
     SpawnModelRequest,
 )
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
+from support.ros.calls import BOUND, call
 
 from ros_utils import ros_gazebo
 
-BOUND = 60.0  # [s of wall time]
 UNKNOWN = (
     "GazeboRosApiPlugin SpawnModel Failure: input model_xml not SDF or URDF, or cannot be converted "
     "to Gazebo compatible format."
@@ -56,11 +56,6 @@ URDF = (
     'iyz="0"/></inertial><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
     '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>'
 )
-
-
-def call(name, kind, *args, **kwargs):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)(*args, **kwargs)
 
 
 def spawn(name, xml, service="sdf", **kwargs):
@@ -193,11 +188,6 @@ class Spawning(unittest.TestCase):
         self.spawned("wordy", xml, initial_pose=at(0.0, -30.0, 1.0))
         self.assertLess(time.monotonic() - start, 2 * BOUND)
 
-    def test_static_models_can_be_deleted(self):
-        spawn("block", BOX.format(more="<static>true</static>"), initial_pose=at(9.0))
-        self.assertEqual(delete("block").status_message, "DeleteModel: successfully deleted model")
-        self.assertNotIn("block", models())
-
     def test_a_light_is_spawned_under_the_models_name(self):
         xml = (
             '<sdf version="1.6"><light name="l" type="point"><pose>0 0 1 0 0 0</pose></light></sdf>'
@@ -324,17 +314,6 @@ class OddFiles(unittest.TestCase):
         self.assertIn("a planar joint is only simulated", answers[0].status_message)
         # One may come before the slow one is looked at; if they waited, no second one would.
         self.assertGreater(served, 2)
-
-    def test_texts_may_say_what_files_say_of_themselves(self):
-        """The text of a parameter or request is decoded already, whatever its declaration says."""
-        declaration = '<?xml version="1.0" encoding="{}"?>\r\n'
-        for number, encoding in enumerate(("utf-8", "ISO-8859-1", "utf-16")):
-            for before in ("", "\ufeff", "\r\n <!-- mine -->\n"):
-                for service, text in (("urdf", URDF), ("sdf", URDF), ("sdf", BOX.format(more=""))):
-                    xml = before + declaration.format(encoding) + text
-                    answer = spawn("Gerät", xml, service, initial_pose=at(50.0 + number))
-                    self.assertTrue(answer.success, answer.status_message)
-                    self.assertTrue(delete("Gerät").success)
 
     def test_spawn_model_reads_files_of_every_encoding(self):
         declaration = '\n<!-- mine -->\n<?xml version="1.0" encoding="{0}"?>\r\n<!-- Gelände -->'

@@ -1,9 +1,7 @@
 #!/usr/bin/env python3
-"""Clients that hang, die or come in crowds; and a node that goes by the wall's clock."""
+"""Clients that hang, die or come in crowds; a node on the wall clock."""
 
 import contextlib
-import random
-import resource
 import signal
 import socket
 import struct
@@ -12,18 +10,17 @@ import sys
 import threading
 import time
 import unittest
-import xmlrpc.client
 from urllib.parse import urlsplit
 
 import rosgraph
 import rospy
 import rostest
 from gazebo_msgs.msg import ModelState
-from gazebo_world import BOUND, BOX, call, now, spawn, wait_until
+from gazebo_world import BOX, call, now, spawn
 from geometry_msgs.msg import Point, Pose, Twist
+from support.ros.calls import BOUND, wait_until
 
 CROWD = 30
-SMALL = 60.0  # [MiB]; what a crowd that sends nonsense may cost
 LISTENER = """
 import rospy
 from gazebo_msgs.msg import LinkStates, ModelStates
@@ -44,33 +41,6 @@ def connect(service):
 
 def packed(data):
     return struct.pack("<I", len(data)) + data
-
-
-def send_nonsense(seed, opened):
-    """Connections with garbage, with a header that claims to be long, half-open ones, ones that vanish."""
-    draw = random.Random(seed)
-    for kind in range(12):
-        client = opened.enter_context(connect("spawn_urdf_model"))
-        with contextlib.suppress(OSError):  # it hangs up, as it should
-            if kind % 4 == 0:
-                client.sendall(draw.randbytes(draw.randrange(1, 65536)))
-            elif kind % 4 == 1:
-                client.sendall(struct.pack("<I", 2**31) + bytes(2**20))
-            elif kind % 4 == 2:
-                client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-                client.close()
-            else:
-                client.sendall(b"\x10")
-
-
-def memory():
-    """Resident memory of the simulator [MiB]."""
-    with xmlrpc.client.ServerProxy(
-        rosgraph.Master("/gazebo_clients").lookupNode("/gazebo")
-    ) as node:
-        pid = node.getPid("/gazebo_clients")[2]
-    with open(f"/proc/{pid}/statm", encoding="ascii") as statm:
-        return int(statm.read().split()[1]) * resource.getpagesize() / 2**20
 
 
 class ClientsTest(unittest.TestCase):
@@ -143,18 +113,6 @@ class ClientsTest(unittest.TestCase):
         self.assertEqual((faults, [t for t in threads if t.is_alive()]), ([], []))
         call("unpause_physics")
         self.check_alive()
-
-    def test_a_crowd_that_sends_nonsense_costs_no_memory_and_nobody_else(self):
-        before = memory()
-        with contextlib.ExitStack() as opened:
-            crowd = [threading.Thread(target=send_nonsense, args=(i, opened)) for i in range(CROWD)]
-            for client in crowd:
-                client.start()
-            self.check_alive()
-            for client in crowd:
-                client.join(BOUND)
-            self.check_alive()
-            self.assertLess(memory(), before + SMALL)
 
     def test_stamps_are_the_walls_time_without_use_sim_time(self):
         stamp = call("get_model_state", "box", "").header.stamp.to_sec()

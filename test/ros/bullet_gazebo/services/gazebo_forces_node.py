@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Efforts and wrenches, and what clears them: over real ROS."""
+"""Services that apply and clear efforts and wrenches."""
 
 import rospy
 import rostest

@@ -1,18 +1,15 @@
 #!/usr/bin/env python3
-"""Services that tell, change and place joints, and the resets: over real ROS."""
+"""Services that report, change and place joints; resets."""
 
-import sys
 import threading
-from pathlib import Path
 
 import rospy
 import rostest
 from gazebo_msgs.msg import LinkState, LinkStates, ModelState, ODEJointProperties
-from gazebo_world import BOUND, BOX, INF, NAN, GazeboTest, call, now, run, wait_until
+from gazebo_world import BOX, INF, NAN, GazeboTest, call, now, run
 from geometry_msgs.msg import Point, Pose, Twist, Vector3
 from rosgraph_msgs.msg import Clock
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+from support.ros.calls import BOUND, wait_until
 from support.ros.subscribed import wait_until_heard
 
 

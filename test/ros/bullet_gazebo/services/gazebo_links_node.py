@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Services that tell, change and place links: each text, failure and effect, over real ROS."""
+"""Services that report, change and place links: each text, failure and effect."""
 
 import math
 

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""Services that tell and place models: each text, failure and effect, over real ROS."""
+"""Services that report and place models: each text, failure and effect."""
 
 import math
 
 import rospy
 import rostest
 from gazebo_msgs.msg import LinkState, ModelState
-from gazebo_world import BOX, INF, NAN, GazeboTest, call, now, run, wait_until
+from gazebo_world import BOX, INF, NAN, GazeboTest, call, now, run
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
+from support.ros.calls import wait_until
 
 
 class ModelsTest(GazeboTest):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`enable_ros_network` and `pub_clock_frequency` (docs/contract/gazebo.md 1.2), over real ROS."""
+"""`enable_ros_network` and `pub_clock_frequency` (docs/contract/gazebo.md 1.2)."""
 
 import threading
 import unittest

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Physics properties, dynamic_reconfigure, lights and loggers: over real ROS."""
+"""Physics properties, dynamic_reconfigure, lights and loggers."""
 
 import time
 
@@ -14,10 +14,11 @@ from dynamic_reconfigure.msg import (
     IntParameter,
 )
 from dynamic_reconfigure.srv import Reconfigure
-from gazebo_world import BOUND, INF, NAN, GazeboTest, call, now, ode, physics, run, wait_until
+from gazebo_world import INF, NAN, GazeboTest, call, now, ode, physics, run
 from geometry_msgs.msg import Pose, Vector3
 from roscpp.srv import GetLoggers, SetLoggerLevel
 from std_msgs.msg import ColorRGBA
+from support.ros.calls import BOUND, wait_until
 
 PARAMETERS = {  # type, default, least, most
     "time_step": ("double", 0.001, 0.0, 10.0),

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""An empty world offers exactly what Gazebo's does (docs/contract/gazebo.md 1.3 and 1.4), and no more."""
+"""An empty world offers exactly what Gazebo's does (docs/contract/gazebo.md 1.3 and 1.4)."""
 
 import time
 import unittest

@@ -1,4 +1,4 @@
-"""What the tests of Gazebo's services share: calls, the world they begin with, and ways to check answers."""
+"""The world that the tests of Gazebo's services start from, calls, and checks of answers."""
 
 import unittest
 
@@ -8,10 +8,10 @@ from gazebo_msgs import srv
 from gazebo_msgs.msg import ODEPhysics
 from geometry_msgs.msg import Point, Pose, Vector3
 from std_srvs.srv import Empty
+from support.ros.calls import BOUND
 
 from bullet_gazebo.ros.clients.world_client import RemoteWorld
 
-BOUND = 60.0  # [s of wall time]
 NAN, INF = float("nan"), float("inf")
 SCOPE = "did you forget to scope the link by model name?"
 BOX = """<robot name="box"><link name="body"><inertial><mass value="2"/>
@@ -39,15 +39,6 @@ def run(seconds):
     start, step = now(), call("get_physics_properties").time_step
     RemoteWorld("/gazebo", rosgraph.get_master_uri()).step(max(1, round(seconds / step)))
     return now() - start
-
-
-def wait_until(condition):
-    """Waits until `condition` holds; returns whether it does."""
-    for _ in range(int(BOUND / 0.005)):
-        if condition():
-            return True
-        rospy.rostime.wallsleep(0.005)
-    return False
 
 
 def spawn(name, xml, position=(0.0, 0.0, 0.0), namespace="/"):

@@ -1,10 +1,8 @@
 #!/usr/bin/env python3
-"""The step service over real ROS: exact ticks, repeatable bits, and what it refuses."""
+"""The step service: exact ticks, repeatable bits, refusals."""
 
-import sys
 import threading
 import unittest
-from pathlib import Path
 
 import rospy
 import rostest
@@ -13,8 +11,6 @@ from controller_manager_msgs.srv import LoadController, SwitchController
 from gazebo_msgs.srv import GetWorldProperties, SpawnModel, SpawnModelRequest
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from support.ros.subscribed import wait_until_heard
 
 BOUND = 60.0  # [s of wall time]

@@ -1,20 +1,14 @@
 #!/usr/bin/env python3
-"""Sliders of the window's page: they place joints of a paused world, and command running controllers."""
-
-import sys
-from pathlib import Path
+"""The sliders of the window's page place joints while paused, and command running controllers."""
 
 import rospy
 import rostest
 from controller_manager_msgs.srv import LoadController, SwitchController
 from gazebo_msgs.srv import GetJointProperties
 from std_msgs.msg import Float64
-from trajectory_msgs.msg import JointTrajectory
-
-sys.path.append(str(Path(__file__).resolve().parents[3]))
-
 from support.pages.browser import wait_for
 from support.pages.window_page import WindowCase, proxy
+from trajectory_msgs.msg import JointTrajectory
 
 HELD = ["position_hold", "effort_arm", "velocity_drive"]
 PRESSES = 5  # of a key, each of which moves a slider by a five hundredth of its way

@@ -1,13 +1,11 @@
 #!/usr/bin/env python3
-"""The window outlives simulators that are killed, pages that go or take nothing, and other windows."""
+"""The window survives killed simulators, pages that leave or stop reading, and other windows."""
 
 import contextlib
 import subprocess
-import sys
 import time
 import unittest
 from importlib.metadata import version
-from pathlib import Path
 
 import msgspec
 import rosnode
@@ -15,12 +13,9 @@ import rospy
 import rostest
 import zstandard
 from gazebo_msgs.srv import SpawnModel, SpawnModelRequest
-from websockets.sync.client import connect
-
-sys.path.append(str(Path(__file__).resolve().parents[3]))
-
 from support.pages.browser import BOUND, wait_for
 from support.pages.window_page import INERTIAL, Output, proxy
+from websockets.sync.client import connect
 
 HEADER = 16  # [bytes] in front of what viser sends: its lengths
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a window is told over ROS: the scene once, and where its links are."""
+"""What the simulator sends a window: the scene once, then the poses of its links."""
 
 import threading
 import unittest

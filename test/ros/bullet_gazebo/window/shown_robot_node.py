@@ -1,11 +1,8 @@
 #!/usr/bin/env python3
-"""What RViz is told of a robot: where its joints are, and where it stands."""
+"""What RViz hears of a robot: its joints and where it stands."""
 
 import subprocess
-import sys
-import threading
 import unittest
-from pathlib import Path
 
 import rospy
 import rostest
@@ -14,52 +11,30 @@ from gazebo_msgs.srv import SetModelConfiguration, SetModelState, SpawnModel, Sp
 from geometry_msgs.msg import Point, Pose, Quaternion
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
-from tf2_msgs.msg import TFMessage
-
-sys.path.append(str(Path(__file__).resolve().parents[3]))
-
 from support.robots.bodies import ROVER
+from support.ros.calls import call
+from support.ros.subscribed import Listener
+from tf2_msgs.msg import TFMessage
 
 BOUND = 180.0  # [s] for anything
 NAME = "robot with a/b"  # of the model: nobody tells it to who shows the robot
 
 
-def call(name, kind, *request):
-    rospy.wait_for_service(name, BOUND)
-    return rospy.ServiceProxy(name, kind)(*request)
-
-
-class Topic:
-    """Messages of a topic, until one is as it should be."""
-
-    def __init__(self, name, kind):
-        self._news = threading.Condition()
-        self._newest = None
-        rospy.Subscriber(name, kind, self._take)
-
-    def _take(self, message):
-        with self._news:
-            self._newest = message
-            self._news.notify_all()
-
-    def wait(self, what, holds):
-        with self._news:
-            found = self._news.wait_for(
-                lambda: self._newest is not None and holds(self._newest), BOUND
-            )
-            assert found, f"no {what}, but {self._newest}"
-
-
 class ShownRobotTest(unittest.TestCase):
+    def wait(self, listener, what, holds):
+        """Until the newest message is as it should be."""
+        found = listener.wait_for(lambda messages: holds(messages[-1]))
+        self.assertTrue(found, f"no {what}, but {listener.messages[-1:]}")
+
     def test_a_robot_that_stands_anywhere_without_controllers(self):
         rospy.set_param("/robot_description", ROVER)
         command = ["rosrun", "cartpole", "shown_joints.py"]
         shown = subprocess.Popen(command)  # before there is a robot
         self.addCleanup(shown.wait, BOUND)
         self.addCleanup(shown.terminate)
-        joints = Topic("/shown_joints/joint_states", JointState)
-        places = Topic("/shown_joints/tf", TFMessage)
-        joints.wait("joint at zero", lambda it: (it.name, it.position) == (["neck"], (0.0,)))
+        joints = Listener("/shown_joints/joint_states", JointState, False)
+        places = Listener("/shown_joints/tf", TFMessage, False)
+        self.wait(joints, "joint at zero", lambda it: (it.name, it.position) == (["neck"], (0.0,)))
         pose = Pose(Point(0.5, -0.25, 2.0), Quaternion(0.0, 0.0, 0.6, 0.8))
         request = SpawnModelRequest(NAME, ROVER, "", pose, "world")
         self.assertTrue(call("/gazebo/spawn_urdf_model", SpawnModel, request).success)
@@ -74,18 +49,18 @@ class ShownRobotTest(unittest.TestCase):
 
             return holds
 
-        places.wait("robot where it was spawned", is_at(0.5, -0.25, 2.0))
+        self.wait(places, "robot where it was spawned", is_at(0.5, -0.25, 2.0))
         state = ModelState(model_name=NAME, pose=Pose(Point(3.0, 1.0, 0.5), pose.orientation))
         self.assertTrue(call("/gazebo/set_model_state", SetModelState, state).success)
-        places.wait("robot that was moved", is_at(3.0, 1.0, 0.5))
+        self.wait(places, "robot that was moved", is_at(3.0, 1.0, 0.5))
         answer = call(
             "/gazebo/set_model_configuration", SetModelConfiguration, NAME, "", ["neck"], [0.7]
         )
         self.assertTrue(answer.success)
-        joints.wait("joint that was moved", lambda it: abs(it.position[0] - 0.7) < 1e-6)
+        self.wait(joints, "joint that was moved", lambda it: abs(it.position[0] - 0.7) < 1e-6)
         publisher = rospy.Publisher("/joint_states", JointState, queue_size=1, latch=True)
         publisher.publish(JointState(Header(), ["neck"], [-0.2], [0.0], []))
-        joints.wait("joint as a controller has it", lambda it: it.position[0] == -0.2)
+        self.wait(joints, "joint as a controller has it", lambda it: it.position[0] == -0.2)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
-"""The window in a real browser: the page shows what happens, and what is clicked there happens."""
+"""The window in a real browser: the page shows the world, and its buttons work."""
 
 import io
-import sys
 import tempfile
 from pathlib import Path
 
@@ -12,6 +11,8 @@ import rostest
 from gazebo_msgs.msg import ModelState
 from gazebo_msgs.srv import GetLinkState, GetModelState, SetModelConfiguration, SetModelState
 from PIL import Image
+from support.pages.browser import wait_for
+from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.pictures.camera import Camera
@@ -19,11 +20,6 @@ from bullet_gazebo.pictures.scene import Scene
 from bullet_gazebo.pictures.solids import visible_shapes
 from bullet_gazebo.ros.clients.window.opened import CAMERA, LOOK_AT
 from bullet_gazebo.ros.wire.conversions import from_pose_msg
-
-sys.path.append(str(Path(__file__).resolve().parents[3]))
-
-from support.pages.browser import wait_for
-from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, count, proxy
 
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>

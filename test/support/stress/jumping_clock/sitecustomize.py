@@ -1,4 +1,4 @@
-"""With this folder on PYTHONPATH the wall clock jumps: hours forth and back, in any Python process.
+"""With this folder on PYTHONPATH, the wall clock of any Python process jumps by hours.
 
 As a clock that is set, or set right over the network; the clocks that only measure spans go on evenly. Not in
 roslaunch and master, which give up what they wait for when it jumps.

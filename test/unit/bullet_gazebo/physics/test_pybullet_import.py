@@ -38,7 +38,7 @@ def outcome(code: str, *python: str) -> subprocess.CompletedProcess[str]:
     [
         "from bullet_gazebo.physics.engines import make_engine; make_engine()",
         "import gymnasium, cartpole; gymnasium.make('cartpole/Balance-v0').reset(seed=0)",
-        "import robot_envs.pictures.window",
+        "import robot_envs.pictures.drawn",
     ],
 )
 def test_an_engine_comes_without_a_word(code: str) -> None:

@@ -8,7 +8,7 @@ from support.ros.ros_fakes import FakeMaster
 
 from bullet_gazebo.ros.node import master_watch
 from bullet_gazebo.ros.node.master_watch import MasterWatch
-from ros_calls.xmlrpc import NoAnswer
+from ros_calls.master import NoAnswer
 
 SERVICE, OURS = "/gazebo/get_loggers", "rosrpc://127.0.0.1:1"
 

@@ -1,11 +1,7 @@
 """step_world as a function: random numbers, groups, joints of every interface, several robots, refusals."""
 
 import contextlib
-import io
-import itertools
 import random
-import struct
-import sys
 import threading
 from functools import lru_cache
 
@@ -13,7 +9,7 @@ import numpy as np
 import pytest
 import xacro
 import yaml
-from bullet_gazebo_msgs.srv import StepWorldRequest, StepWorldResponse
+from bullet_gazebo_msgs.srv import PreparedStepRequest, PrepareStepRequest, StepWorldRequest
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 
@@ -26,9 +22,7 @@ from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.ros.services.stepping import step_service
-from bullet_gazebo.ros.services.stepping.addresses import MOST_LISTS
 from bullet_gazebo.ros.services.stepping.step_service import StepService
-from bullet_gazebo.ros.services.stepping.usual_requests import UsualRequest, UsualRequests
 from bullet_gazebo.simulator import Simulator
 
 WORLD = StepWorldRequest.WORLD
@@ -52,7 +46,6 @@ class Slides:
         self._urdf = slides(root)
         self._params = yaml.safe_load((root / "test/data/robots/slides.yaml").read_text())
         self.service = StepService(self.sim, contextlib.nullcontext(), threading.Lock())
-        self._usual = UsualRequests()
 
     def add(self, name, *controllers):
         model = self.sim.world.spawn(name, parse_urdf(self._urdf), Pose())
@@ -64,19 +57,15 @@ class Slides:
         robot.manager.switch(list(controllers), [], STRICT)
 
     def call(self, ticks=0, **fields):
-        return self.service._step(self._read(StepWorldRequest(ticks=ticks, **fields)))
+        return self.service._step(StepWorldRequest(ticks=ticks, **fields))
 
-    def _read(self, request):
-        """As it comes from a lasting connection: by genpy, or in less time if it is a usual one."""
-        data = on_the_wire(request)
-        usual = self._usual.read(data)
-        genpys = StepWorldRequest().deserialize(data[4:])
-        if usual is None:
-            self._usual.learn(data, genpys)
-            return genpys
-        for name in genpys.__slots__:
-            assert repr(tuple_of(getattr(usual, name))) == repr(tuple_of(getattr(genpys, name)))
-        return usual
+    def prepare(self, **names):
+        answer = self.service._prepare(PrepareStepRequest(**names))
+        assert answer.success, answer.status_message
+        return answer
+
+    def prepared(self, prepared, ticks, *commands):
+        return self.service._step_prepared(PreparedStepRequest(prepared.handle, ticks, commands))
 
     def step(self, ticks, **fields):
         """Joints by name: (position, velocity, effort)."""
@@ -94,21 +83,10 @@ class Slides:
 
 @pytest.fixture
 def world(root, monkeypatch):
-    monkeypatch.setattr(step_service, "PolledService", lambda *args: None)
+    monkeypatch.setattr(step_service.rospy, "Service", lambda *args: None)
     made = Slides(root)
     yield made
     made.sim.world.close()
-
-
-def on_the_wire(request):
-    """Its bytes, with their number in front."""
-    buffer = io.BytesIO()
-    request.serialize(buffer)
-    return struct.pack("<I", buffer.tell()) + buffer.getvalue()
-
-
-def tuple_of(value):
-    return tuple(value) if isinstance(value, list) else value
 
 
 def drawn():
@@ -364,49 +342,6 @@ def test_what_has_gone_during_a_long_request_is_told(objects, monkeypatch):
     assert answer.sim_time == pytest.approx(0.6)
 
 
-def calls_of(function):
-    """How many functions are called while one runs, Python's own among them."""
-    count = 0
-
-    def note(_frame, event, _argument):
-        nonlocal count
-        count += event in ("call", "c_call")
-
-    sys.setprofile(note)
-    try:
-        function()
-    finally:
-        sys.setprofile(None)
-    return count
-
-
-def names_of(robots):
-    return {
-        "controllers": [f"/{name}/effort_joint" for name in robots],
-        "commands": [0.1] * len(robots),
-        "commanded_joints": [f"{name}::effort_b" for name in robots],
-        "joint_commands": [0.2] * len(robots),
-        "joints": [f"{name}::velocity_b" for name in robots],
-        "positions": [0.3] * len(robots),
-    }
-
-
-def test_what_a_request_costs_grows_with_the_number_of_robots_and_no_faster(world, monkeypatch):
-    monkeypatch.setattr(Simulator, "advance", lambda *args: 1)  # the ticks are measured elsewhere
-    monkeypatch.setattr(Simulator, "set_joint_states", lambda *args: None)
-    robots, first, again = [], [], []
-    for count in (2, 4, 6):
-        while len(robots) < count:
-            robots.append(f"r{len(robots)}")
-            world.add(robots[-1], "effort_joint")
-        fields = names_of(robots)
-        first.append(calls_of(lambda fields=fields: world.step(1, **fields)))
-        again.append(calls_of(lambda fields=fields: world.step(1, **fields)))
-    for costs in (first, again):
-        assert costs[2] - costs[1] == pytest.approx(costs[1] - costs[0], abs=4)
-    assert again[2] < first[2] / 2  # names are looked up once
-
-
 def test_who_comes_goes_stops_or_is_another_one_is_noticed_by_the_same_request(world):
     """What was found for the names of a request must not outlive those who had them."""
     world.add("left", "effort_joint")
@@ -459,75 +394,122 @@ def test_who_comes_goes_stops_or_is_another_one_is_noticed_by_the_same_request(w
     assert gone.hardware.joints["velocity_b"].position == pytest.approx(0.5)
 
 
-def test_faults_are_told_in_the_order_of_the_names_also_for_names_that_are_known(world):
-    world.add("slides", "effort_joint", "position_joint")
-    names = {"controllers": ["effort_joint", "position_joint"]}
-    assert world.step(1, commands=[1.0, 0.0], **names)
-    world.sim.robots[0].manager.switch([], ["position_joint"])
-    assert "2 controllers but 0 commands" in world.call(1, commands=[], **names).status_message
-    stopped = world.call(1, commands=[1.0], **names).status_message
-    assert "controller 'position_joint' is stopped, not running" in stopped
+QUESTION = {
+    "model_states_of": ["crate"], "link_states_of": ["crate", "crate"], "contacts_of": ["crate"],
+    "link_frames": ["", "ground_plane::link"],
+}  # fmt: skip
 
 
-def test_no_more_lists_of_names_are_kept_than_clients_send(world):
-    world.add("slides")
-    joints = sorted(world.sim.robots[0].hardware.joints)
-    lists = [list(names) for size in (1, 2) for names in itertools.permutations(joints, size)]
-    assert len(lists) > MOST_LISTS
-    for names in lists + lists:
-        numbers = [0.0] * len(names)
-        assert world.step(1, joints=names, positions=numbers)
-        assert world.step(1, commanded_joints=names, joint_commands=numbers)
-    assert len(world.service._addresses._movable_joints) == MOST_LISTS
-    assert len(world.service._addresses._free_joints) == MOST_LISTS
+def test_a_prepared_step_has_the_numbers_of_step_world(objects):
+    objects.add("other", "effort_group")
+    names = {
+        "controllers": ["/slides/effort_joint", "effort_group"],
+        "commanded_joints": ["slides::position_a"],
+        **QUESTION,
+    }
+    prepared = objects.prepare(**names)
+    assert prepared.models == ["crate"]
+
+    def by_name():
+        return objects.call(
+            8, commands=[1.0, 2.0, -1.0], joint_commands=[0.3], **names, reset=StepWorldRequest.SIMULATION
+        )  # fmt: skip
+
+    expected, again = by_name(), by_name()
+    assert again == expected
+    for _ in range(100):
+        expected = objects.call(8, commands=[1.0, 2.0, -1.0], joint_commands=[0.3], **names)
+    by_name()
+    for _ in range(100):
+        answer = objects.prepared(prepared, 8, 1.0, 2.0, -1.0, 0.3)
+    assert answer.success, answer.status_message
+    joints = expected.joint_states
+    numbers = [*joints.position, *joints.velocity, *joints.effort]
+    poses = [*expected.model_poses, *expected.link_poses]
+    for pose, twist in zip(poses, [*expected.model_twists, *expected.link_twists], strict=True):
+        for part in (pose.position, pose.orientation, twist.linear, twist.angular):
+            numbers += [getattr(part, name) for name in part.__slots__]
+    assert answer.numbers == numbers
+    assert prepared.joints == joints.name
+    assert answer.contacts == expected.contacts
+    assert answer.now == joints.header.stamp.to_nsec()
+    assert objects.prepared(prepared, 0, 1.0, 2.0, -1.0, 0.3).numbers == numbers
+
+
+def test_a_handle_is_stale_once_its_names_may_mean_something_else(world):
+    world.add("left", "effort_joint")
+    names = {"controllers": ["/left/effort_joint"], "commanded_joints": ["left::position_a"]}
+    manager = world.sim.robots[0].manager
+    for change in (
+        lambda: world.add("right"),
+        lambda: world.sim.remove_robot(world.sim.robots[1]),
+        lambda: manager.load("effort_group", world._params["effort_group"]),
+        lambda: manager.unload("effort_group"),
+        lambda: world.sim.world.spawn("ground_plane", ground_plane(), Pose()),
+    ):
+        prepared = world.prepare(**names)
+        assert world.prepared(prepared, 1, 1.0, 0.0).success
+        change()
+        answer = world.prepared(prepared, 1, 1.0, 0.0)
+        assert (answer.success, answer.stale) == (False, True)
+    # A controller that starts or stops: the names are refused until it has its old state again.
+    prepared = world.prepare(**names)
+    manager.switch([], ["effort_joint"])
+    assert world.prepared(prepared, 1, 1.0, 0.0).stale
+    answer = world.service._prepare(PrepareStepRequest(**names))
+    assert "effort_joint' is stopped, not running" in answer.status_message
+    manager.switch(["effort_joint"], [])
+    assert world.prepared(prepared, 1, 1.0, 0.0).success
+
+
+def test_an_unknown_handle_is_stale_and_handles_are_bounded(world):
+    assert world.service._step_prepared(PreparedStepRequest(1, 1, [])).stale
+    first = world.prepare()
+    for _ in range(step_service.MOST_HANDLES):
+        last = world.prepare()
+    assert world.prepared(first, 1).stale
+    assert world.prepared(last, 1).success
+    assert len(world.service._prepared) == step_service.MOST_HANDLES
 
 
 @pytest.mark.parametrize(
-    ("usual", "fields"),
+    ("ticks", "commands", "text"),
     [
-        (True, {}),
-        (True, {"controllers": ["r\u00f6bot"], "commands": [-0.0, float("nan")]}),
-        (False, {"seed": 1}),
-        (False, {"reset": WORLD}),
-        (False, {"contacts": True}),
-        (False, {"contacts_of": ["a"]}),
-        (False, {"model_states": True}),
-        (False, {"joints": ["a"]}),
-        (False, {"velocities": [0.0]}),
-        (False, {"twists": [Twist()]}),
-        (False, {"commanded_joints": [""]}),
-        (False, {"joint_commands": [0.0]}),
+        (1, [1.0], "1 commands where 1 controllers take 1 and 1 joints one each"),
+        (1, [1.0, float("nan")], "commands has nan"),
+        (1, [1e300, 0.0], "commands has 1e+300"),
+        (-1, [1.0, 0.0], "ticks is -1"),
+        (10**7, [1.0, 0.0], "ticks is 10000000"),
     ],
 )
-def test_requests_for_commands_and_ticks_alone_are_read_by_their_numbers(usual, fields):
-    """Any other one, one that isn't whole and one that comes with the next are genpy's to read."""
-    reader = UsualRequests()
-    request = StepWorldRequest(ticks=8, **fields)
-    data = on_the_wire(request)
-    assert reader.read(data) is None
-    reader.learn(data, request)
-    found = reader.read(data)
-    assert isinstance(found, UsualRequest) is usual
-    for cut in (data[:-1], data + data, data[:4], data[:40]):
-        assert reader.read(cut) is None
-        reader.learn(cut, request)
-        assert reader.read(cut) is None
-    others = on_the_wire(StepWorldRequest(ticks=9, **fields))
-    assert reader.read(others) is None
+def test_numbers_that_do_not_fit_are_refused_and_nothing_done(world, ticks, commands, text):
+    world.add("slides", "effort_joint")
+    prepared = world.prepare(controllers=["effort_joint"], commanded_joints=["position_a"])
+    answer = world.prepared(prepared, ticks, *commands)
+    assert not answer.success
+    assert text in answer.status_message
+    assert (answer.stale, answer.now) == (False, 0)
 
 
-def test_an_answer_is_on_the_wire_what_its_fields_are(world):
-    """Names of joints are put together once; what clients read must be the whole answer all the same."""
-    for robots in range(3):
-        if robots:
-            world.add(f"r\u00f6bot{robots}")
-        for ticks in (1, 2):
-            answer = world.call(ticks)
-            kept, whole = io.BytesIO(), io.BytesIO()
-            answer.serialize(kept)
-            fields = {name: getattr(answer, name) for name in answer.__slots__}
-            StepWorldResponse(**fields).serialize(whole)
-            assert kept.getvalue() == whole.getvalue()
-            read = StepWorldResponse().deserialize(kept.getvalue())
-            assert len(read.joint_states.velocity) == 6 * robots
-            assert read.sim_time == world.sim.sim_time
+def test_a_prepared_step_says_what_has_gone_during_a_long_request(objects, monkeypatch):
+    sim = objects.sim
+    linked, every = objects.prepare(link_states_of=["crate"]), objects.prepare(model_states=True)
+    monkeypatch.setattr(
+        sim.lock, "yield_turn", lambda: sim.world.spawn("new", parse_urdf(BOX), Pose())
+    )
+    answer = objects.prepared(every, 600)
+    assert "the ticks are done, but meanwhile robots or models" in answer.status_message
+    linked = objects.prepare(link_states_of=["crate::crate"])
+    monkeypatch.setattr(sim.lock, "yield_turn", lambda: sim.delete_model(sim.world.models["crate"]))
+    answer = objects.prepared(linked, 600)
+    assert "the ticks are done, but meanwhile there is no link" in answer.status_message
+
+
+def test_a_count_and_a_controller_that_are_wrong_are_refused(world):
+    world.add("slides", "effort_joint", "position_joint")
+    names = {"controllers": ["effort_joint", "position_joint"]}
+    assert world.step(1, commands=[1.0, 0.0], **names)
+    assert "2 controllers but 0 commands" in world.call(1, commands=[], **names).status_message
+    world.sim.robots[0].manager.switch([], ["position_joint"])
+    stopped = world.call(1, commands=[1.0, 0.0], **names).status_message
+    assert "controller 'position_joint' is stopped, not running" in stopped

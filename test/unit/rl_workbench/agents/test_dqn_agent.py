@@ -8,8 +8,8 @@ import pytest
 import torch
 from torch import nn
 
-from rl_workbench.agents.dqn.agent import DQNAgent
-from rl_workbench.agents.dqn.settings import DQNSettings
+from rl_workbench.agents.dqn_agent import DQNAgent
+from rl_workbench.agents.settings import DQNSettings
 from rl_workbench.errors import WorkbenchError
 
 RNG = np.random.default_rng(0)

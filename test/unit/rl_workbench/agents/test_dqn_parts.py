@@ -5,12 +5,17 @@ import pytest
 import torch
 from torch import nn
 
-from rl_workbench.agents.dqn.networks import DuelingQNetwork, FlatParameters, QNetwork, fast_values
-from rl_workbench.agents.dqn.normalisation import Normaliser
-from rl_workbench.agents.dqn.replay import ReplayBuffer, Transition
-from rl_workbench.agents.dqn.returns import NStepReturns
-from rl_workbench.agents.dqn.schedules import Epsilon, learning_rate
-from rl_workbench.agents.dqn.settings import DQNSettings
+from rl_workbench.agents.dqn_agent import (
+    DuelingQNetwork,
+    Epsilon,
+    FlatParameters,
+    QNetwork,
+    fast_values,
+    learning_rate,
+)
+from rl_workbench.agents.normalisation import Normaliser
+from rl_workbench.agents.replay import NStepReturns, ReplayBuffer, Transition
+from rl_workbench.agents.settings import DQNSettings
 from rl_workbench.errors import WorkbenchError
 
 NETWORKS = [QNetwork, DuelingQNetwork]

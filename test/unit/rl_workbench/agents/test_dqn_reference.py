@@ -8,8 +8,8 @@ import pytest
 import torch
 from torch import nn
 
-from rl_workbench.agents.dqn.agent import DQNAgent
-from rl_workbench.agents.dqn.settings import DQNSettings
+from rl_workbench.agents.dqn_agent import DQNAgent
+from rl_workbench.agents.settings import DQNSettings
 
 STEPS, GAMMA, ALL = 24, 0.9, 1000
 ENDS = {7: "truncated", 15: "terminated"}  # after these steps

@@ -7,11 +7,11 @@ import torch
 from support.training.goal_environments import REACH
 from torch.distributions import Normal
 
-from rl_workbench.agents.pg.gaussian_policy import Bounds, GaussianNetwork
-from rl_workbench.agents.pg.reinforce import ReinforceAgent
-from rl_workbench.agents.pg.settings import ReinforceSettings
-from rl_workbench.training.environments.making import make_environment
-from rl_workbench.training.pg.episodes import run_episode
+from rl_workbench.agents.policy_networks import Bounds, GaussianNetwork
+from rl_workbench.agents.reinforce import ReinforceAgent
+from rl_workbench.agents.settings import ReinforceSettings
+from rl_workbench.training.environments import make_environment
+from rl_workbench.training.episodes import run_episode
 
 BOUNDS = Bounds(np.array([-1.0, 0.0, -np.inf], np.float32), np.array([1.0, 6.0, 2.0], np.float32))
 SCALE = (1.0, 2.0)

@@ -8,14 +8,14 @@ import torch
 from support.training.learning_fakes import learned_lengths
 from torch import nn
 
-from rl_workbench.agents.pg.document import (
+from rl_workbench.agents.document import (
     Episode,
     PolicyGradientAgent,
     PolicyNetwork,
     ValueNetwork,
     discounted_returns,
 )
-from rl_workbench.agents.pg.settings import DocumentSettings
+from rl_workbench.agents.settings import DocumentSettings
 from rl_workbench.errors import WorkbenchError
 
 RANDOM = DocumentSettings(random_weights=True)

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.training.learning_fakes import learned_lengths
 
-from rl_workbench.agents.pg.document import Episode
-from rl_workbench.agents.pg.reinforce import ReinforceAgent, generalised_advantages
-from rl_workbench.agents.pg.settings import ReinforceSettings
+from rl_workbench.agents.document import Episode
+from rl_workbench.agents.reinforce import ReinforceAgent, generalised_advantages
+from rl_workbench.agents.settings import ReinforceSettings
 from rl_workbench.errors import WorkbenchError
 
 numbers = st.floats(-10.0, 10.0)

@@ -1,133 +1,176 @@
-"""Jobs without Ray: folders on their way between machines, how they are getting on, what is lost."""
+"""Jobs: trainings that are killed, stopped or lost, and how the list tells it."""
 
 import json
 import os
 import re
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+from functools import partial
 from pathlib import Path
 
 import pytest
 from support.training import workbench_runs
+from support.training.training_runs import assert_same_run
+from support.training.workbench_runs import job
 
 from rl_workbench import cli
-from rl_workbench.tools.jobs.cluster import parcels
-from rl_workbench.tools.jobs.cluster.parcels import Inbox, Outbox, Parcel
-from rl_workbench.tools.jobs.job import Job
-from rl_workbench.tools.jobs.ledger import Ledger, settle
-from rl_workbench.tools.jobs.states import read_states
-from rl_workbench.training.run import folder as run_folder
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt, search_path
+from rl_workbench.tools import job as job_module
+from rl_workbench.tools.job import Ending, Job, Program, StopWithin, run_here, steps_of
+from rl_workbench.tools.jobs import JobPool, read_jobs
+from rl_workbench.tools.runs import cost_file, cost_of
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.train import PROGRAM
 
 pytestmark = pytest.mark.usefixtures("signals")
 
-EVENTS = "events.out.tfevents.1.host.2"
+LONGER = {"total_timesteps": 3000, "checkpoint_frequency": 100}
+HERE = Program(PROGRAM, search_path())
 
 
-class Node:
-    """A run's folder as a training leaves it while it learns: rows, then a checkpoint that counts on them."""
-
-    def __init__(self, place: Path) -> None:
-        self.folder, self.log = place / "run", place / "run.log"
-        (self.folder / "checkpoints").mkdir(parents=True)
-        (self.folder / "config.json").write_text("{}")
-        (self.folder / "scalars.csv").write_text("step,tag\n")
-        (self.folder / ".half.pt.x1").write_text("being written")
-
-    def learn(self, step: int, best: bool = False) -> None:
-        with (self.folder / "scalars.csv").open("a") as table, self.log.open("a") as log:
-            table.write(f"{step},a\n" * 50)
-            log.write(f"at step {step}\n")
-        self.save(step, ("best.pt", "last.pt") if best else ("last.pt",))
-
-    def save(self, step: int, names: tuple[str, ...]) -> None:
-        length = (self.folder / "scalars.csv").stat().st_size
-        path = self.folder / f"checkpoints/step_{step}.pt"
-        path.write_text(json.dumps({"step": step, "log_bytes": length, "weights": "w" * 100}))
-        for name in names:
-            parcels.give_name(path, self.folder / name)
+def pool(
+    folder: Path, jobs: list[Job], at_once: int = 1, interrupt: Interrupt | None = None
+) -> JobPool:
+    folder.mkdir(exist_ok=True)
+    run = partial(run_here, program=HERE, since=time.time())
+    return JobPool(folder, run, at_once, interrupt or Interrupt(), jobs)
 
 
-def tree(folder: Path) -> dict[str, bytes]:
-    files = (path for path in folder.rglob("*") if path.is_file())
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes()
-        for path in files
-        if not path.name.startswith(".")
-    }
+def sleeping(
+    monkeypatch: pytest.MonkeyPatch, program: str = "import time; time.sleep(1000)"
+) -> None:
+    """Trainings become another program."""
+    words = [sys.executable, "-c", program]
+    monkeypatch.setattr(job_module, "command", lambda *_: words)
 
 
-def check_resumable(home: Path) -> None:
-    """Wherever it breaks off: what is called a checkpoint is whole, and so is its table."""
-    if (home / "last.pt").exists():
-        checkpoint = json.loads((home / "last.pt").read_text())
-        assert checkpoint["weights"] == "w" * 100
-        assert (home / "scalars.csv").stat().st_size >= checkpoint["log_bytes"]
-
-
-def carry(sent: Outbox, inbox: Inbox, home: Path) -> list[Parcel]:
-    all_of_it = []
-    for parcel in sent.pack():
-        inbox.take(parcel)
-        check_resumable(home)
-        all_of_it.append(parcel)
-    return all_of_it
-
-
-def test_a_folder_comes_home_as_it_changes(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(parcels, "PIECE", 64)
-    node, home, log = Node(tmp_path / "node"), tmp_path / "home/run", tmp_path / "home/run.log"
-    log.parent.mkdir()
-    log.write_text("an earlier attempt\n")
-    outbox, inbox = Outbox(node.folder, node.log), Inbox(home, log)
-    (node.folder / EVENTS).write_text("one")
-    node.learn(100)
-    carry(outbox, inbox, home)
-    assert tree(home) == tree(node.folder)
-    assert os.path.samefile(home / "last.pt", home / "checkpoints/step_100.pt"), "it came once"
-    assert not outbox.has_new_files() and not list(outbox.pack())
-
-    node.learn(200, best=True)
-    (node.folder / "checkpoints/step_100.pt").unlink()
-    assert outbox.has_new_files()
-    content = sum(
-        len(each.content) for each in carry(outbox, inbox, home) if hasattr(each, "content")
+def test_a_training_that_outlived_its_benchmark_is_left_alone(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
+    monkeypatch.setattr(job_module, "MAX_ATTEMPTS", 2)
+    one = job(tmp_path)
+    one.folder.mkdir()
+    with run_folder.held(one.folder):
+        failure = pool(tmp_path, [one]).run(one)
+    assert (
+        f"lost, and tried again: a training is running in {one.folder}" in capsys.readouterr().out
     )
-    table = (node.folder / "scalars.csv").stat().st_size
-    assert content < table + 200, "of what grows, only what is new"
-    assert tree(home) == tree(node.folder)
-    assert log.read_text() == "an earlier attempt\nat step 100\nat step 200\n"
-
-    # Resumed, a training cuts its table back to the checkpoint, and begins another file for TensorBoard.
-    with (node.folder / "scalars.csv").open("a") as table_file:
-        table_file.write("210,b\n" * 20)
-    carry(outbox, inbox, home)
-    os.truncate(node.folder / "scalars.csv", table)
-    (node.folder / EVENTS).unlink()
-    (node.folder / "events.out.tfevents.9.host.2").write_text("two")
-    node.learn(300)
-    carry(outbox, inbox, home)
-    assert tree(home) == tree(node.folder)
+    assert "without progress: a training is running in" in failure
+    assert one.folder.exists() and not one.log.exists()
 
 
-def test_a_file_that_is_replaced_on_its_way_arrives_as_it_was(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(parcels, "PIECE", 64)
-    node, home = Node(tmp_path / "node"), tmp_path / "home"
-    outbox, inbox = Outbox(node.folder, node.log), Inbox(home, tmp_path / "log")
-    node.learn(100)
-    for number, parcel in enumerate(outbox.pack()):
-        if number == 8:
-            node.learn(200)
-            (node.folder / "checkpoints/step_100.pt").unlink()
-        inbox.take(parcel)
-        check_resumable(home)
-    carry(outbox, inbox, home)
-    assert tree(home) == tree(node.folder)
+@pytest.mark.slow
+def test_a_training_that_is_killed_goes_on_bit_identically(tmp_path: Path, capsys) -> None:
+    killed, other = job(tmp_path / "a", **LONGER), job(tmp_path / "b", **LONGER)
+    found: list[int] = []
+    start = job_module._start
+
+    def started(*arguments):
+        process = start(*arguments)
+        found.append(process.pid)
+        return process
+
+    def is_needed() -> bool:
+        if len(found) == 1 and steps_of(killed.folder)[0] >= 300:
+            os.kill(found[0], signal.SIGKILL)
+        return True
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(job_module, "_start", started)
+        assert pool(tmp_path, [killed]).run(killed, is_needed) == ""
+    assert pool(tmp_path, [other]).run(other) == ""
+    assert "lost, and tried again: its process was killed" in capsys.readouterr().out
+    assert len(cost_of(killed.folder)["spans"]) == 2
+    assert_same_run(killed.folder, other.folder)
 
 
-def test_a_half_done_run_travels_to_another_node(tmp_path: Path) -> None:
-    home = Node(tmp_path / "home")
-    home.learn(100)
-    there = tmp_path / "node/run"
-    carry(Outbox(home.folder, log=None), Inbox(there, tmp_path / "log"), there)
-    assert tree(there) == tree(home.folder)
+def test_one_that_is_killed_again_and_again_is_given_up(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(job_module, "MAX_PAUSE", 0.0)
+    sleeping(monkeypatch, "import os, signal; os.kill(os.getpid(), signal.SIGKILL)")
+    one = job(tmp_path)
+    failure = pool(tmp_path, [one]).run(one)
+    assert failure == "given up after 8 attempts without progress: its process was killed"
+    assert len(cost_of(one.folder)["spans"]) == 8
+    (status,) = read_jobs(tmp_path)
+    assert (status.state, status.attempts) == ("failed", 8)
+
+
+def test_every_training_has_an_address_of_its_own(tmp_path: Path, monkeypatch) -> None:
+    sleeping(monkeypatch, "import os; print(os.environ['ROS_MASTER_URI'])")
+    jobs = [job(tmp_path, seed) for seed in range(2)]
+    pool(tmp_path, jobs, 2).run_all(jobs)
+    masters = {one.log.read_text().strip() for one in jobs}
+    assert len(masters) == 2 and all(each.startswith("http://127.0.0.1:") for each in masters)
+    for status in read_jobs(tmp_path):
+        assert status.state == "failed" and "ended with exit code 0" in status.line
+
+
+def test_no_further_job_begins_after_ctrl_c(tmp_path: Path, monkeypatch) -> None:
+    interrupt = Interrupt()
+    sleeping(monkeypatch)
+    one, other = jobs = [job(tmp_path, seed) for seed in range(2)]
+
+    def press() -> None:
+        while not one.log.exists():
+            time.sleep(0.01)
+        interrupt.signal = signal.SIGINT
+
+    threading.Thread(target=press).start()
+    pool(tmp_path, jobs, 1, interrupt).run_all(jobs)
+    assert cost_of(one.folder)["cpu_seconds"] >= 0.0
+    assert not other.log.exists() and not cost_of(other.folder)
+
+
+def test_one_that_is_not_needed_any_more_is_stopped(tmp_path: Path, monkeypatch) -> None:
+    sleeping(monkeypatch)
+    one = job(tmp_path)
+    assert pool(tmp_path, [one]).run(one, lambda: not one.log.exists()) == ""
+    (status,) = read_jobs(tmp_path)
+    assert (status.state, status.line) == ("done", "ended early: the rest wasn't needed any more")
+
+
+def test_a_folder_that_cannot_be_written_to_ends_all(tmp_path: Path, monkeypatch) -> None:
+    sleeping(monkeypatch)
+    (tmp_path / "file").write_text("")
+    jobs = [job(tmp_path), Job("second", tmp_path / "file" / "run", ())]
+    with pytest.raises(WorkbenchError, match="can't train into"):
+        pool(tmp_path, jobs, 2).run_all(jobs)
+
+
+TRAINING = """
+import os, signal
+signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it saves what it has
+os.write(1, f"{os.getpid()}\\n".encode())
+while True:
+    signal.pause()
+"""
+WORKER = f"""
+import sys, time
+from pathlib import Path
+from rl_workbench.tools import job
+
+job.command = lambda *_: [sys.executable, "-c", {TRAINING!r}]
+one = job.Job("one", Path(sys.argv[1]) / "run", ())
+job.run_attempt(one, job.Program((), ""), lambda: None, time.time(), death_signal="KILL")
+"""
+
+
+def test_a_training_whose_worker_is_killed_does_not_outlive_it(tmp_path: Path) -> None:
+    """Otherwise there would be two of them once the worker is replaced."""
+    log = tmp_path / "run.log"
+    with subprocess.Popen([sys.executable, "-c", WORKER, str(tmp_path)]) as worker:
+        while not (log.exists() and log.read_text().endswith("\n")):
+            assert worker.poll() is None
+            time.sleep(0.01)
+        training = os.pidfd_open(int(log.read_text()))
+        worker.kill()
+    assert select.select([training], [], [], 60.0)[0]
+    os.close(training)
 
 
 def jobs(folder: Path) -> list[Job]:
@@ -143,47 +186,62 @@ def jobs(folder: Path) -> list[Job]:
     return found
 
 
-def test_jobs_are_listed_from_files_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_jobs_are_listed_from_files_alone(tmp_path: Path, capsys) -> None:
     every = jobs(tmp_path)
-    ledger = Ledger(tmp_path, every)
-    ledger.began(every[1], "10.0.0.7")
-    ledger._entries[every[1]].began -= 3600.0
-    ledger.ended(every[2], "ended with exit code 1: the loss is nan")
-    with run_folder.held(tmp_path):
-        ledger.progressed(every[1], "10.0.0.8")  # written, since something has changed
-        assert [each.state for each in read_states(tmp_path)] != []
-    ledger._write()
-    with run_folder.held(tmp_path):
-        assert cli.main(["jobs", str(tmp_path), f"--json={tmp_path / 'out.json'}"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+    began = time.time() - 3600.0
+    cost_file(every[1].folder).write_text(
+        json.dumps({"node": "10.0.0.8", "spans": [[1.0, 2.0], [began, began]]})
+    )
+
+    def run(job: Job, stop_within: StopWithin, say) -> Ending:
+        if job is every[2]:
+            job.log.write_text("the loss is nan\n")
+            return Ending(1)
+        with run_folder.held(tmp_path):
+            assert cli.main(["jobs", str(tmp_path), f"--json={tmp_path / 'out.json'}"]) == 0
+        return Ending()
+
+    made = JobPool(tmp_path, run, 1, Interrupt(), every)
+    made.run(every[2])
+    made.run(every[1])
+    lines = [line for line in capsys.readouterr().out.splitlines() if not line.startswith("[")]
     assert (
         lines[0].split()[:2] == ["done", "done"]
         and "300 steps  in 1.5 s, best evaluation 9.0 at step 200" in lines[0]
     )
     assert lines[1].split()[0] == "running" and "30 of 500 steps" in lines[1]
-    assert re.search("for 1:00:.. on 10.0.0.8", lines[1]) and lines[1].endswith("Episode 20")
+    assert re.search("for 1:00:.. on 10.0.0.8  attempt 2", lines[1]) and lines[1].endswith(
+        "Episode 20"
+    )
     assert lines[2].endswith("the loss is nan") and lines[3].split()[0] == "waiting"
     assert lines[4] == "4 jobs: 1 done, 1 running, 1 failed, 1 waiting"
     assert json.loads((tmp_path / "out.json").read_text())[1]["step"] == 30
 
-    # Whoever ran them was killed.
+
+def test_what_a_command_that_was_killed_has_left_is_stopped_and_then_waits(tmp_path: Path) -> None:
+    every = jobs(tmp_path)
+    content = {"jobs": [{"name": "running", "folder": "running", "state": "running", "note": ""}]}
+    (tmp_path / "jobs.json").write_text(json.dumps(content))
     summary = {"complete": False, "interrupted": True, "steps": 30, "seconds": 1.5, "best": None}
     (every[1].folder / "summary.json").write_text(json.dumps(summary))
-    stopped = read_states(tmp_path)[1]
+    (stopped,) = read_jobs(tmp_path)
     assert (stopped.state, stopped.line) == ("stopped", "in 1.5 s, no evaluation")
-    settle(tmp_path)
+    pool(tmp_path, [])
     with run_folder.held(tmp_path):
-        assert [each.state for each in read_states(tmp_path)][1] == "waiting"
-        ledger.lost(every[1], "its node died")
-        ledger._write()
-        assert read_states(tmp_path)[1].line == "lost, and tried again: its node died"
+        assert [each.state for each in read_jobs(tmp_path)] == ["waiting"]
 
 
-def test_where_there_are_no_jobs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_jobs_of_earlier_commands_stay_in_the_list(tmp_path: Path, monkeypatch) -> None:
+    sleeping(monkeypatch, "")
+    for name in ("one", "two", "one"):
+        pool(tmp_path, []).run(Job(name, tmp_path / name, ()))
+    found = [(each.name, each.state, each.attempts) for each in read_jobs(tmp_path)]
+    assert found == [("one", "failed", 2), ("two", "failed", 1)]
+
+
+def test_where_there_are_no_jobs(tmp_path: Path, capsys) -> None:
     assert cli.main(["jobs", str(tmp_path)]) == 1
-    assert "has no jobs: jobs.json lies in the folder of a benchmark" in capsys.readouterr().err
-    (tmp_path / "jobs.json").write_text('{"host": "a", "jobs": [{"nam": 1}]}')
+    assert "has no jobs: jobs.json is in the folder of a benchmark" in capsys.readouterr().err
+    (tmp_path / "jobs.json").write_text('{"jobs": [{"nam": 1}]}')
     assert cli.main(["jobs", str(tmp_path)]) == 1
     assert "isn't a list of jobs" in capsys.readouterr().err

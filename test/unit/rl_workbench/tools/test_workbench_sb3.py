@@ -8,8 +8,8 @@ import pytest
 from support.training import workbench_runs
 
 from rl_workbench import cli
-from rl_workbench.tools.runs.policies import load_learned
-from rl_workbench.tools.runs.runs import open_run
+from rl_workbench.tools.policies import load_learned
+from rl_workbench.tools.runs import open_run
 
 pytestmark = [pytest.mark.usefixtures("signals"), pytest.mark.extras("stable_baselines3")]
 
@@ -47,7 +47,6 @@ def test_the_other_commands_take_it(ppo: Path, tmp_path: Path) -> None:
     assert work("eval", ppo, "--episodes", 2, "--checkpoint", "last") == 0
     assert work("record", ppo, "--out", tmp_path / "a.gif", "--max-steps", 10) == 0
     assert work("plot", ppo, "--out", tmp_path / "a.png") == 0
-    assert work("policy", ppo, "--out", tmp_path / "b.png") == 0
     assert work("compare", ppo, "--episodes", 1, "--out", tmp_path / "c.png") == 0
 
 

@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 from support.training.training_runs import assert_same_run
 
-from rl_workbench.training import cli, page
+from rl_workbench.training import page
+from rl_workbench.training import train as cli
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.options.training_options import choose
+from rl_workbench.training.command_line import choose
 from rl_workbench.training.page import page_beside
 
 pytestmark = pytest.mark.usefixtures("signals")

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_envs.variation.actuation import Actuator
+from robot_envs.variation.imperfections import Actuator
 
 PERIOD = 0.01  # [s]
 KINDS = {"motor": False, "servo": True}  # of a motor's efforts, and of positions

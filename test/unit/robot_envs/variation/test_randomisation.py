@@ -12,8 +12,7 @@ from support.robots.rig import RIG, SLEDGE, make_rig
 
 from robot_envs import Robot, RobotEnv
 from robot_envs.scene import Scene
-from robot_envs.variation.options import OPTIONS
-from robot_envs.variation.randomisation import UniformRandomisation
+from robot_envs.variation.randomisation import OPTIONS, UniformRandomisation
 
 FILES = Path(__file__).resolve().parents[3] / "data/robots"
 SCENE = Scene([RIG])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_envs.variation.sensing import Sensor
+from robot_envs.variation.imperfections import Sensor
 from robot_envs.world_state import JointState, Motion, Pose, WorldState
 
 JOINTS = ("elbow", "shoulder")

@@ -14,8 +14,8 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.ros.clients.world_client import RemoteWorld
 from ros_calls import master
+from ros_calls.master import NoAnswer, Refused
 from ros_calls.service import ServiceClient, ServiceFailed
-from ros_calls.xmlrpc import NoAnswer, Refused
 
 TIMEOUT = 10.0  # [s of wall time] for an answer
 LONGEST_STEP = 1000  # ticks in one request, so that others have their turn

@@ -4,12 +4,12 @@ import threading
 from contextlib import AbstractContextManager
 
 import genpy
+import rospy
 from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldRequest, AdvanceWorldResponse
 
 from bullet_gazebo.ros.services.stepping.step_requests import MAX_TICKS
 from bullet_gazebo.ros.wire.conversions import to_time
 from bullet_gazebo.ros.wire.mailboxes import Mailboxes
-from bullet_gazebo.ros.wire.rospy_patches.polling import PolledService
 from bullet_gazebo.ros.wire.rospy_patches.topics import deliver
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.ros.wire.thinning import Thinner
@@ -36,7 +36,7 @@ class AdvanceService:
         self._one_at_a_time = one_at_a_time
         self._mailboxes = Mailboxes()
         thinner.is_whole = self._mailboxes.any_hears
-        self._service = PolledService("~advance_world", AdvanceWorld, self._serve)
+        self._service = rospy.Service("~advance_world", AdvanceWorld, self._serve)
 
     def _serve(self, request: AdvanceWorldRequest) -> AdvanceWorldResponse:
         if not 0 <= request.ticks <= MAX_TICKS:

@@ -1,25 +1,82 @@
-"""step_world: resets, commands and moves a world in lock-step, and answers with its state."""
+"""Services that command and advance a world in lock-step, and answer with its state.
 
+- step_world (StepWorld.srv) resets and places as well; its requests and answers name things.
+- prepare_step (PrepareStep.srv) looks names up once and returns a handle.
+- prepared_step (PreparedStep.srv) takes the handle and numbers, and answers with numbers.
+"""
+
+import secrets
 import threading
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 
-from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest, StepWorldResponse
+import rospy
+from bullet_gazebo_msgs.srv import (
+    PreparedStep,
+    PreparedStepRequest,
+    PreparedStepResponse,
+    PrepareStep,
+    PrepareStepRequest,
+    PrepareStepResponse,
+    StepWorld,
+    StepWorldRequest,
+    StepWorldResponse,
+)
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.ros.services.stepping.addresses import Addresses
-from bullet_gazebo.ros.services.stepping.answers import JointsAnswer, fields_of
-from bullet_gazebo.ros.services.stepping.step_requests import StepPlan
-from bullet_gazebo.ros.services.stepping.usual_requests import UsualRequests
-from bullet_gazebo.ros.wire.rospy_patches.polling import PolledService
+from bullet_gazebo.ros.services.stepping.step_requests import (
+    MAX_TICKS,
+    StepPlan,
+    check_numbers,
+    query_of,
+)
+from bullet_gazebo.ros.wire.conversions import (
+    to_contact_state,
+    to_pose_msg,
+    to_time,
+    to_twist_msg,
+)
 from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import NOTHING, StateQuery, StateReader, UnknownName
 
 SLICE = 500  # ticks between which other services get their turn
+MOST_HANDLES = 256  # a client whose handle was dropped prepares its step again
+
+
+class _Prepared:
+    """What a handle stands for."""
+
+    def __init__(self, sim: Simulator, addresses: Addresses, request: PrepareStepRequest) -> None:
+        """
+        Raises:
+            ControlError: for a controller or joint that can't be commanded.
+            UnknownName: for a name of nothing in the world.
+        """
+        self.addresses = addresses
+        self.commanded = addresses.commanded(request.controllers, request.commanded_joints)
+        self.reader = StateReader(sim.world, query_of(request))
+        self.models = list(self.reader.read(stepped=False).models)
+
+    def read(self, stepped: bool) -> tuple[list[float], list[object]]:
+        """Returns the numbers of an answer, and the contacts."""
+        joints = self.addresses.joints
+        numbers = [joint.position for joint in joints]
+        numbers += [joint.velocity for joint in joints]
+        numbers += [joint.effort for joint in joints]
+        if self.reader.query is NOTHING:
+            return numbers, []
+        state = self.reader.read(stepped)
+        for pose, (linear, angular) in (*state.models.values(), *state.links):
+            numbers += (*pose.position, *pose.orientation, *linear, *angular)
+        return numbers, [to_contact_state(pair) for pair in state.contacts]
 
 
 class StepService:
-    """One call: reset, commands, exactly n ticks, state; in lock-step only (bullet_gazebo_msgs/StepWorld)."""
+    """Offers the services; a request is checked as a whole before anything is done."""
 
     def __init__(
         self,
@@ -27,53 +84,140 @@ class StepService:
         watchdog: AbstractContextManager[object],
         one_at_a_time: threading.Lock,
     ) -> None:
-        """A fault in a block of `watchdog` ends the node; with `one_at_a_time`, nobody else's ticks come
-        within a request's.
+        """
+        Args:
+            sim: the simulator, in lock-step.
+            watchdog: a fault in its block ends the node.
+            one_at_a_time: keeps the ticks of other requests out of a request's ticks.
         """
         self._sim = sim
         self._watchdog = watchdog
         self._one_at_a_time = one_at_a_time
         self._reader = StateReader(sim.world, NOTHING)
-        self._addresses = Addresses(sim)
-        self._knows_contacts = False  # the last tick's, which a reset or a placing makes void
-        self._service = PolledService("~step_world", StepWorld, self._step, UsualRequests)
+        self._current = Addresses(sim)
+        self._prepared: dict[int, _Prepared] = {}  # by handle
+        # Contacts are those of the last tick, until a reset or a placing makes them void.
+        self._knows_contacts = False
+        self._services = [
+            rospy.Service("~prepare_step", PrepareStep, self._prepare),
+            rospy.Service("~prepared_step", PreparedStep, self._step_prepared),
+            rospy.Service("~step_world", StepWorld, self._step),
+        ]
+
+    def _prepare(self, request: PrepareStepRequest) -> PrepareStepResponse:
+        with self._sim.lock:
+            try:
+                prepared = _Prepared(self._sim, self._addresses(), request)
+            except (ControlError, UnknownName) as error:
+                return PrepareStepResponse(status_message=f"PrepareStep: {error}")
+            if len(self._prepared) >= MOST_HANDLES:
+                del self._prepared[next(iter(self._prepared))]
+            # Not drawn from the world's random numbers. A handle of a simulator that was here before
+            # must not mean anything in this one, so they aren't counted.
+            handle = secrets.randbits(64)
+            self._prepared[handle] = prepared
+            return PrepareStepResponse(
+                success=True,
+                handle=handle,
+                joints=prepared.addresses.joint_names,
+                models=prepared.models,
+            )
+
+    def _step_prepared(self, request: PreparedStepRequest) -> PreparedStepResponse:
+        sim, commands = self._sim, request.commands
+        with self._one_at_a_time, sim.lock:
+            sim.await_holds()
+            prepared = self._prepared.get(request.handle)
+            if prepared is None or prepared.addresses.version != sim.version:
+                self._prepared.pop(request.handle, None)
+                return PreparedStepResponse(False, True, sim.now, "PreparedStep: stale", [], [])
+            commanded = prepared.commanded
+            if not commanded.is_ready:
+                return PreparedStepResponse(False, True, sim.now, "PreparedStep: stale", [], [])
+            size = commanded.size
+            try:
+                if not 0 <= request.ticks <= MAX_TICKS:
+                    raise ControlError(f"ticks is {request.ticks}: it is 0 to {MAX_TICKS}")
+                if size + len(commanded.joints) != len(commands):
+                    raise ControlError(
+                        f"{len(commands)} commands where {len(commanded.controllers)} controllers "
+                        f"take {size} and {len(commanded.joints)} joints one each"
+                    )
+                check_numbers("commands", commands)
+                commanded.send(list(commands[:size]))
+            except ControlError as error:
+                return self._refused(str(error))
+            hold = None
+            if commanded.joints:
+                hold = lambda: commanded.hold(commands[size:])  # noqa: E731
+            self._advance(request.ticks, hold)
+            try:
+                if request.ticks > SLICE:
+                    self._check_layout(prepared)
+                numbers, contacts = prepared.read(self._knows_contacts)
+            except UnknownName as error:
+                return self._refused(f"the ticks are done, but meanwhile {error}")
+            return PreparedStepResponse(True, False, sim.now, "", numbers, contacts)
+
+    def _check_layout(self, prepared: _Prepared) -> None:
+        """
+        Raises:
+            UnknownName: if the numbers would belong to other names now.
+        """
+        models = list(prepared.reader.read(stepped=False).models)
+        if (prepared.addresses.joint_names, prepared.models) != (
+            self._addresses().joint_names,
+            models,
+        ):
+            raise UnknownName("robots or models have come or gone")
+
+    def _refused(self, fault: str) -> PreparedStepResponse:
+        return PreparedStepResponse(False, False, self._sim.now, f"PreparedStep: {fault}", [], [])
 
     def _step(self, request: StepWorldRequest) -> StepWorldResponse:
         with self._one_at_a_time, self._sim.lock:
             self._sim.await_holds()
             try:
                 # Everything is checked before anything is done.
-                plan = StepPlan(self._sim, request, self._found())
+                plan = StepPlan(self._sim, request, self._addresses())
                 reader = self._reader_of(plan.query)
                 self._begin(request, plan)  # what is left to fail is a user's controller
             except (ControlError, UnknownName) as error:
-                return self._refusal(str(error))
-            with self._watchdog:
-                self._advance(request.ticks, plan)
-            if request.ticks:
-                self._knows_contacts = True
+                return self._answer(status_message=f"StepWorld: {error}")
+            hold = None
+            if request.commanded_joints:
+                hold = lambda: plan.commanded.hold(request.joint_commands)  # noqa: E731
+            self._advance(request.ticks, hold)
             try:
-                return self._answer(reader, self._knows_contacts)
+                state = reader.read(self._knows_contacts)
             except UnknownName as error:
-                return self._refusal(f"the ticks are done, but meanwhile {error}")
+                fault = f"StepWorld: the ticks are done, but meanwhile {error}"
+                return self._answer(status_message=fault)
+            models = state.models.values()
+            return self._answer(
+                success=True,
+                model_names=list(state.models),
+                model_poses=[to_pose_msg(pose) for pose, _ in models],
+                model_twists=[to_twist_msg(twist) for _, twist in models],
+                link_poses=[to_pose_msg(pose) for pose, _ in state.links],
+                link_twists=[to_twist_msg(twist) for _, twist in state.links],
+                contacts=[to_contact_state(pair) for pair in state.contacts],
+            )
 
-    def _found(self) -> Addresses:
-        """What names stand for now; clients send the same again and again."""
-        if self._addresses.is_stale:
-            self._addresses = Addresses(self._sim)
-        return self._addresses
+    def _addresses(self) -> Addresses:
+        """What names stand for now."""
+        if self._current.version != self._sim.version:
+            self._current = Addresses(self._sim)
+        return self._current
 
-    def _reader_of(self, query: StateQuery) -> StateReader | None:
-        """Clients ask the same again and again, so the names are looked up but once."""
-        if query is NOTHING:
-            return None
+    def _reader_of(self, query: StateQuery) -> StateReader:
         if query != self._reader.query or self._reader.is_stale:
             self._reader = StateReader(self._sim.world, query)
         return self._reader
 
     def _begin(self, request: StepWorldRequest, plan: StepPlan) -> None:
         sim = self._sim
-        if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed:
+        if request.reset != StepWorldRequest.NONE or plan.placed_models or plan.placed_joints:
             self._knows_contacts = False
         if request.reset != StepWorldRequest.NONE:
             if request.seed:
@@ -81,22 +225,26 @@ class StepService:
             sim.reset(everything=request.reset == StepWorldRequest.SIMULATION)
         for model, pose, twist in plan.placed_models:
             sim.place_model(model, pose, twist)
-        for model, (positions, velocities) in plan.placed.items():
+        for model, (positions, velocities) in plan.placed_joints.items():
             sim.set_joint_states(model, positions, velocities)
-        plan.send()
-        plan.hold()
+        plan.commanded.send(list(request.commands))
+        plan.commanded.hold(request.joint_commands)
 
-    def _advance(self, ticks: int, plan: StepPlan) -> None:
-        while ticks > SLICE:
-            self._pass(SLICE, plan)
-            ticks -= SLICE
-            self._sim.lock.yield_turn()
-            self._sim.await_holds()
-        if ticks:
-            self._pass(ticks, plan)
+    def _advance(self, ticks: int, hold: Callable[[], None] | None) -> None:
+        """Lets time pass; `hold` commands joints, before each tick."""
+        if not ticks:
+            return
+        with self._watchdog:
+            while ticks > SLICE:
+                self._pass(SLICE, hold)
+                ticks -= SLICE
+                self._sim.lock.yield_turn()
+                self._sim.await_holds()
+            self._pass(ticks, hold)
+        self._knows_contacts = True
 
-    def _pass(self, ticks: int, plan: StepPlan) -> None:
-        if not plan.holds:
+    def _pass(self, ticks: int, hold: Callable[[], None] | None) -> None:
+        if hold is None:
             self._sim.advance(ticks)
             return
         left = ticks
@@ -105,26 +253,23 @@ class StepService:
             nonlocal left
             left -= 1
             if left:  # not after the last tick: what limits have left of a command stays
-                plan.hold()
+                hold()
             return False
 
-        plan.hold()
+        hold()
         self._sim.advance(ticks, hold_on)
 
-    def _answer(self, reader: StateReader | None, stepped: bool) -> StepWorldResponse:
-        sim, joints = self._sim, self._found().told_joints
-        if reader is None:
-            return JointsAnswer(joints, sim.now)
+    def _answer(self, **fields: object) -> StepWorldResponse:
+        sim, addresses = self._sim, self._addresses()
+        joints = addresses.joints
         return StepWorldResponse(
-            success=True,
             sim_time=sim.sim_time,
-            joint_states=joints.message(sim.now),
-            **fields_of(reader.read(stepped)),
-        )
-
-    def _refusal(self, fault: str) -> StepWorldResponse:
-        return StepWorldResponse(
-            status_message=f"StepWorld: {fault}",
-            sim_time=self._sim.sim_time,
-            joint_states=self._found().told_joints.message(self._sim.now),
+            joint_states=JointState(
+                header=Header(stamp=to_time(sim.now)),
+                name=addresses.joint_names,
+                position=[joint.position for joint in joints],
+                velocity=[joint.velocity for joint in joints],
+                effort=[joint.effort for joint in joints],
+            ),
+            **fields,
         )

@@ -11,8 +11,8 @@ import rospy
 import rospy.impl.registration
 from rospy.impl.registration import RegManager
 
-from ros_calls import master, xmlrpc
-from ros_calls.xmlrpc import Refused
+from ros_calls import master
+from ros_calls.master import Refused
 
 RECOVERY = 0.5  # [s] until the next try
 
@@ -85,7 +85,7 @@ def _tell(method: str, *what: str, timeout: float) -> list[str]:
     """Registers one thing; returns a topic's publishers, where the master tells them."""
     own = (rospy.get_name(), *what, rospy.core.get_node_uri())
     try:
-        answer = xmlrpc.call_plain(master.uri(), method, *own, timeout=timeout)
+        answer = master.call_plain(master.uri(), method, *own, timeout=timeout)
     except Refused as refusal:
         rospy.logerr("%s of %s: the master refuses it: %s", method, what[0], refusal)
         return []

@@ -8,10 +8,10 @@ import pytest
 from support.training.training_runs import options_of, record
 
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.algorithms import recorded_options
-from rl_workbench.training.environments.making import make_environment
-from rl_workbench.training.run.checkpoints import read
-from rl_workbench.training.run.policy import load_policy
+from rl_workbench.training.algorithm import load_policy
+from rl_workbench.training.checkpoints import read
+from rl_workbench.training.environments import make_environment
+from rl_workbench.training.options import recorded_options
 
 pytestmark = pytest.mark.extras("stable_baselines3")
 
@@ -34,12 +34,12 @@ def test_a_policy_needs_no_environment_of_its_training(
 
 @pytest.mark.parametrize("value", [float("inf"), float("nan")])
 def test_numbers_that_no_record_can_hold(value: float) -> None:
-    with pytest.raises(WorkbenchError, match="^target_kl has a value that no file can hold: "):
+    with pytest.raises(WorkbenchError, match="^target_kl has a value that JSON can't hold: "):
         options_of("ppo", {"target_kl": value})
 
 
 def test_a_date_is_none_either() -> None:
-    with pytest.raises(WorkbenchError, match="^sde_sample_freq has a value that no file can hold"):
+    with pytest.raises(WorkbenchError, match="^sde_sample_freq has a value that JSON can't hold"):
         options_of("ppo", {"sde_sample_freq": "2020-01-01"})
 
 

@@ -1,0 +1,312 @@
+"""Policy gradient with a value baseline: a linear softmax policy, one update per episode.
+
+The algorithm of the existing script: the advantage of a step is its discounted return less
+the value network's estimate before the update; the policy's loss is the sum, not the mean,
+of -log pi(a|s) A; the value's loss is the mean squared error to the returns.
+"""
+
+import json
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import nn
+
+from rl_workbench.agents.greedy import SingleChoice
+from rl_workbench.agents.settings import DocumentSettings
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import array, load_optimizer, set_generator, switch
+
+
+class PolicyNetwork(nn.Module):
+    """Observation (N, 4) to the probabilities (N, 2) of the two actions."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fc = nn.Linear(4, 2)
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        return torch.softmax(self.fc(observations), dim=1)
+
+
+class ValueNetwork(nn.Module):
+    """Observation (N, 4) to the estimated return (N, 1)."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fc1 = nn.Linear(4, 10)
+        self.relu = nn.ReLU()
+        self.fc2 = nn.Linear(10, 1)
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        return self.fc2(self.relu(self.fc1(observations)))
+
+
+@dataclass
+class Episode:
+    """What happened, step by step: observation before the action, action, reward."""
+
+    observations: list[np.ndarray] = field(default_factory=list)  # each float32 (D,)
+    actions: list[Any] = field(default_factory=list)  # numbers, or arrays (n,), float32
+    rewards: list[float] = field(default_factory=list)
+    final_observation: np.ndarray | None = None  # after the last step
+    terminated: bool = False  # by the task; False: it was cut off
+    success: bool | None = None  # None if the environment doesn't say
+
+    def add(self, observation: np.ndarray, action: Any, reward: float) -> None:
+        self.observations.append(observation)
+        self.actions.append(action)
+        self.rewards.append(reward)
+
+    @property
+    def length(self) -> int:
+        return len(self.rewards)
+
+    @property
+    def total_reward(self) -> float:
+        """The undiscounted sum, added in order as the existing script does."""
+        return float(sum(self.rewards))
+
+    def states(self) -> list[np.ndarray]:
+        """All observations, the final one included: T + 1.
+
+        Raises:
+            ValueError: if the episode isn't over.
+        """
+        if self.final_observation is None:
+            raise ValueError("the episode isn't over")
+        return [*self.observations, self.final_observation]
+
+    def state_dict(self) -> dict[str, Any]:
+        """Tensors and plain values, for a checkpoint.
+
+        Raises:
+            ValueError: if the episode isn't over.
+        """
+        return {
+            "observations": torch.from_numpy(np.stack(self.states())),
+            "actions": as_tensor(self.actions),
+            "rewards": torch.tensor(self.rewards, dtype=torch.float64),
+            "terminated": self.terminated,
+        }
+
+    @classmethod
+    def from_state(cls, state: dict[str, Any], size: int, kind: int | tuple[int, ...]) -> "Episode":
+        """The episode that `state_dict` told of.
+
+        Args:
+            state: of the episode.
+            size: D, of observations.
+            kind: number of single actions, or the shape of continuous ones.
+
+        Raises:
+            TypeError, ValueError, LookupError: if it is something else.
+        """
+        *observations, final = array(state["observations"], torch.float32, (None, size))
+        length = len(observations)
+        if not length:
+            raise ValueError("an episode without a step")
+        if isinstance(kind, tuple):
+            actions = list(array(state["actions"], torch.float32, (length, *kind)))
+        else:
+            actions = array(state["actions"], torch.int64, (length,)).tolist()
+            if not 0 <= min(actions) <= max(actions) < kind:
+                raise ValueError(f"an episode with other actions than 0 to {kind - 1}")
+        rewards = array(state["rewards"], torch.float64, (length,)).tolist()
+        return cls(observations, actions, rewards, final, switch(state["terminated"]))
+
+
+def as_tensor(actions: list[Any]) -> torch.Tensor:
+    """Actions of all steps: numbers (T,), or arrays (T, n)."""
+    if actions and isinstance(actions[0], np.ndarray):
+        return torch.from_numpy(np.stack(actions))
+    return torch.tensor(actions)
+
+
+class Losses(NamedTuple):
+    """The two losses of one update, taken before the weights change."""
+
+    policy: float
+    value: float
+
+
+def discounted_returns(rewards: list[float], gamma: float) -> np.ndarray:
+    """Each step's return, from the last step backwards: G_t = r_t + gamma G_t+1.
+
+    Returns:
+        float64, shape (len(rewards),).
+    """
+    returns = np.empty(len(rewards))
+    future = 0.0
+    for index in range(len(rewards) - 1, -1, -1):
+        future = rewards[index] + gamma * future
+        returns[index] = future
+    return returns
+
+
+class TwoNetworks(ABC):
+    """A policy and a value network, each with an Adam, and a generator that draws actions.
+
+    Args:
+        policy: observations (N, D) to probabilities (N, A).
+        value: observations (N, D) to estimated returns (N, 1).
+        rates: the learning rates of the two.
+        seed: of the generator.
+    """
+
+    def __init__(
+        self, policy: nn.Module, value: nn.Module, rates: tuple[float, float], seed: int
+    ) -> None:
+        self.policy = policy
+        self.value = value
+        self.policy_optimizer = torch.optim.Adam(policy.parameters(), rates[0])
+        self.value_optimizer = torch.optim.Adam(value.parameters(), rates[1])
+        self.generator = np.random.default_rng(seed)
+
+    @abstractmethod
+    def sync(self) -> None:
+        """Copies the policy's weights to where acting reads them."""
+
+    def _parts(self) -> dict[str, Any]:
+        return {
+            "policy": self.policy,
+            "value": self.value,
+            "policy_optimizer": self.policy_optimizer,
+            "value_optimizer": self.value_optimizer,
+        }
+
+    def state_dict(self) -> dict[str, Any]:
+        """All that is needed to go on learning to the same bits: tensors, numbers, texts."""
+        return {
+            **{name: part.state_dict() for name, part in self._parts().items()},
+            "generator": json.dumps(self.generator.bit_generator.state),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Takes over what `state_dict` gave."""
+        self.policy.load_state_dict(state["policy"])
+        self.value.load_state_dict(state["value"])
+        load_optimizer(self.policy_optimizer, state["policy_optimizer"])
+        load_optimizer(self.value_optimizer, state["value_optimizer"])
+        set_generator(self.generator, state["generator"])
+        self.sync()
+
+
+class PolicyGradientAgent(TwoNetworks):
+    """Learns from whole episodes; acts from a NumPy copy of the linear policy.
+
+    Both output layers start at zero: a uniform policy, and a value of 0 everywhere. From random
+    ones, as in the existing script, several seeds in ten need more than 600 episodes: a weight
+    of the policy that starts with the wrong sign has to be unlearned, and a hidden unit that
+    starts with a negative weight to the value's output is soon dead, since returns are positive.
+
+    Args:
+        seed: makes the initial weights and the choice of actions repeatable, through
+            generators of its own.
+        settings: the algorithm's options.
+    """
+
+    def __init__(self, seed: int = 0, settings: DocumentSettings | None = None) -> None:
+        self.settings = settings = settings or DocumentSettings()
+        with torch.random.fork_rng():
+            torch.manual_seed(seed)
+            policy, value = PolicyNetwork(), ValueNetwork()
+        if not settings.random_weights:
+            start_at_zero(policy.fc)
+            start_at_zero(value.fc2)
+        rates = (settings.policy_learning_rate, settings.value_learning_rate)
+        super().__init__(policy, value, rates, seed)
+        self._output = policy.fc
+        self.sync()
+
+    def sync(self) -> None:
+        """Copies the policy's weights to where acting reads them."""
+        self._weight = self._output.weight.detach().numpy().copy()  # (2, 4)
+        self._bias = self._output.bias.detach().numpy().copy()  # (2,)
+
+    def probability_of_zero(self, observation: np.ndarray) -> float:
+        """The policy's probability of action 0 for an observation of shape (4,).
+
+        Eight times as fast as asking torch; equal to it within float32.
+        """
+        left, right = (self._weight @ observation + self._bias).tolist()
+        return 1.0 / (1.0 + math.exp(min(right - left, 700.0)))
+
+    def probabilities(self, observation: np.ndarray) -> np.ndarray:
+        """Of both actions, (2,)."""
+        left = self.probability_of_zero(observation)
+        return np.array([left, 1.0 - left])
+
+    def draw(self, observation: np.ndarray, generator: np.random.Generator) -> int:
+        """Draws an action from the policy."""
+        return 0 if generator.random() < self.probability_of_zero(observation) else 1
+
+    def act(self, observation: np.ndarray) -> int:
+        """Draws one by the agent's own generator."""
+        return self.draw(observation, self.generator)
+
+    def limited(self, action: int) -> int:
+        """An action that was drawn, as the environment takes it: the same."""
+        return action
+
+    def act_greedily(self, observation: np.ndarray) -> int:
+        """The more probable action."""
+        return 0 if self.probability_of_zero(observation) >= 0.5 else 1
+
+    def greedy_network(self) -> SingleChoice:
+        """The same as a torch module: observations (N, 4) to actions (N,)."""
+        return SingleChoice(self._output)
+
+    def learn(self, episode: Episode) -> Losses:
+        """Updates both networks once from one episode.
+
+        Raises:
+            WorkbenchError: if a loss isn't finite; the weights are as before then.
+        """
+        observations = torch.from_numpy(np.stack(episode.observations))  # (T, 4)
+        actions = torch.tensor(episode.actions)  # (T,)
+        returns = torch.from_numpy(
+            discounted_returns(episode.rewards, self.settings.gamma)
+        )  # (T,) float64
+        values = self.value(observations).squeeze(1)  # (T,)
+        advantages = (returns - values.detach().double()).float()
+        value_loss = nn.functional.mse_loss(values, returns.float())
+        chosen = self.policy(observations).gather(1, actions.unsqueeze(1)).squeeze(1)
+        policy_loss = -torch.sum(torch.log(chosen) * advantages)
+        losses = Losses(policy_loss.item(), value_loss.item())
+        check_finite(losses)
+        descend(self.policy_optimizer, policy_loss)
+        descend(self.value_optimizer, value_loss)
+        self.sync()
+        return losses
+
+
+def check_finite(losses: Losses) -> None:
+    """Refuses losses that are no numbers with a WorkbenchError, before anything is changed."""
+    for name, loss in losses._asdict().items():
+        if not math.isfinite(loss):
+            raise WorkbenchError(f"the {name} loss is {loss}; the networks were left unchanged")
+
+
+def start_at_zero(layer: nn.Linear) -> None:
+    """Has a layer begin with an output of 0 everywhere."""
+    nn.init.zeros_(layer.weight)
+    nn.init.zeros_(layer.bias)
+
+
+def descend(optimizer: torch.optim.Optimizer, loss: torch.Tensor) -> None:
+    """One step of the optimizer down the loss.
+
+    Raises:
+        WorkbenchError: if the gradient isn't finite, as it may be where the loss is; no weight was
+            changed then.
+    """
+    optimizer.zero_grad()
+    loss.backward()
+    gradients = [weight.grad for group in optimizer.param_groups for weight in group["params"]]
+    if not math.isfinite(nn.utils.get_total_norm(gradients, math.inf)):
+        raise WorkbenchError("a gradient isn't finite; the networks were left unchanged")
+    optimizer.step()

@@ -1,1 +1,0 @@
-"""Deep Q-learning: networks, replay, schedules and the agent; torch and NumPy only."""

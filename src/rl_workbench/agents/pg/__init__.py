@@ -1,1 +1,0 @@
-"""Learning from whole episodes by policy gradient."""

@@ -1,0 +1,270 @@
+"""REINFORCE with a learned baseline: generalised advantages, one step of the policy a batch of episodes.
+
+Against the algorithm of the ROS policy-gradient document (document.py) it differs in four things, each
+of which takes variance out of the gradient: advantages are weighted sums of temporal differences (Schulman
+et al. 2016, λ = 0.95) instead of whole returns; they are normalised over the batch; the baseline is fitted
+to each batch, not nudged towards it once; and observations come scaled, so that one learning rate suits all
+weights. A truncated episode bootstraps from the baseline, a terminated one doesn't.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import nn
+
+from rl_workbench.agents.document import (
+    Episode,
+    Losses,
+    TwoNetworks,
+    as_tensor,
+    check_finite,
+    descend,
+    start_at_zero,
+)
+from rl_workbench.agents.greedy import ClippedAction, Scaling, SingleChoice, Spread
+from rl_workbench.agents.normalisation import Normaliser
+from rl_workbench.agents.policy_networks import (
+    Actor,
+    Bounds,
+    GaussianActor,
+    GaussianNetwork,
+    PairActor,
+    SoftmaxActor,
+    SoftmaxNetwork,
+)
+from rl_workbench.agents.settings import ReinforceSettings
+from rl_workbench.states import sequence
+
+SMALLEST_SPREAD = 1e-8  # of advantages, below which they are not blown up
+
+
+class BaselineNetwork(nn.Module):
+    """Prepared observation (N, D) to the estimated return (N, 1)."""
+
+    def __init__(self, observations: int, hidden: int) -> None:
+        super().__init__()
+        self.layers = nn.Sequential(
+            nn.Linear(observations, hidden), nn.Tanh(),
+            nn.Linear(hidden, hidden), nn.Tanh(),
+            nn.Linear(hidden, 1),
+        )  # fmt: skip
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        return self.layers(observations)
+
+
+class ReinforceAgent(TwoNetworks):
+    """Learns from batches of whole episodes; a softmax policy over single actions, or a Gaussian one.
+
+    Args:
+        seed: makes initial weights and the choice of actions repeatable, through generators of
+            its own.
+        scale: what an observation is divided by, of shape (D,).
+        settings: the algorithm's options.
+        actions: number of single actions, or the bounds of continuous ones.
+        environments: that episodes come from at the same time, each with its share of a batch.
+    """
+
+    def __init__(
+        self,
+        seed: int = 0,
+        scale: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
+        settings: ReinforceSettings | None = None,
+        actions: int | Bounds = 2,
+        environments: int = 1,
+    ) -> None:
+        self.settings = settings = settings or ReinforceSettings()
+        with torch.random.fork_rng():
+            torch.manual_seed(seed)
+            self._network = _make_network(len(scale), actions, settings)
+            value = BaselineNetwork(len(scale), settings.value_hidden)
+        start_at_zero(self._network.fc)
+        rates = (settings.policy_learning_rate, settings.value_learning_rate)
+        super().__init__(self._network, value, rates, seed)
+        self._factors = 1.0 / np.asarray(scale, np.float32)  # (D,)
+        self._normaliser = Normaliser(len(scale)) if settings.normalize_observations else None
+        self._actions = actions
+        self._batch_size = settings.batch_episodes * environments
+        self._batch: list[Episode] = []
+        self._actor: Actor
+        self.sync()
+
+    def sync(self) -> None:
+        """Copies the policy's weights to where acting reads them."""
+        self._actor = self._make_actor()
+
+    def _make_actor(self) -> Actor:
+        network = self._network
+        if isinstance(self._actions, Bounds):
+            assert isinstance(network, GaussianNetwork)
+            return GaussianActor(network, self._actions, self._prepared)
+        assert isinstance(network, SoftmaxNetwork)
+        if self._actions == 2 and not network.has_hidden and self._normaliser is None:
+            return PairActor(network, self._factors)
+        return SoftmaxActor(network, self._prepared)
+
+    def _prepared(self, observations: np.ndarray) -> np.ndarray:
+        """Observations (..., D) as the networks see them, float32."""
+        scaled: np.ndarray = observations * self._factors
+        return scaled if self._normaliser is None else self._normaliser(scaled)
+
+    def probabilities(self, observation: np.ndarray) -> np.ndarray:
+        """The policy's probabilities of single actions, (A,), for an observation (D,)."""
+        assert isinstance(self._actor, PairActor | SoftmaxActor)
+        return self._actor.probabilities(observation)
+
+    def draw(self, observation: np.ndarray, generator: np.random.Generator) -> Any:
+        """Draws an action from the policy, to be learned from; `limited` is for the environment."""
+        return self._actor.draw(observation, generator)
+
+    def act(self, observation: np.ndarray) -> Any:
+        """Draws one by the agent's own generator."""
+        return self.draw(observation, self.generator)
+
+    def limited(self, action: Any) -> Any:
+        """An action that was drawn, as the environment takes it."""
+        return self._actions.limited(action) if isinstance(self._actions, Bounds) else action
+
+    def act_greedily(self, observation: np.ndarray) -> Any:
+        """The most probable action."""
+        return self._actor.greedy(observation)
+
+    def greedy_network(self) -> nn.Module:
+        """The same as a torch module: observations (N, D) to actions (N, ...)."""
+        scaling = Scaling(np.zeros_like(self._factors), self._factors)
+        normaliser = [] if self._normaliser is None else [self._normaliser.network()]
+        outputs = nn.Sequential(scaling, *normaliser, *self._network.layers())
+        bounds = self._actions
+        if not isinstance(bounds, Bounds):
+            return SingleChoice(outputs)
+        spread = Spread(bounds.middle, bounds.half)
+        return ClippedAction(nn.Sequential(outputs, spread), bounds.low, bounds.high)
+
+    def learn(self, *episodes: Episode) -> Losses | None:
+        """Takes an episode, or one of each environment; the last ones of a batch update both networks.
+
+        Returns:
+            The losses of the update, taken before it; None if the batch isn't full yet.
+
+        Raises:
+            WorkbenchError: if a loss or a gradient isn't finite; the agent is as before then.
+        """
+        batch = [*self._batch, *episodes]
+        if len(batch) < self._batch_size:
+            self._batch = batch
+            return None
+        losses = self._update(batch)
+        self._batch = []
+        self._measure(batch)
+        self.sync()
+        return losses
+
+    def _measure(self, batch: list[Episode]) -> None:
+        """Counts a batch's observations: after its update, so that this met the policy that acted."""
+        if self._normaliser is not None:
+            for episode in batch:
+                for observation in episode.observations:
+                    self._normaliser.add(observation * self._factors)
+
+    def _update(self, batch: list[Episode]) -> Losses:
+        observations = torch.cat([self._seen(episode.observations) for episode in batch])
+        actions = as_tensor([action for episode in batch for action in episode.actions])
+        advantages, targets = self._advantages(batch)
+        spread = float(advantages.std(correction=0))
+        advantages = (advantages - advantages.mean()) / (spread + SMALLEST_SPREAD)
+        policy_loss = self._policy_loss(observations, actions, advantages)
+        value_loss = self._value_loss(observations, targets)
+        losses = Losses(policy_loss.item(), value_loss.item())
+        check_finite(losses)
+        descend(self.policy_optimizer, policy_loss)
+        for _ in range(self.settings.value_epochs):
+            descend(self.value_optimizer, self._value_loss(observations, targets))
+        return losses
+
+    def _policy_loss(
+        self, observations: torch.Tensor, actions: torch.Tensor, advantages: torch.Tensor
+    ) -> torch.Tensor:
+        output = self._network(observations)
+        loss = -(self._network.log_chances(output, actions) * advantages).mean()
+        if not self.settings.entropy_coefficient:
+            return loss
+        return loss - self.settings.entropy_coefficient * self._network.entropy(output)
+
+    def _advantages(self, batch: list[Episode]) -> tuple[torch.Tensor, torch.Tensor]:
+        """Advantages and the baseline's targets, each (T,) over all episodes' steps."""
+        advantages, targets = [], []
+        for episode in batch:
+            values = self._values(episode)
+            found = generalised_advantages(
+                episode.rewards, values, self.settings.gamma, self.settings.gae_lambda
+            )
+            advantages.append(found)
+            targets.append(found + values[:-1])
+        return tuple(  # type: ignore[return-value]
+            torch.from_numpy(np.concatenate(each).astype(np.float32))
+            for each in (advantages, targets)
+        )
+
+    def _values(self, episode: Episode) -> np.ndarray:
+        """The baseline at each state, the final one included: (T + 1,); 0 where nothing follows."""
+        with torch.no_grad():
+            values = self.value(self._seen(episode.states())).squeeze(1).double().numpy()
+        if episode.terminated:
+            values[-1] = 0.0
+        return values
+
+    def _seen(self, observations: Sequence[np.ndarray]) -> torch.Tensor:
+        return torch.from_numpy(self._prepared(np.stack(observations)))
+
+    def _value_loss(self, observations: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
+        return nn.functional.mse_loss(self.value(observations).squeeze(1), targets)
+
+    def state_dict(self) -> dict[str, Any]:
+        """As every learner's, with the episodes that wait for their batch to fill."""
+        return {
+            **super().state_dict(),
+            "batch": [episode.state_dict() for episode in self._batch],
+            "normaliser": None if self._normaliser is None else self._normaliser.state_dict(),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Takes over what `state_dict` gave."""
+        size = len(self._factors)
+        batch = sequence(state["batch"])
+        bounds = self._actions
+        kind = bounds if isinstance(bounds, int) else (bounds.low.size,)
+        self._batch = [Episode.from_state(each, size, kind) for each in batch]
+        if self._normaliser is not None:
+            self._normaliser.load_state_dict(state["normaliser"])
+        super().load_state_dict(state)
+
+
+def _make_network(
+    observations: int, actions: int | Bounds, settings: ReinforceSettings
+) -> SoftmaxNetwork | GaussianNetwork:
+    if isinstance(actions, int):
+        return SoftmaxNetwork(observations, actions, settings.policy_hidden)
+    return GaussianNetwork(observations, actions, settings.policy_hidden, settings.log_std_init)
+
+
+def generalised_advantages(
+    rewards: Sequence[float], values: np.ndarray, gamma: float, gae_lambda: float
+) -> np.ndarray:
+    """Â_t = Σ_k (γλ)^k δ_{t+k} with δ_t = r_t + γ V(s_{t+1}) - V(s_t) (Schulman et al. 2016, eq. 16).
+
+    Args:
+        rewards: of T steps.
+        values: V at the T states and the final one, (T + 1,).
+
+    Returns:
+        float64, (T,).
+    """
+    advantages = np.empty(len(rewards))
+    following = 0.0
+    for index in range(len(rewards) - 1, -1, -1):
+        difference = rewards[index] + gamma * values[index + 1] - values[index]
+        following = difference + gamma * gae_lambda * following
+        advantages[index] = following
+    return advantages

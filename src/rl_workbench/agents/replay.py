@@ -1,0 +1,199 @@
+"""The replay buffer: transitions in preallocated arrays, drawn uniformly."""
+
+from collections import deque
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import array, number, sequence, whole
+
+
+class Transition(NamedTuple):
+    """One step, or n of them in one: what Q(observation, action) is compared with.
+
+    `discount` multiplies the next observation's value: gamma^n, or 0 where the episode ended.
+    """
+
+    observation: np.ndarray  # (D,) float32
+    action: int
+    reward: float  # the discounted sum over n steps
+    next_observation: np.ndarray  # (D,) float32
+    discount: float
+
+
+class Batch(NamedTuple):
+    """Transitions as arrays; K rounds of B transitions each."""
+
+    observations: np.ndarray  # (K, B, D) float32
+    actions: np.ndarray  # (K, B) int64
+    rewards: np.ndarray  # (K, B) float32
+    next_observations: np.ndarray  # (K, B, D) float32
+    discounts: np.ndarray  # (K, B) float32
+
+
+class ReplayBuffer:
+    """Keeps the newest `capacity` transitions.
+
+    Memory is reserved, not touched, so that a large buffer costs nothing before it is filled.
+
+    Raises:
+        WorkbenchError: if the memory isn't there.
+    """
+
+    def __init__(self, capacity: int, observation_size: int) -> None:
+        shape = (capacity, observation_size)
+        try:
+            self._observations = np.zeros(shape, np.float32)
+            self._next_observations = np.zeros(shape, np.float32)
+            self._actions = np.zeros(capacity, np.int64)
+            self._rewards = np.zeros(capacity, np.float32)
+            self._discounts = np.zeros(capacity, np.float32)
+        except MemoryError as error:
+            raise WorkbenchError(
+                f"no memory for {capacity} transitions; take a smaller buffer_size"
+            ) from error
+        self.capacity = capacity
+        self._size = 0
+        self._next = 0  # where the next transition goes
+
+    def __len__(self) -> int:
+        return self._size
+
+    def push(self, transition: Transition) -> None:
+        """Adds a transition, in the oldest one's place once the buffer is full."""
+        index = self._next
+        self._observations[index] = transition.observation
+        self._actions[index] = transition.action
+        self._rewards[index] = transition.reward
+        self._next_observations[index] = transition.next_observation
+        self._discounts[index] = transition.discount
+        self._next = (index + 1) % self.capacity
+        self._size = max(self._size, index + 1)
+
+    def sample(self, batch_size: int, rng: np.random.Generator, rounds: int = 1) -> Batch:
+        """Draws `rounds` batches; within a batch no transition comes twice.
+
+        A buffer that holds fewer than `batch_size` gives all it has.
+        """
+        count = min(batch_size, self._size)
+        if count == self._size:
+            indices = np.tile(np.arange(count), (rounds, 1))
+        else:
+            indices = np.empty((rounds, count), np.int64)
+            for row in indices:
+                row[:] = rng.choice(self._size, count, replace=False, shuffle=False)
+        return Batch(
+            self._observations[indices],
+            self._actions[indices],
+            self._rewards[indices],
+            self._next_observations[indices],
+            self._discounts[indices],
+        )
+
+    def state_dict(self) -> dict[str, Any]:
+        """The filled part as tensors that share its memory, and where the next one goes."""
+        arrays = {name: torch.from_numpy(array[: self._size]) for name, array in self._columns()}
+        return {**arrays, "next": self._next}
+
+    def load_state_dict(self, state: dict[str, Any], actions: int) -> None:
+        """Takes over what `state_dict` gave.
+
+        Args:
+            actions: A, of which the transitions have some.
+
+        Raises:
+            WorkbenchError: if it doesn't fit into this buffer.
+            TypeError, ValueError, LookupError: if it is something else.
+        """
+        size, following = len(state["actions"]), whole(state["next"])
+        is_full = size == self.capacity
+        if size > self.capacity or not (following < size if is_full else following == size):
+            raise WorkbenchError(f"a buffer of {self.capacity} can't hold {size} transitions")
+        for name, column in self._columns():
+            dtype, shape = torch.from_numpy(column[:0]).dtype, (size, *column.shape[1:])
+            column[:size] = array(state[name], dtype, shape)
+        if size and not 0 <= self._actions[:size].min() <= self._actions[:size].max() < actions:
+            raise WorkbenchError(f"the transitions have other actions than 0 to {actions - 1}")
+        self._size, self._next = size, following
+
+    def _columns(self) -> list[tuple[str, np.ndarray]]:
+        return [
+            ("observations", self._observations),
+            ("actions", self._actions),
+            ("rewards", self._rewards),
+            ("next_observations", self._next_observations),
+            ("discounts", self._discounts),
+        ]
+
+
+class NStepReturns:
+    """Turns an episode's steps into transitions over n steps, fewer at the episode's end.
+
+    Args:
+        steps: n; with 1 each step is a transition.
+        gamma: the discount factor.
+    """
+
+    def __init__(self, steps: int, gamma: float) -> None:
+        self._steps = steps
+        self._gamma = gamma
+        self._window: deque[tuple[np.ndarray, int, float]] = deque()
+
+    def add(
+        self, step: tuple[np.ndarray, int, float], following: np.ndarray, ended: bool, valued: bool
+    ) -> list[Transition]:
+        """Takes one step; returns the transitions that are complete now.
+
+        Args:
+            step: observation before the action, action, reward.
+            following: the observation after it.
+            ended: the episode is over: terminated or truncated.
+            valued: the following observation's value counts; it doesn't after a termination.
+        """
+        self._window.append(step)
+        transitions = []
+        if len(self._window) == self._steps or ended:
+            transitions.append(self._oldest(following, valued))
+        while ended and self._window:
+            transitions.append(self._oldest(following, valued))
+        return transitions
+
+    def _oldest(self, following: np.ndarray, valued: bool) -> Transition:
+        reward, discount = 0.0, 1.0
+        for _, _, later in self._window:
+            reward += discount * later
+            discount *= self._gamma
+        observation, action, _ = self._window.popleft()
+        return Transition(observation, action, reward, following, discount if valued else 0.0)
+
+    def clear(self) -> None:
+        """Forgets the steps of an episode that isn't continued."""
+        self._window.clear()
+
+    def state_dict(self) -> dict[str, Any]:
+        """The steps that wait for their successors."""
+        return {
+            "observations": [torch.from_numpy(step[0].copy()) for step in self._window],
+            "actions": [step[1] for step in self._window],
+            "rewards": [step[2] for step in self._window],
+        }
+
+    def load_state_dict(self, state: dict[str, Any], size: int, actions: int) -> None:
+        """Takes over what `state_dict` gave.
+
+        Args:
+            size: D, of observations.
+            actions: A.
+        """
+        observations = [
+            array(each, torch.float32, (size,)) for each in sequence(state["observations"])
+        ]
+        chosen = [whole(each) for each in sequence(state["actions"], len(observations))]
+        if max(chosen, default=0) >= actions:
+            raise ValueError(f"action {max(chosen)} of {actions}")
+        rewards = [number(each) for each in sequence(state["rewards"], len(observations))]
+        if len(observations) >= max(self._steps, 1):
+            raise ValueError(f"{len(observations)} steps wait for {self._steps}-step returns")
+        self._window = deque(zip(observations, chosen, rewards, strict=True))

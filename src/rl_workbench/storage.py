@@ -1,0 +1,129 @@
+"""Files on disk: each one whole, or as it was before."""
+
+import io
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from files.content import open_text
+from rl_workbench.errors import WorkbenchError
+
+Writer = Callable[[BinaryIO], object]  # fills a file
+
+
+def write_atomically(path: Path, write: Writer) -> None:
+    """Lets `write` fill a file that replaces `path` only once it is whole and on disk.
+
+    Raises:
+        OSError: if the disk refuses; an older file of that name is untouched.
+    """
+    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(descriptor, "wb") as stream:
+            write(stream)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, path)
+    except BaseException:
+        os.unlink(temporary)
+        raise
+    _sync_folder(path.parent)
+
+
+def write_file(path: Path, write: Writer, told: Path | None = None) -> None:
+    """The same for what a user asked for: makes the folder, and tells what the disk refuses.
+
+    Args:
+        told: the name for the error, if the user gave another one.
+
+    Raises:
+        WorkbenchError: if it does; an older file of that name is untouched.
+    """
+    told = told or path
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, write)
+    except FileExistsError as error:
+        raise WorkbenchError(f"can't write {told}: {told.parent} is no folder") from error
+    except OSError as error:
+        raise WorkbenchError(f"can't write {told}: {error.strerror or error}") from error
+
+
+def check_writable(path: Path) -> None:
+    """Refuses a place where nothing can be written, before hours are spent on what goes there.
+
+    Raises:
+        WorkbenchError: if it is one.
+    """
+    if path.is_dir():
+        raise WorkbenchError(f"can't write {path}: it is a folder")
+    probe = path.with_name(f".{path.name}.probe")
+    write_file(probe, as_text(""), path)
+    probe.unlink()
+
+
+def as_text(text: str) -> Writer:
+    """Writes a text."""
+    return lambda stream: stream.write(text.encode())
+
+
+def as_json(content: Any) -> Writer:
+    """Writes JSON with an end of line.
+
+    Raises:
+        ValueError: if a number of it is none.
+    """
+    return as_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def save_tensors(path: Path, content: dict[str, Any]) -> None:
+    """Writes what `torch.load` reads, whole or not at all.
+
+    By way of the memory: torch turns the error of a full disk into one of its own.
+
+    Raises:
+        OSError: if the disk refuses; an older file of that name is untouched.
+    """
+    import torch  # takes seconds, and most files need none of it
+
+    memory = io.BytesIO()
+    torch.save(content, memory)
+    write_atomically(path, lambda stream: stream.write(memory.getbuffer()))
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _sync_folder(folder: Path) -> None:
+    """Makes a rename survive a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+CONFIG_RECORD = "config.json"
+
+
+def read_record(folder: Path) -> Any:
+    """What config.json holds.
+
+    Raises:
+        WorkbenchError: if there is none, or it isn't JSON.
+    """
+    path = folder / CONFIG_RECORD
+    try:
+        with open_text(path) as file:
+            return json.load(file)
+    except OSError as error:
+        raise WorkbenchError(f"{folder} is no run folder: {path}: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:  # the latter of brackets within brackets
+        raise WorkbenchError(f"{path} isn't JSON: {error}") from error

@@ -1,0 +1,342 @@
+"""`benchmark`: one training, or several variants of it, over several seeds."""
+
+import argparse
+import datetime
+import json
+import os
+import platform
+import re
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from files.content import open_text
+from rl_workbench.env_ids import as_file_name
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.option import is_plain, key_values
+from rl_workbench.starting import Interrupt
+from rl_workbench.storage import as_json, as_text, write_file
+from rl_workbench.tools.flags import add_job_flags, number, write_figure
+from rl_workbench.tools.job import Job, last_words
+from rl_workbench.tools.jobs import job_pool
+from rl_workbench.tools.runs import Run, open_run
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.algorithms import ALGORITHMS, algorithm
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.options import default_file, known_options, read_section
+from rl_workbench.training.progress import tell, warn
+
+if TYPE_CHECKING:
+    from rl_workbench.tools.results import RunResult
+
+RECORD = "suite.json"
+CONFIG = "benchmark.yaml"
+NAME = re.compile(r"\w[\w.+-]*")  # of a variant, and so of a folder
+MAX_SEEDS = 10_000
+OWN = ("seed", "run_dir", "exp_name")  # options that the benchmark sets
+SEEDS = 5  # unless the suite or the user says otherwise
+KEYS = ("about", "seeds", "common", "variants")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to train; every seed of it is a run."""
+
+    name: str
+    algorithm: str
+    options: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Suite:
+    """What is trained and compared."""
+
+    name: str
+    about: str
+    seeds: int  # unless the user says otherwise
+    variants: tuple[Variant, ...]
+
+
+class _Planned(NamedTuple):
+    """A training of the benchmark."""
+
+    variant: str
+    seed: int
+    job: Job
+
+
+class _Hint(argparse.Action):
+    """A flag of `train` and `sweep`, which users may expect here."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        parser.error(f"{self.option_strings[0]} is an option of the training: {self.metavar}")
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags of the command."""
+    add = parser.add_argument
+    add("suite", nargs="?", metavar="SUITE",
+        help="a section of config/benchmark.yaml; without one, the training that --algo, --env-id "
+        "and --params name")  # fmt: skip
+    add("--suites", type=Path, metavar="FILE", help="suites, instead of config/benchmark.yaml")
+    add("--algo", choices=ALGORITHMS, help="default dqn")
+    add("--env-id", metavar="ID", help="default CartPole-v1")
+    add("--params", nargs="+", default=[], metavar="KEY=VALUE", help="options of the training")
+    add("--seeds", type=number(1), metavar="N", help=f"how many (the suite's, or {SEEDS})")
+    add("--first-seed", type=number(0), default=0, metavar="N", help="default 0")
+    add_job_flags(parser)
+    add("--episodes", type=number(1), default=100, metavar="N",
+        help="greedy episodes on fresh seeds for each policy's score (default 100)")  # fmt: skip
+    add("--out", type=Path, metavar="FOLDER",
+        help="for runs, tables and curves; a benchmark that was interrupted is continued there "
+        "(runs/benchmark/SUITE)")  # fmt: skip
+    add("--total-timesteps", nargs="?", action=_Hint, help=argparse.SUPPRESS,
+        metavar="--params total_timesteps=N, or the suite's own")  # fmt: skip
+
+
+def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
+    """Trains what isn't trained yet, then writes results.md, costs.md, results.json and two pictures.
+
+    Raises:
+        WorkbenchError: if a name is unknown, the folder holds another benchmark or one runs in it,
+            or a training has failed; then all files are written first.
+    """
+    suite = _suite(arguments)
+    for variant in suite.variants:
+        check_package(variant)
+    folder = (arguments.out or Path("runs/benchmark") / suite.name).resolve()
+    first = arguments.first_seed
+    seeds = range(first, first + (arguments.seeds or suite.seeds))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WorkbenchError(f"can't make {folder}: {error.strerror}") from error
+    with run_folder.held(folder, "another benchmark"):
+        _claim(folder, suite)
+        planned = [
+            _Planned(variant.name, seed, _job(variant, seed, folder))
+            for variant in suite.variants
+            for seed in seeds
+        ]
+        jobs = [each.job for each in planned]
+        with job_pool(arguments, folder, interrupt, jobs) as pool:
+            interrupt.defer()
+            pool.run_all(jobs)
+        if interrupt.requested():
+            tell("interrupted; the same command goes on")
+            return
+        interrupt.at_once()  # what follows takes minutes, and can be repeated
+        _report(folder, suite, planned, arguments.episodes, pool.where)
+
+
+def _job(variant: Variant, seed: int, folder: Path) -> Job:
+    own = folder / variant.name / f"seed_{seed}"
+    return Job(f"{variant.name}, seed {seed}", own, tuple(training_flags(variant, seed)))
+
+
+def _suite(arguments: argparse.Namespace) -> Suite:
+    if arguments.suite:
+        if arguments.algo or arguments.env_id or arguments.params:
+            raise WorkbenchError(
+                "a suite says what is trained: it takes no --algo, --env-id or --params"
+            )
+        return read_suite(arguments.suite, arguments.suites)
+    if arguments.suites:
+        raise WorkbenchError(f"which suite of {arguments.suites}? Name one")
+    kind, env_id = arguments.algo or "dqn", arguments.env_id or "CartPole-v1"
+    given = {"env_id": env_id, **key_values(arguments.params, "--params")}
+    name = f"{kind}__{as_file_name(given['env_id'])}"
+    return Suite(name, "", SEEDS, (make_variant("--params", name, {"algo": kind, **given}),))
+
+
+def _claim(folder: Path, suite: Suite) -> None:
+    """Notes what the runs of the folder are, or checks that they are the same."""
+    path, wanted = folder / RECORD, [asdict(variant) for variant in suite.variants]
+    try:
+        with open_text(path) as file:
+            found = json.load(file)
+    except FileNotFoundError:
+        if any(folder.iterdir()):
+            raise WorkbenchError(f"{folder} holds something else; name another folder") from None
+        write_file(path, as_json(wanted))
+        return
+    except (OSError, ValueError) as error:
+        raise WorkbenchError(f"can't read {path}: {error}") from error
+    if found != json.loads(json.dumps(wanted)):
+        raise WorkbenchError(f"{folder} holds runs with other options; name another folder")
+
+
+def read_suite(name: str, path: Path | None = None) -> Suite:
+    """Reads a suite of a file, by default of config/benchmark.yaml.
+
+    Raises:
+        WorkbenchError: if the file has no such suite, or it makes no sense.
+    """
+    path = path or default_file(CONFIG)
+    section = read_section(path, (), name)
+    unknown = [key for key in section if key not in KEYS]
+    if unknown or not isinstance(section.get("variants"), dict) or not section["variants"]:
+        raise WorkbenchError(f"{path}: a suite has variants, and perhaps {', '.join(KEYS[:-1])}")
+    origin = f"{path}, {name}"
+    common = _options(section.get("common"), f"{origin}: common")
+    variants = tuple(
+        make_variant(origin, str(key), {**common, **_options(own, f"{origin}: {key}")})
+        for key, own in section["variants"].items()
+    )
+    seeds = section.get("seeds", SEEDS)
+    if type(seeds) is not int or not 1 <= seeds <= MAX_SEEDS:
+        raise WorkbenchError(f"{origin}: seeds is a number from 1 to {MAX_SEEDS}, not {seeds!r}")
+    return Suite(name, str(section.get("about", "")), seeds, variants)
+
+
+def _options(value: Any, origin: str) -> dict[str, Any]:
+    if value is None:
+        return {}
+    if not isinstance(value, dict) or not is_plain(value):
+        raise WorkbenchError(f"{origin} has options with plain values, not {value!r}")
+    return value
+
+
+def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
+    """Makes a variant; names and types of our own algorithms' options are checked.
+
+    Args:
+        origin: where the variant stands, for errors.
+        name: of the variant.
+        options: with the algorithm as `algo`.
+
+    Raises:
+        WorkbenchError: if there is no such algorithm or option, or no folder can have the name.
+    """
+    if not NAME.fullmatch(name):
+        raise WorkbenchError(
+            f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}"
+        )
+    rest = dict(options)
+    kind = str(rest.pop("algo", "dqn"))
+    if kind not in ALGORITHMS:
+        raise WorkbenchError(f"{origin}: algo is one of {', '.join(ALGORITHMS)}, not {kind!r}")
+    taken = [key for key in rest if key in OWN]
+    if taken:
+        raise WorkbenchError(f"{origin}: the benchmark sets {taken[0]} itself")
+    if not algorithm(kind).package:  # others are asked in `check_package`
+        rest = {key: value for key, value in rest.items() if value is not None}
+        known_options(algorithm(kind)).read(_without_special(kind, rest), f"{origin}: {name}")
+    return Variant(name, kind, rest)
+
+
+def check_package(variant: Variant) -> None:
+    """Checks that the package of the variant's algorithm is installed and takes the options.
+
+    Raises:
+        WorkbenchError: if not.
+    """
+    kind = algorithm(variant.algorithm)
+    if kind.package:
+        choose(kind, training_flags(variant, 0)[2:])
+
+
+def _without_special(name: str, options: dict[str, Any]) -> dict[str, Any]:
+    """Leaves out the flags that choose a section or a file of options."""
+    special = ("config", *(("preset",) if algorithm(name).presets else ()))
+    return {key: value for key, value in options.items() if key not in special}
+
+
+def training_flags(variant: Variant, seed: int) -> list[str]:
+    """Returns the flags of `train` for one run, but for its folder."""
+    rest = _without_special(variant.algorithm, variant.options)
+    special = {key: value for key, value in variant.options.items() if key not in rest}
+    if "config" in special:  # a node may have another current folder
+        special["config"] = Path(special["config"]).resolve()
+    own = {"exp_name": variant.name, "seed": seed, **special}
+    flags = [f"--{key.replace('_', '-')}={value}" for key, value in own.items()]
+    pairs = [f"{key}={_text(value)}" for key, value in rest.items()]
+    return ["--algo", variant.algorithm, *flags, *(["--params", *pairs] if pairs else [])]
+
+
+def _text(value: Any) -> str:
+    """As `train` reads it."""
+    if isinstance(value, list | tuple):
+        return f"[{','.join(map(str, value))}]"
+    if isinstance(value, dict):
+        return ",".join(f"{key}={each}" for key, each in value.items())
+    return "null" if value is None else str(value)
+
+
+def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, where: str) -> None:
+    """Writes all files; the same results whatever happened on the way and wherever the folder lies."""
+    from rl_workbench.env_ids import threshold
+    from rl_workbench.plotting import evaluation_curves, seed_curves
+    from rl_workbench.tools import results as figures
+    from rl_workbench.tools.plot import seed_panels, variant_panels
+
+    runs, results = _examine(planned, episodes)
+    results = [replace(each, fault=each.fault.replace(f"{folder}/", "")) for each in results]
+    if all(each.steps is None for each in results):
+        raise WorkbenchError(f"no training came to anything; see {planned[0].job.log}")
+    groups = figures.grouped(results)
+    summary = figures.summary_table(groups, figures.RESULTS_SUMMARY)
+    every = figures.table(results, figures.RESULTS)
+    about = _measured(episodes, {threshold(run.env_id) for run in runs})
+    text = f"# {suite.name}\n\n{suite.about}\n\n{about}\n\n{summary}\n\n{every}\n"
+    write_file(folder / "results.md", as_text(text))
+    costs = figures.summary_table(groups, figures.COSTS_SUMMARY)
+    costs += f"\n\n{figures.table(results, figures.COSTS)}"
+    machine = (
+        f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}, {where}"
+    )
+    text = f"# {suite.name}: costs\n\n{datetime.date.today().isoformat()}, {machine}.\n\n{costs}\n"
+    write_file(folder / "costs.md", as_text(text))
+    content = {
+        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "versions": run_folder.versions(),
+        "episodes": episodes,
+        "where": where,
+        "runs": figures.rows(results, {**figures.RESULTS, **figures.COSTS}),
+    }
+    write_file(folder / "results.json", as_json(content))
+    for name, panels, draw in (
+        ("curves.png", seed_panels, seed_curves),
+        ("evaluations.png", variant_panels, evaluation_curves),
+    ):
+        try:  # a picture that can't be drawn must not cost the tables
+            figure = draw(panels(runs))
+        except WorkbenchError as error:
+            warn(f"no {name}: {error}")
+        else:
+            write_figure(folder / name, figure)
+    tell(f"{every}\n\n{summary}\n\n{costs}\n\ntables, figures and curves are in {folder}")
+    failed = [each for each in results if each.fault]
+    if failed:
+        raise WorkbenchError(
+            f"{len(failed)} of {len(results)} trainings failed; the first one: {failed[0].fault}"
+        )
+
+
+def _examine(planned: list[_Planned], episodes: int) -> "tuple[list[Run], list[RunResult]]":
+    """The runs whose record can be read, and a row of figures for every one that was planned."""
+    from rl_workbench.tools.results import RunResult, examine
+
+    runs, results = [], []
+    for name, seed, job in planned:
+        try:
+            runs.append(open_run(job.folder))
+        except WorkbenchError as error:
+            fault = last_words(job.log) or str(error)  # a training that couldn't begin says why
+            results.append(RunResult(name, seed, job.folder.name, fault=fault))
+        else:
+            results.append(examine(runs[-1], name, episodes, warn, also_last=True))
+    return runs, results
+
+
+def _measured(episodes: int, thresholds: Iterable[float | None]) -> str:
+    """How the figures were measured."""
+    lines = sorted(line for line in thresholds if line is not None)
+    solved = "".join(
+        f" Solved: the first confirmed evaluation of at least {line:g}." for line in lines
+    )
+    return (
+        f"Best and final: mean return of {episodes} greedy episodes on fresh seeds, which chose no "
+        f"policy.{solved}"
+    )

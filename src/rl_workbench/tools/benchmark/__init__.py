@@ -1,1 +1,0 @@
-"""Several trainings, and what they come to."""

@@ -1,1 +1,0 @@
-"""The subcommands of workbench.py: flags, and what they call."""

@@ -1,0 +1,48 @@
+"""`export`: a run's policy as a file that torch runs alone."""
+
+import argparse
+from pathlib import Path
+
+from rl_workbench.starting import Interrupt
+from rl_workbench.tools.flags import add_policy_flags, env_options
+from rl_workbench.training.progress import tell
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags of the command."""
+    add_policy_flags(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE.pt",
+                        help="TorchScript: observations (N, ...) to greedy actions (N, ...)")  # fmt: skip
+
+
+def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
+    """Exports the policy, and compares the file with it.
+
+    Raises:
+        WorkbenchError: if something is wrong with the run or the file, or their actions differ.
+    """
+    from rl_workbench.storage import check_writable, write_file
+    from rl_workbench.tools.policies import load_learned
+    from rl_workbench.tools.runs import open_run
+    from rl_workbench.tools.torchscript import export, open_exported
+
+    run = open_run(arguments.run)
+    check_writable(arguments.out)
+    policy = load_learned(run, arguments.checkpoint, env_options(arguments))
+    try:
+        content, agreement = export(run, policy, arguments.seed)
+    finally:
+        policy.env.close()
+    write_file(arguments.out, lambda stream: stream.write(content))
+    open_exported(arguments.out)  # what is on the disk now
+    rest = ""
+    if agreement.equal < agreement.observations:
+        rest = ", as good as tied in the others"
+        if agreement.largest_difference:
+            rest = (
+                f", within {agreement.largest_difference:.1g} of the bounds' distance in the others"
+            )
+    tell(
+        f"{arguments.out}: the policy of {policy.checkpoint}, {policy.steps} steps; the same action "
+        f"in {agreement.equal} of {agreement.observations} observations{rest}"
+    )

@@ -1,0 +1,88 @@
+"""Flags that several commands share, and pictures as files."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rl_workbench.errors import WorkbenchError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WHICH = ("best", "last")  # checkpoints: by evaluation, the newest
+POLICIES = (*WHICH, "random")
+
+
+def add_policy_flags(
+    parser: argparse.ArgumentParser, choices: tuple[str, ...] = WHICH, several: bool = False
+) -> None:
+    """Adds the flags that choose a run, one of its policies (or several), and the environment."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
+    which = "best by evaluation, newest" + (", or random actions" if "random" in choices else "")
+    if several:
+        parser.add_argument("--checkpoint", choices=choices, nargs="+", default=["best"],
+                            help=f"{which}; several are shown side by side (default best)")  # fmt: skip
+    else:
+        parser.add_argument("--checkpoint", choices=choices, default="best",
+                            help=f"{which} (default best)")  # fmt: skip
+    add_environment_flags(parser)
+
+
+def add_environment_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds the seed of the episodes and the options of the environment."""
+    parser.add_argument("--seed", type=number(0), default=0, metavar="N",
+                        help="of the episodes (default 0)")  # fmt: skip
+    parser.add_argument("--env-kwargs", nargs="+", default=[], metavar="KEY=VALUE",
+                        help="options of the environment, as max_steps=200")  # fmt: skip
+
+
+def add_job_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags that say where trainings run, and how many at a time."""
+    parser.add_argument("--jobs", type=number(1), metavar="N",
+                        help="trainings at a time, each on one core (default 1; with --ray the "
+                        "number of cores)")  # fmt: skip
+    parser.add_argument("--ray", metavar="ADDRESS",
+                        help="train on a Ray cluster, whose nodes all see --out: HOST:PORT of its "
+                        "head, auto for the cluster of this machine, or local to start one here")  # fmt: skip
+
+
+def env_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Returns the options of the environment, with values as `train` reads them.
+
+    Raises:
+        WorkbenchError: if one isn't KEY=VALUE.
+    """
+    from rl_workbench.option import Options
+    from rl_workbench.training.options import RunOptions
+
+    text = ",".join(arguments.env_kwargs)
+    return dict(
+        Options(RunOptions).read({"env_kwargs": text}, "--env-kwargs").get("env_kwargs", {})
+    )
+
+
+def number(lowest: int) -> Any:
+    """Returns an argparse type: a whole number from `lowest` on."""
+
+    def whole(text: str) -> int:
+        value = int(text)
+        if not lowest <= value < 2**31:
+            raise argparse.ArgumentTypeError(f"must be at least {lowest} and below 2^31: {text}")
+        return value
+
+    whole.__name__ = "whole number"  # argparse names it so in its errors
+    return whole
+
+
+def write_figure(path: Path, figure: "Figure") -> None:
+    """Writes a picture as PNG.
+
+    Raises:
+        WorkbenchError: if the file can't be written, or its name ends in something else.
+    """
+    from rl_workbench.plotting import as_png
+    from rl_workbench.storage import write_file
+
+    if path.suffix.lower() != ".png":
+        raise WorkbenchError(f"pictures are PNG: name one that ends in .png, not {path}")
+    write_file(path, as_png(figure))

@@ -1,0 +1,268 @@
+"""One training as a job: a process that is started, watched, stopped and resumed.
+
+FOLDER/NAME             the run folder
+FOLDER/NAME.log         the output of its training
+FOLDER/NAME.cost.json   when and where each attempt ran, and what it took
+"""
+
+import contextlib
+import os
+import random
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.storage import CONFIG_RECORD, as_json, write_file
+from rl_workbench.tools.runs import SUMMARY, cost_file, cost_of, read_leniently
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.checkpoints import LAST
+from rl_workbench.training.scalar_log import NAME as SCALARS
+
+POLL = 0.2  # [s]
+TIME_TO_SAVE = 60.0  # [s] for a training that is stopped because nobody needs its rest
+MAX_ATTEMPTS = 8  # in a row that were lost without a new checkpoint
+MAX_PAUSE = 30.0  # [s] between two attempts
+TAIL = 4096  # [bytes] of a file that hold its last line
+# Below the kernel's own range, so that nobody else is given the port before it is used.
+MASTER_PORTS = range(30000, 32768)
+# The networks are too small to gain by more cores.
+ONE_CORE = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+# Somebody else ended the process, as the kernel does when memory is short: the training is tried again.
+KILLED = {-signal.SIGKILL, -signal.SIGTERM, 128 + signal.SIGTERM}
+
+StopWithin = Callable[[], float | None]
+"""Says how long a training may take to save and end [s]; None: it goes on."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One training. If it is complete it is skipped; if it isn't, it is resumed, bit-identically."""
+
+    name: str  # for the user
+    folder: Path  # of the run
+    flags: tuple[str, ...]  # of `train`, all but --run-dir
+
+    @property
+    def log(self) -> Path:
+        """The output of the training."""
+        return self.folder.with_name(f"{self.folder.name}.log")
+
+    def summary(self) -> dict[str, Any]:
+        """What the training wrote at its end; empty until then."""
+        return read_leniently(self.folder / SUMMARY)
+
+    def is_done(self) -> bool:
+        """Returns whether the training is complete."""
+        return bool(self.summary().get("complete"))
+
+
+class Program(NamedTuple):
+    """How trainings are started."""
+
+    words: tuple[str, ...]  # the command line, without `train`
+    modules: str  # PYTHONPATH
+
+
+class Ending(NamedTuple):
+    """How an attempt at a training ended."""
+
+    code: int | None = None  # exit code, or minus the number of the signal
+    lost: str = ""  # why the attempt failed through no fault of the training; it is tried again
+
+
+def run_attempt(
+    job: Job, program: Program, stop_within: StopWithin, since: float, death_signal: str = "TERM"
+) -> Ending:
+    """Runs a training as a child process, which ends with this one.
+
+    Args:
+        job: the training; it is resumed if it has a checkpoint.
+        program: how it is started.
+        stop_within: asked several times a second. A KeyboardInterrupt stops the training, too.
+        since: when the command began [s since 1970]; earlier attempts don't count as lost.
+        death_signal: for the training if this process is killed.
+
+    Raises:
+        WorkbenchError: if its folder can't be written to.
+    """
+    spans = cost_of(job.folder).get("spans", [])
+    lost = _attempts_without_checkpoint(job, spans, since)
+    until = time.monotonic() + (min(2.0 ** (lost - 1), MAX_PAUSE) if lost else 0.0)
+    while time.monotonic() < until:
+        if stop_within() is not None:
+            return Ending()
+        time.sleep(POLL)
+    try:
+        job.folder.parent.mkdir(parents=True, exist_ok=True)
+        words = command(job, program.words)
+        process = _start(words, job.log, program.modules, death_signal)
+    except WorkbenchError as error:
+        _note(job, spans, time.time())
+        return Ending(lost=str(error))
+    except OSError as error:
+        raise WorkbenchError(f"can't train into {job.folder}: {error.strerror}") from error
+    began = time.time()
+    _note(job, spans, began)
+    code, cpu_seconds, was_stopped = _finish(process, stop_within)
+    _note(job, spans, began, time.time(), cpu_seconds)
+    return Ending(code, "its process was killed" if code in KILLED and not was_stopped else "")
+
+
+def run_here(
+    job: Job, stop_within: StopWithin, say: Callable[[str], None], program: Program, since: float
+) -> Ending:
+    """Runs a training on this machine; one that is killed is resumed."""
+    while True:
+        ending = run_attempt(job, program, stop_within, since)
+        if not ending.lost or is_hopeless(job, since):
+            return ending
+        say(ending.lost)
+
+
+def is_hopeless(job: Job, since: float) -> bool:
+    """Returns whether so many attempts were lost in a row that another one is no use."""
+    spans = cost_of(job.folder).get("spans", [])
+    return _attempts_without_checkpoint(job, spans, since) >= MAX_ATTEMPTS
+
+
+def _attempts_without_checkpoint(job: Job, spans: list[list[float]], since: float) -> int:
+    with contextlib.suppress(OSError):
+        since = max(since, (job.folder / LAST).stat().st_mtime)
+    return sum(began > since for began, _ in spans)
+
+
+def _note(
+    job: Job, spans: list[list[float]], began: float, ended: float | None = None, cpu: float = 0.0
+) -> None:
+    """Adds an attempt to the cost of a training; one that is lost with its machine has no end."""
+    cost = cost_of(job.folder)
+    if ended is not None:
+        for name, seconds in (("command_seconds", ended - began), ("cpu_seconds", cpu)):
+            cost[name] = round(cost.get(name, 0.0) + seconds, 1)
+    cost |= {"spans": [*spans, [round(began, 1), round(ended or began, 1)]]}
+    write_file(cost_file(job.folder), as_json({**cost, "node": socket.gethostname()}))
+
+
+def command(job: Job, program: Sequence[str]) -> list[str]:
+    """Returns the command of a new training, or of one that is resumed.
+
+    Args:
+        job: the training.
+        program: the command line, without `train`.
+
+    Raises:
+        WorkbenchError: if a training of an earlier command still runs there.
+    """
+    if job.folder.exists():
+        with run_folder.held(job.folder):
+            if (job.folder / LAST).exists():
+                return [*program, "train", f"--resume={job.folder}"]
+            shutil.rmtree(job.folder)  # it ended before its first checkpoint
+    return [*program, "train", f"--run-dir={job.folder}", *job.flags]
+
+
+def _start(words: list[str], log: Path, modules: str, death_signal: str) -> subprocess.Popen[bytes]:
+    prefix = ["setpriv", "--pdeathsig", death_signal, "--"] if shutil.which("setpriv") else []
+    # Environments over a network may need a port of their own, which is passed as ROS does.
+    address = {"ROS_MASTER_URI": f"http://127.0.0.1:{_free_port()}"}
+    # Workers of Ray block Ctrl-C, and what they start would inherit that.
+    before = signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    try:
+        with log.open("ab") as output:
+            return subprocess.Popen(
+                [*prefix, *words],
+                env={**os.environ, **ONE_CORE, **address, "PYTHONPATH": modules},
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # Ctrl-C in the terminal is for this process alone
+            )
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _free_port() -> int:
+    for port in random.SystemRandom().sample(MASTER_PORTS, len(MASTER_PORTS)):
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            return port
+    raise WorkbenchError("no port is free for the training's own simulation")
+
+
+def _finish(process: subprocess.Popen[bytes], stop_within: StopWithin) -> tuple[int, float, bool]:
+    """Waits for a training; returns its exit code, its processor time [s] and whether it was stopped."""
+    descriptor = os.pidfd_open(process.pid)  # readable once the process has ended
+    deadline, was_stopped = float("inf"), False
+    try:
+        ended = select.poll()
+        ended.register(descriptor, select.POLLIN)
+        while True:
+            try:
+                if ended.poll(1000 * POLL):
+                    break
+                grace = stop_within()
+            except KeyboardInterrupt:  # in a worker of Ray
+                grace = TIME_TO_SAVE
+            if grace is not None:
+                deadline = min(deadline, time.monotonic() + grace)
+                if not was_stopped:
+                    signal.pidfd_send_signal(descriptor, signal.SIGTERM)
+                    was_stopped = True
+            if time.monotonic() > deadline:
+                os.killpg(process.pid, signal.SIGKILL)
+    except BaseException:
+        os.killpg(process.pid, signal.SIGKILL)  # not waited for yet, so the number is its own
+        raise
+    finally:
+        os.close(descriptor)
+        # wait4 counts this one process; getrusage knows only the sum over all children.
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    return process.returncode, usage.ru_utime + usage.ru_stime, was_stopped
+
+
+def last_words(log: Path) -> str:
+    """Returns the last line of a training's output; empty if there is none."""
+    try:
+        with log.open("rb") as file:
+            file.seek(max(0, file.seek(0, 2) - TAIL))
+            text = file.read().decode(errors="replace")
+    except OSError:
+        return ""
+    lines = [line.strip() for line in text.replace("\r", "\n").split("\n")]
+    return next((line for line in reversed(lines) if line), "")
+
+
+def steps_of(folder: Path) -> tuple[int, int]:
+    """Returns the last step of a run and the steps of the whole training; 0 if not known."""
+    run = read_leniently(folder / CONFIG_RECORD).get("run")
+    length = run.get("total_timesteps") if isinstance(run, dict) else 0
+    return next(_last_steps(folder / SCALARS), 0), length if isinstance(length, int) else 0
+
+
+def _last_steps(path: Path) -> Iterator[int]:
+    """The steps of the last whole rows of a table, the last one first."""
+    try:
+        with path.open("rb") as file:
+            file.seek(max(0, file.seek(0, 2) - TAIL))
+            rows = file.read().split(b"\n")[:-1]
+    except OSError:
+        return
+    for row in reversed(rows):
+        step, tag, *_ = *row.split(b","), b""
+        if step.isdigit() and b"/" in tag:  # without a slash, it is a curve over episodes
+            yield int(step)
+
+
+def outcome(summary: dict[str, Any]) -> str:
+    """Returns what a training came to, in half a line."""
+    best = summary.get("best")
+    found = f"best evaluation {best[1]:.1f} at step {best[0]}" if best else "no evaluation"
+    return f"in {summary['seconds']:.1f} s, {found}"

@@ -1,0 +1,345 @@
+"""A pool of jobs, their states in FOLDER/jobs.json, and `jobs`, which lists them."""
+
+import argparse
+import contextlib
+import datetime
+import io
+import json
+import os
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from files.content import open_text
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt, search_path
+from rl_workbench.storage import as_json, write_file
+from rl_workbench.tools.job import (
+    MAX_ATTEMPTS,
+    TIME_TO_SAVE,
+    Ending,
+    Job,
+    Program,
+    StopWithin,
+    last_words,
+    outcome,
+    run_here,
+    steps_of,
+)
+from rl_workbench.tools.runs import cost_of, read_leniently
+from rl_workbench.training.folder import is_held
+from rl_workbench.training.progress import tell, writable
+
+NAME = "jobs.json"
+WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
+STOPPED = "stopped"  # not complete, and nobody runs it now
+TIME_TO_END = 4.0  # [s] for all trainings after Ctrl-C
+
+
+@contextlib.contextmanager
+def job_pool(
+    arguments: argparse.Namespace, folder: Path, interrupt: Interrupt, jobs: Sequence[Job] = ()
+) -> Iterator["JobPool"]:
+    """Makes the pool that a command's flags ask for, on this machine or on a Ray cluster.
+
+    Args:
+        arguments: with the flags of `add_job_flags`, and the program.
+        folder: in which all run folders lie.
+        interrupt: ends all jobs.
+        jobs: that are known from the beginning.
+
+    Raises:
+        WorkbenchError: if there is no such cluster.
+    """
+    program = Program(arguments.program, search_path())
+    with contextlib.ExitStack() as stack:
+        if arguments.ray is None:
+            run: RunJob = partial(run_here, program=program, since=time.time())
+            at_once = arguments.jobs or 1
+            where = f"{at_once} at a time"
+        else:
+            with interrupt.reading():  # a start of Ray that is interrupted leaves processes behind
+                from rl_workbench.tools.ray_tasks import RayJobs, joined
+
+                cluster = RayJobs(stack.enter_context(joined(arguments.ray)), folder, program)
+            run, where = cluster.run, cluster.about()
+            at_once = min(arguments.jobs or cluster.cpus, cluster.cpus)
+            tell(where)
+        pool = JobPool(folder, run, at_once, interrupt, jobs)
+        stack.callback(pool.close)
+        pool.where = where
+        yield pool
+
+
+RunJob = Callable[[Job, StopWithin, Callable[[str], None]], Ending]
+"""Runs a job to its end; the last argument receives a line for each attempt that is lost."""
+
+
+@dataclass
+class JobEntry:
+    """A job in jobs.json."""
+
+    name: str
+    folder: str  # of the run, relative to that of jobs.json
+    state: str = WAITING
+    note: str = ""  # why it has failed, or was lost
+
+
+class JobPool:
+    """Runs jobs in threads, shows how they get on, and keeps jobs.json.
+
+    Args:
+        folder: of jobs.json; those of the jobs lie in it.
+        run: runs a job, here or on a cluster.
+        at_once: the number of jobs at a time.
+        interrupt: ends all jobs.
+        jobs: that are known from the beginning; others are added as they are run.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        run: RunJob,
+        at_once: int,
+        interrupt: Interrupt,
+        jobs: Sequence[Job] = (),
+    ) -> None:
+        self.at_once, self.where = at_once, ""  # `where` describes the machines
+        self.failure: BaseException | None = None  # for which all jobs end
+        self._folder, self._run, self._interrupt = folder, run, interrupt
+        self._lock = threading.Lock()
+        self._total = len(jobs)
+        self._entries = {} if jobs else {each.folder: each for each in _written(folder)}
+        for each in self._entries.values():
+            each.state = WAITING if each.state == RUNNING else each.state
+        for job in jobs:
+            self._set(job, DONE if job.is_done() else WAITING, write=False)
+        stream = sys.stderr or io.StringIO()
+        self._bar: Any = None
+        if stream.isatty():
+            self._bar = tqdm(total=self._total or None, unit="job", file=stream, dynamic_ncols=True)
+        self._write()
+
+    def close(self) -> None:
+        """Ends the bar."""
+        if self._bar is not None:
+            self._bar.close()
+
+    def run_all(self, jobs: Sequence[Job]) -> None:
+        """Runs jobs that are independent of each other.
+
+        Raises:
+            WorkbenchError: if a folder can't be written to.
+        """
+        with ThreadPoolExecutor(self.at_once) as threads:
+            list(threads.map(self.run, jobs))
+
+    def run(self, job: Job, is_needed: Callable[[], bool] = lambda: True) -> str:
+        """Runs a job in the calling thread; returns why it has failed, empty if it hasn't.
+
+        A job that is stopped, by the user or because it is not needed, has not failed.
+
+        Args:
+            job: the job; one that is done is skipped.
+            is_needed: asked several times a second; the training is stopped if not.
+
+        Raises:
+            WorkbenchError: if a folder can't be written to.
+        """
+        if job.is_done():
+            self._set(job, DONE)
+            return ""
+        if self._is_over():
+            return ""
+
+        def stop_within() -> float | None:
+            if self._is_over():
+                return TIME_TO_END
+            return None if is_needed() else TIME_TO_SAVE
+
+        self._set(job, RUNNING)
+        try:
+            with self._progress(job, stop_within) as watched:
+                ending = self._run(job, watched, lambda reason: self._lost(job, reason))
+        except BaseException as error:
+            self.failure = error
+            raise
+        if job.is_done() or not is_needed():
+            return self._ended(job, "")
+        if self._is_over():
+            self._set(job, WAITING)
+            return ""
+        return self._ended(job, _failure(job, ending))
+
+    def _is_over(self) -> bool:
+        return self._interrupt.requested() or self.failure is not None
+
+    def _lost(self, job: Job, reason: str) -> None:
+        self._set(job, RUNNING, reason)
+        self._say(f"{job.name}: lost, and tried again: {reason}")
+
+    def _ended(self, job: Job, failure: str) -> str:
+        self._set(job, FAILED if failure else DONE, failure)
+        summary = job.summary()
+        words = failure or ("stopped" if summary.get("steps") is None else
+                            f"{summary['steps']} steps {outcome(summary)}")  # fmt: skip
+        counts = self.counts()
+        over = counts[DONE] + counts[FAILED]
+        position = f"{over} of {self._total}" if self._total else str(over)
+        failed = f", {counts[FAILED]} failed" if counts[FAILED] else ""
+        self._say(f"[{position}{failed}] {job.name}: {words}")
+        return failure
+
+    def counts(self) -> Counter[str]:
+        """Returns the number of jobs in each state."""
+        with self._lock:
+            return Counter(each.state for each in self._entries.values())
+
+    def _set(self, job: Job, state: str, note: str = "", write: bool = True) -> None:
+        folder = os.path.relpath(job.folder, self._folder)
+        with self._lock:
+            self._entries[folder] = JobEntry(job.name, folder, state, note)
+        if write:
+            self._write()
+
+    def _write(self) -> None:
+        counts = self.counts()
+        with self._lock:
+            content = [asdict(each) for each in self._entries.values()]
+            write_file(self._folder / NAME, as_json({"jobs": content}))
+            if self._bar is not None:
+                self._bar.n = counts[DONE] + counts[FAILED]
+                states = (f"{counts[state]} {state}" for state in (DONE, RUNNING, FAILED))
+                self._bar.set_postfix_str(", ".join(states))
+
+    @contextlib.contextmanager
+    def _progress(self, job: Job, stop_within: StopWithin) -> Iterator[StopWithin]:
+        """Shows a bar for a job on a terminal, which moves whenever `stop_within` is asked."""
+        if self._bar is None:
+            yield stop_within
+            return
+        bar: Any = tqdm(
+            desc=job.name, unit="step", file=self._bar.fp, leave=False, dynamic_ncols=True
+        )
+
+        def watched() -> float | None:
+            bar.n, length = steps_of(job.folder)
+            bar.total = length or None
+            bar.refresh()
+            return stop_within()
+
+        with contextlib.closing(bar):
+            yield watched
+
+    def _say(self, text: str) -> None:
+        if self._bar is not None:
+            self._bar.write(writable(text, self._bar.fp), file=self._bar.fp)
+        else:
+            tell(text)
+
+
+def _failure(job: Job, ending: Ending) -> str:
+    if ending.lost:
+        return f"given up after {MAX_ATTEMPTS} attempts without progress: {ending.lost}"
+    words = last_words(job.log)
+    code = f"ended with exit code {ending.code}, see {job.log}"
+    return f"{code}: {words}" if words else code
+
+
+def _written(folder: Path) -> list[JobEntry]:
+    """The jobs of earlier commands; none if they can't be read."""
+    try:
+        return [JobEntry(**each) for each in read_leniently(folder / NAME).get("jobs", [])]
+    except TypeError:
+        return []
+
+
+@dataclass(frozen=True)
+class JobStatus:
+    """How a job is getting on."""
+
+    name: str
+    folder: str
+    state: str  # done, running, failed, waiting or stopped
+    step: int  # of the environment
+    steps: int  # of the whole training; 0: its length isn't counted in steps
+    node: str  # the machine of the last attempt
+    attempts: int
+    seconds: float  # since the running attempt began; else 0
+    line: str  # why it has failed; else the last line that it printed
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags of the command."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER",
+                        help="of a benchmark or a sweep, also while it runs")  # fmt: skip
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the list as JSON, too")
+
+
+def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
+    """Lists the jobs of a benchmark or a sweep; only reads files.
+
+    Raises:
+        WorkbenchError: if the folder has no jobs.
+    """
+    found = read_jobs(arguments.folder)
+    if arguments.json:
+        write_file(arguments.json, as_json([asdict(each) for each in found]))
+    width = max((len(each.name) for each in found), default=0)
+    for each in found:
+        steps = f"{each.step} of {each.steps}" if each.steps else str(each.step)
+        parts = [f"{each.state:8}", f"{each.name:{width}}", f"{steps:>15} steps"]
+        if each.state == RUNNING:
+            parts.append(f"for {datetime.timedelta(seconds=int(each.seconds))} on {each.node}")
+        if each.attempts > 1:
+            parts.append(f"attempt {each.attempts}")
+        tell("  ".join([*parts, each.line]).rstrip())
+    counts = Counter(each.state for each in found)
+    tell(f"{len(found)} jobs: {', '.join(f'{count} {state}' for state, count in counts.items())}")
+
+
+def read_jobs(folder: Path) -> list[JobStatus]:
+    """Returns how the jobs of a folder are getting on.
+
+    Raises:
+        WorkbenchError: if the folder has no jobs.
+    """
+    path = folder / NAME
+    try:
+        with open_text(path) as file:
+            entries = [JobEntry(**each) for each in json.load(file)["jobs"]]
+    except OSError as error:
+        raise WorkbenchError(
+            f"{folder} has no jobs: {NAME} is in the folder of a benchmark or a sweep "
+            f"({error.strerror})"
+        ) from error
+    except (ValueError, TypeError, KeyError) as error:
+        raise WorkbenchError(f"{path} isn't a list of jobs: {error}") from error
+    is_alive = is_held(folder)
+    return [_status(folder, entry, is_alive) for entry in entries]
+
+
+def _status(folder: Path, entry: JobEntry, is_alive: bool) -> JobStatus:
+    run = folder / entry.folder
+    job, cost = Job(entry.name, run, ()), cost_of(run)
+    summary, spans = job.summary(), cost.get("spans", [])
+    (step, steps), state, line = steps_of(run), entry.state, entry.note or last_words(job.log)
+    if summary.get("complete"):
+        step, state, line = summary["steps"], DONE, outcome(summary)
+    elif state == DONE:
+        line = "ended early: the rest wasn't needed any more"
+    elif not is_alive and (state == RUNNING or step and state == WAITING):
+        state = STOPPED
+        line = outcome(summary) if summary.get("interrupted") else line
+    seconds = round(max(time.time() - spans[-1][0], 0.0), 1) if state == RUNNING and spans else 0.0
+    node = str(cost.get("node", ""))
+    return JobStatus(entry.name, entry.folder, state, step, steps, node, len(spans), seconds, line)

@@ -1,1 +1,0 @@
-"""Jobs on a cluster of Ray's: a task for each attempt, whose files come home as they are written."""

@@ -1,1 +1,0 @@
-"""Panels of curves, policies over the state plane, and videos."""

@@ -1,0 +1,155 @@
+"""`plot`: the training curves of runs as PNG; and the panels of such pictures for other commands."""
+
+import argparse
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt
+from rl_workbench.tools.flags import write_figure
+from rl_workbench.tools.runs import (
+    Curve,
+    Run,
+    evaluation_curve,
+    find_runs,
+    success_curve,
+    summary_of,
+    training_curve,
+)
+from rl_workbench.training.progress import tell, warn
+
+if TYPE_CHECKING:
+    from rl_workbench.plotting import Panel, SeedCurve
+
+CurveOf = Callable[[Run], "SeedCurve | None"]  # None: leave the run out
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags of the command."""
+    parser.add_argument("runs", nargs="+", metavar="RUN", help="run folders, or patterns")
+    parser.add_argument("--over", choices=("episodes", "steps"), default="episodes",
+                        help="the horizontal axis (default episodes)")  # fmt: skip
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE.png", help="the picture")
+
+
+def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
+    """Draws the curves.
+
+    Raises:
+        WorkbenchError: if there is no run, or the file can't be written.
+    """
+    from rl_workbench.plotting import STEPS, training_curves
+
+    panels = run_panels(find_runs(arguments.runs, warn), arguments.over)
+    across = "episode" if arguments.over == "episodes" else STEPS
+    write_figure(arguments.out, training_curves(panels, across))
+    tell(str(arguments.out))
+
+
+def run_panels(runs: Sequence[Run], over: str) -> "list[Panel]":
+    """Makes panels of single runs, one for each environment.
+
+    Args:
+        runs: the runs.
+        over: "episodes" or "steps".
+
+    Raises:
+        WorkbenchError: if a run has no episode yet.
+    """
+    import numpy as np
+
+    from rl_workbench.plotting import SeedCurve
+
+    short = {run.folder: f"{run.experiment}, seed {run.seed}" for run in runs}
+    count = Counter((run.env_id, short[run.folder]) for run in runs)
+
+    def name(run: Run) -> str:
+        found = short[run.folder]
+        return found if count[run.env_id, found] == 1 else f"{found} ({run.name})"
+
+    def curve(run: Run) -> "SeedCurve":
+        found = training_curve(run)
+        episodes = np.arange(1.0, len(found.values) + 1.0)
+        return SeedCurve(found.steps if over == "steps" else episodes, found.values)
+
+    def success(run: Run) -> "SeedCurve | None":
+        found = success_curve(run)
+        episodes = np.searchsorted(training_curve(run).steps, found.steps, side="right")
+        steps = found.steps if over == "steps" else episodes.astype(float)
+        return SeedCurve(steps, found.values) if len(found.values) else None
+
+    return [*_panels(runs, name, curve), *_success_panels(runs, name, success)]
+
+
+def seed_panels(runs: Sequence[Run]) -> "list[Panel]":
+    """Makes panels of the training returns of experiments over their seeds, one for each environment.
+
+    Raises:
+        WorkbenchError: if no run has an episode.
+    """
+
+    def of(curve: Callable[[Run], Curve]) -> CurveOf:
+        def seed_curve(run: Run) -> "SeedCurve | None":
+            try:
+                return _seed_curve(run, curve(run))
+            except WorkbenchError:
+                return None  # the table of results names the run
+
+        return seed_curve
+
+    panels = _panels(runs, lambda run: run.experiment, of(training_curve))
+    if not panels:
+        raise WorkbenchError("no episode has ended yet in any of these runs")
+    return [*panels, *_success_panels(runs, lambda run: run.experiment, of(success_curve))]
+
+
+def variant_panels(runs: Sequence[Run]) -> "list[Panel]":
+    """Makes panels of the evaluations of experiments over their seeds, one for each experiment.
+
+    Raises:
+        WorkbenchError: if no run was evaluated.
+    """
+    panels = _panels(
+        runs,
+        lambda run: run.experiment,
+        lambda run: _seed_curve(run, evaluation_curve(run)),
+        apart=True,
+    )
+    if not panels:
+        raise WorkbenchError("none of these runs was evaluated")
+    return panels
+
+
+def _seed_curve(run: Run, curve: Curve) -> "SeedCurve | None":
+    from rl_workbench.plotting import SeedCurve
+
+    if not len(curve.values):
+        return None
+    return SeedCurve(curve.steps, curve.values, bool(summary_of(run).get("complete")))
+
+
+def _success_panels(
+    runs: Sequence[Run], name_of: Callable[[Run], str], curve_of: CurveOf
+) -> "list[Panel]":
+    return [
+        panel._replace(threshold=None, shows_success=True)
+        for panel in _panels(runs, name_of, curve_of)
+    ]
+
+
+def _panels(
+    runs: Sequence[Run], name_of: Callable[[Run], str], curve_of: CurveOf, apart: bool = False
+) -> "list[Panel]":
+    """Makes a panel for each environment, in order of appearance; with `apart`, also for each name."""
+    from rl_workbench.env_ids import threshold
+    from rl_workbench.plotting import Panel
+
+    found: dict[tuple[str, str], dict[str, list[SeedCurve]]] = {}
+    for run in runs:
+        name, curve = name_of(run), curve_of(run)
+        if curve is not None:
+            panel = found.setdefault((run.env_id, name if apart else ""), {})
+            panel.setdefault(name, []).append(curve)
+    return [Panel(env_id, groups, threshold(env_id)) for (env_id, _), groups in found.items()]

@@ -1,0 +1,171 @@
+"""What a training learned, ready to act in an environment of its kind, and episodes of it."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from itertools import count
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+from torch import nn
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import whole
+from rl_workbench.storage import CONFIG_RECORD
+from rl_workbench.tools.runs import Run
+from rl_workbench.training import checkpoints
+from rl_workbench.training.algorithm import load_policy
+from rl_workbench.training.algorithms import algorithm
+from rl_workbench.training.environments import as_float32, make_environment, succeeded
+from rl_workbench.training.evaluator import Evaluation, run_greedily
+from rl_workbench.training.options import recorded_options
+from rl_workbench.training.progress import warn
+
+TEST_SEED = 5_000_000  # keeps these episodes apart from those of trainings and their evaluations
+RANDOM = "random"
+Act = Callable[[Any], Any]  # an observation to an action
+
+
+class RandomPolicy(NamedTuple):
+    """Random actions in a run's environment, which the caller closes."""
+
+    act: Act
+    env: gymnasium.Env[Any, Any]
+
+
+class LearnedPolicy(NamedTuple):
+    """A learned policy and an environment of the kind it learned in, which the caller closes."""
+
+    act: Act  # greedily, for one observation: (D,), or a dict as it learned from
+    preference: Callable[[np.ndarray], np.ndarray]  # of (N, D): (N,), see meaning
+    meaning: str  # of the preference: positive is the last action, or a push to the right
+    network: nn.Module  # acts for many observations at once
+    env: gymnasium.Env[Any, Any]
+    checkpoint: Path
+    steps: int  # of the training up to this checkpoint
+
+
+def environment_of(run: Run, options: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
+    """Makes an environment as the policies of a run observe it.
+
+    Args:
+        run: the run.
+        options: of the environment, on top of the training's own.
+
+    Raises:
+        WorkbenchError: if it can't be made.
+    """
+    keeps_dict = algorithm(run.algorithm).keeps_dict
+    return make_environment(run.env_id, {**run.env_kwargs, **options}, keep_dict=keeps_dict)
+
+
+def random_policy(run: Run, env_options: Mapping[str, Any], seed: int) -> RandomPolicy:
+    """Makes a policy that samples the action space.
+
+    Raises:
+        WorkbenchError: if the environment can't be made.
+    """
+    env = environment_of(run, env_options)
+    env.action_space.seed(seed)
+    return RandomPolicy(lambda _: env.action_space.sample(), env)
+
+
+def load_learned(
+    run: Run,
+    which: str = "best",
+    env_options: Mapping[str, Any] | None = None,
+    say: Callable[[str], None] = warn,
+    env: gymnasium.Env[Any, Any] | None = None,
+) -> LearnedPolicy:
+    """Loads the policy of a checkpoint; if that is damaged, the one of the checkpoint before it.
+
+    Args:
+        run: the run.
+        which: of its checkpoints, "best" or "last".
+        env_options: of the environment, on top of the training's own, such as `render_mode`.
+        say: receives a line for each checkpoint that is skipped.
+        env: to act in, of this run's kind; by default one is made.
+
+    Raises:
+        WorkbenchError: if no checkpoint can be read, it belongs to another run, or the environment
+            can't be made.
+    """
+    paths = checkpoints.candidates(run.folder, best_first=which == "best")
+    for path in paths:
+        try:
+            content = checkpoints.read(path)
+        except WorkbenchError as error:
+            say(f"{error}; taking an earlier one")
+            continue
+        if env is not None:
+            return _learned(run, path, content, env)
+        with ExitStack() as on_error:
+            env = environment_of(run, env_options or {})
+            on_error.callback(env.close)
+            policy = _learned(run, path, content, env)
+            on_error.pop_all()
+            return policy
+    reason = "none of its checkpoints can be read" if paths else "it has no checkpoint yet"
+    raise WorkbenchError(f"{run.folder} has no policy: {reason}")
+
+
+def _learned(
+    run: Run, path: Path, content: dict[str, Any], env: gymnasium.Env[Any, Any]
+) -> LearnedPolicy:
+    options = recorded_options(content.get("config"), str(path))
+    recorded = recorded_options(run.config, str(run.folder / CONFIG_RECORD))
+    try:
+        recorded.check_same(content["config"], str(path))
+    except WorkbenchError as error:
+        raise WorkbenchError(f"{path} isn't a checkpoint of {run.folder}") from error
+    with checkpoints.fitting("number of steps"):
+        steps = whole(content["steps"])
+    return LearnedPolicy(*load_policy(options, content, env, str(path)), env, path, steps)
+
+
+def play(policy: LearnedPolicy | RandomPolicy, episodes: int, seed: int) -> Evaluation:
+    """Plays episodes of a policy, seeded once.
+
+    Raises:
+        WorkbenchError: if the environment fails.
+    """
+    try:
+        result = run_greedily(policy.env, policy.act, TEST_SEED + seed, episodes)
+    except (ValueError, AssertionError) as error:
+        raise WorkbenchError(f"the policy doesn't fit the environment: {error}") from error
+    assert result is not None  # nothing can stop it
+    return result
+
+
+class Step(NamedTuple):
+    """The result of a step; the first one is the reset, which has no action."""
+
+    observation: Any
+    action: Any
+    reward: float
+    finished: bool
+    success: bool | None  # None before the end, or if the environment doesn't say
+
+
+def episode_steps(
+    env: gymnasium.Env[Any, Any], act: Act, seed: int, max_steps: int = 0
+) -> Iterator[Step]:
+    """Plays one episode, from the reset on.
+
+    Args:
+        env: the environment.
+        act: chooses the action for an observation.
+        seed: of the episode.
+        max_steps: number of steps after which the episode is cut off; 0 for never.
+    """
+    observation, _ = env.reset(seed=seed)
+    yield Step(observation, None, 0.0, False, None)
+    for length in count(1):
+        action = act(as_float32(observation))
+        observation, reward, terminated, truncated, info = env.step(action)
+        finished = terminated or truncated or length == max_steps
+        success = succeeded(info) if finished else None
+        yield Step(observation, action, float(reward), finished, success)
+        if finished:
+            return

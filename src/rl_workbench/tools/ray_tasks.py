@@ -1,0 +1,236 @@
+"""Trainings on a Ray cluster: one task for each, over a folder that all nodes see.
+
+Ray retries a task whose worker or node dies, and the training is resumed from its own checkpoints, so
+nothing but the folder has to survive. Commands that are killed go on the same way.
+"""
+
+import contextlib
+import logging
+import os
+import secrets
+import signal
+import socket
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from rl_workbench.errors import WorkbenchError, need
+from rl_workbench.storage import as_text, write_file
+from rl_workbench.tools.job import (
+    POLL,
+    Ending,
+    Job,
+    Program,
+    StopWithin,
+    is_hopeless,
+    run_attempt,
+)
+from rl_workbench.training.folder import LIBRARIES, versions
+
+TOKEN = ".seen_by_nodes"
+LOCAL = "local"
+CONNECT_TIMEOUT = 5.0  # [s]; Ray itself would try for more than a minute
+OBJECT_STORE = 128 * 2**20  # [bytes] of a local cluster; jobs hardly use it
+SOCKET_PATH = 40  # [bytes] of a temporary folder's path, so that Ray's sockets fit below
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+# Ray's own messages are pages long.
+REASONS = {
+    "NodeDiedError": "its node died",
+    "WorkerCrashedError": "its worker died",
+    "LocalRayletDiedError": "the raylet of its node died",
+    "OutOfMemoryError": "its node had no memory left",
+    "OwnerDiedError": "its node died",
+    "ObjectLostError": "its node died",
+}
+
+
+class TrainingLost(Exception):
+    """The training has ended through no fault of its own: Ray runs the task again."""
+
+
+class NodeUnusable(Exception):
+    """Nothing can be trained on a node; the text says why."""
+
+
+def train(
+    job: Job, program: Program, folder: Path, token: str, wanted: dict[str, str], since: float
+) -> Ending:
+    """The task: one attempt at a training, in a process of its own.
+
+    Raises:
+        NodeUnusable: if this node doesn't see the folder, or has other libraries.
+        TrainingLost: if the process was killed.
+    """
+    node = socket.gethostname()
+    try:
+        seen = (folder / TOKEN).read_text(encoding="utf-8")
+    except OSError:
+        seen = ""
+    if seen != token:
+        raise NodeUnusable(
+            f"{node} doesn't see {folder}: --out has to be a folder that all nodes share"
+        )
+    found = library_versions()
+    others = [
+        f"{name} {found.get(name)}, not {its}"
+        for name, its in wanted.items()
+        if found.get(name) != its
+    ]
+    if others:
+        raise NodeUnusable(f"{node} would come to other bits: it has {', '.join(others)}")
+    if is_hopeless(job, since):
+        return Ending(lost="its worker or its process was killed again and again")
+    own = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    modules = os.pathsep.join(filter(None, [*own, program.modules]))
+    here = Program((sys.executable, *program.words[1:]), modules)
+    ending = run_attempt(job, here, lambda: None, since, death_signal="KILL")
+    if ending.lost and not is_hopeless(job, since):
+        raise TrainingLost(ending.lost)
+    return ending
+
+
+def library_versions() -> dict[str, str]:
+    """Returns the versions on which the bits of a training depend."""
+    return {name: each for name, each in versions().items() if name in LIBRARIES}
+
+
+class RayJobs:
+    """Runs jobs on a cluster that was joined.
+
+    Args:
+        ray: the module, initialised.
+        folder: in which all run folders lie.
+        program: how trainings are started.
+    """
+
+    def __init__(self, ray: Any, folder: Path, program: Program) -> None:
+        self._ray, self._folder, self._program = ray, folder, program
+        self._token, self._since = secrets.token_hex(8), time.time()
+        self._wanted = library_versions()
+        write_file(folder / TOKEN, as_text(self._token))
+        self._task = ray.remote(num_cpus=1, max_retries=-1, retry_exceptions=[TrainingLost])(train)
+
+    @property
+    def cpus(self) -> int:
+        """The cores of all nodes."""
+        return int(self._ray.cluster_resources().get("CPU", 1))
+
+    def about(self) -> str:
+        """Returns the size of the cluster in half a line."""
+        nodes = sum(bool(each["Alive"]) for each in self._ray.nodes())
+        return f"{nodes} node{'s' * (nodes > 1)} of a Ray cluster with {self.cpus} cores"
+
+    def run(self, job: Job, stop_within: StopWithin, say: Callable[[str], None]) -> Ending:
+        """Runs a job to its end.
+
+        Raises:
+            WorkbenchError: if a node can't be used.
+        """
+        options = self._task.options(name=f"train {job.name}")
+        task = options.remote(
+            job, self._program, self._folder, self._token, self._wanted, self._since
+        )
+        deadline, was_stopped = float("inf"), False
+        while not self._ray.wait([task], timeout=POLL)[0]:
+            grace = stop_within()
+            if grace is not None:
+                deadline = min(deadline, time.monotonic() + grace)
+                if not was_stopped:
+                    self._ray.cancel(task)  # a KeyboardInterrupt in the task, which saves
+                    was_stopped = True
+            if time.monotonic() > deadline:
+                self._ray.cancel(task, force=True)
+                return Ending()
+        return self._result(task)
+
+    def _result(self, task: Any) -> Ending:
+        errors = self._ray.exceptions
+        try:
+            ending: Ending = self._ray.get(task)
+            return ending
+        except errors.TaskCancelledError:
+            return Ending()
+        except errors.RayTaskError as error:
+            cause = error.cause
+            if isinstance(cause, NodeUnusable | WorkbenchError):
+                raise WorkbenchError(str(cause)) from error
+            return Ending(lost=_in_a_line(cause or error))
+        except errors.RayError as error:
+            return Ending(lost=_in_a_line(error))
+
+
+def _in_a_line(error: Exception) -> str:
+    for kind in type(error).__mro__:
+        if kind.__name__ in REASONS:
+            return REASONS[kind.__name__]
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return lines[-1] if lines else type(error).__name__
+
+
+@contextlib.contextmanager
+def joined(address: str) -> Iterator[Any]:
+    """Joins a cluster, or starts one on this machine; yields the module `ray`.
+
+    Args:
+        address: HOST:PORT of the cluster's head, "auto" for the cluster that this machine belongs to, or
+            "local" for a cluster that ends with the block.
+
+    Raises:
+        WorkbenchError: if Ray isn't installed, or there is no such cluster.
+    """
+    need("ray", "Ray", "--ray")
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # sends nothing home
+    with contextlib.ExitStack() as stack:
+        options: dict[str, Any] = {}
+        if address == LOCAL:
+            where = None if len(tempfile.gettempdir()) < SOCKET_PATH else "/tmp"
+            scratch = tempfile.TemporaryDirectory(
+                prefix="ray_", dir=where, ignore_cleanup_errors=True
+            )
+            options = {
+                "num_cpus": len(os.sched_getaffinity(0)),
+                "object_store_memory": OBJECT_STORE,
+                "include_dashboard": False,
+                "_temp_dir": stack.enter_context(scratch),
+            }
+            if "ray" not in sys.modules:  # nobody else on this machine may use it
+                os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
+        elif address != "auto":
+            _check_address(address)
+        import ray
+
+        before = {number: signal.getsignal(number) for number in SIGNALS}
+        try:
+            ray.init(
+                address,
+                log_to_driver=False,
+                logging_level=logging.ERROR,
+                configure_logging=False,
+                **options,
+            )
+        except Exception as error:
+            ray.shutdown()
+            text = " ".join(str(error).split())
+            raise WorkbenchError(f"can't join the Ray cluster {address}: {text}") from error
+        finally:
+            for number, handler in before.items():  # Ray's own would end this process at once
+                signal.signal(number, handler)
+        stack.callback(ray.shutdown)
+        yield ray
+
+
+def _check_address(address: str) -> None:
+    host, _, port = address.rpartition(":")
+    if not host or "/" in host or not port.isdecimal():
+        raise WorkbenchError(
+            "--ray is the HOST:PORT of a cluster's head, as 10.0.0.1:6379, or auto, or local, "
+            f"not {address!r}"
+        )
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), CONNECT_TIMEOUT).close()
+    except (OSError, OverflowError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise WorkbenchError(f"no Ray cluster answers at {address}: {reason}") from error

@@ -1,0 +1,293 @@
+"""`record`: episodes as GIF, MP4, or an HTML file that plays them."""
+
+import argparse
+import base64
+import contextlib
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from io import BytesIO
+from itertools import accumulate, pairwise, zip_longest
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt
+from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, number
+from rl_workbench.training.progress import tell
+
+if TYPE_CHECKING:
+    import numpy as np
+    from PIL.Image import Image
+
+    from rl_workbench.tools.policies import LearnedPolicy, RandomPolicy
+    from rl_workbench.tools.recording import Frame
+    from rl_workbench.tools.runs import Run
+
+RATES = {".gif": 25.0, ".mp4": 50.0, ".html": 25.0}  # [Hz] by default, by the suffix
+MAX_GIF_RATE = 50.0  # [Hz]: browsers slow down what is faster
+GIF_TICK = 10  # [ms], the format's own
+COLOURS = 96  # of a GIF; drawings have few
+PAGE = Path(__file__).with_name("page.html")
+TEXT, PAPER = (40, 44, 52), (255, 255, 255)
+LINES = 14.0  # of text that would fit into a picture's height
+END = 1.0  # [s] for which a 3-D recording shows the end before it starts again
+
+
+class Film(NamedTuple):
+    """A recorded episode."""
+
+    title: str
+    frames: "list[Frame]"
+    rate: float  # of the frames [Hz], in simulated time
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags of the command."""
+    add_policy_flags(parser, POLICIES, several=True)
+    add = parser.add_argument
+    add("--out", type=Path, required=True, metavar="FILE", help="ends in .gif, .mp4 or .html")
+    add("--max-steps", type=number(0), default=0, metavar="N",
+        help="cut the episode off after N steps; 0: never (default)")  # fmt: skip
+    add("--size", type=_size, metavar="WIDTHxHEIGHT",
+        help="of an episode's pictures [pixels]; by default the environment's")  # fmt: skip
+    add("--fps", type=_rate, metavar="HZ",
+        help="frames per second of simulated time (default 25; 50 for an MP4)")  # fmt: skip
+    add("--no-captions", action="store_true", help="no line with step, return and action")
+
+
+def _size(text: str) -> tuple[int, int]:
+    words = text.lower().split("x")
+    if len(words) != 2 or not all(word.isdecimal() and 16 <= int(word) <= 4096 for word in words):
+        raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT, 16x16 to 4096x4096: {text}")
+    return int(words[0]), int(words[1])
+
+
+def _rate(text: str) -> float:
+    value = float(text)
+    if not 0.1 <= value <= 240.0:
+        raise argparse.ArgumentTypeError(f"must lie between 0.1 and 240: {text}")
+    return value
+
+
+def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
+    """Records an episode of each policy, and writes the file.
+
+    Raises:
+        WorkbenchError: if something is wrong with the run or the file, or nothing can be drawn.
+    """
+    from rl_workbench.storage import check_writable
+    from rl_workbench.tools.recording import draw_without_display, draws_itself
+    from rl_workbench.tools.runs import open_run
+
+    out, run = arguments.out, open_run(arguments.run)
+    suffix = out.suffix.lower()
+    if suffix not in RATES:
+        raise WorkbenchError(f"a video's name ends in {', '.join(RATES)}: not {out}")
+    rate = arguments.fps or RATES[suffix]
+    if suffix == ".gif" and rate > MAX_GIF_RATE:
+        raise WorkbenchError(f"--fps: a GIF has at most {MAX_GIF_RATE:g} frames a second")
+    check_writable(out)
+    draw_without_display()
+    with contextlib.ExitStack() as stack:
+        policies = {}
+        for which in arguments.checkpoint:
+            policies[which] = _policy(arguments, run, which)
+            stack.callback(policies[which].env.close)
+        if suffix == ".html" and draws_itself(policies[arguments.checkpoint[0]].env):
+            films = _write_scene(arguments, policies, rate)
+        else:
+            films = list(_pictures(arguments, policies, rate))
+            write_video(out, SideBySide(films, not arguments.no_captions), films[0].rate)
+    for film in films:
+        title, end = f"{film.title}: " if film.title else "", film.frames[-1]
+        words = {None: "", True: ", success", False: ", no success"}[end.success]
+        tell(f"{title}return {end.total_reward:.2f} in {end.step} steps{words}")
+    count = max(len(film.frames) for film in films)
+    tell(f"{out}: {count} frames, {count / films[0].rate:.1f} s")
+
+
+def _policy(
+    arguments: argparse.Namespace, run: "Run", which: str
+) -> "LearnedPolicy | RandomPolicy":
+    from rl_workbench.tools.policies import RANDOM, load_learned, random_policy
+    from rl_workbench.tools.recording import size_options
+
+    def load(sized: dict[str, int]) -> "LearnedPolicy | RandomPolicy":
+        options = {**env_options(arguments), "render_mode": "rgb_array", **sized}
+        if which == RANDOM:
+            return random_policy(run, options, arguments.seed)
+        return load_learned(run, which, options)
+
+    sized = size_options(run.env_id, arguments.size)
+    try:
+        return load(sized)
+    except WorkbenchError:
+        if not sized:
+            raise
+    return load({})  # pictures of its own size are scaled
+
+
+def _record(arguments: argparse.Namespace, which: str, policy: Any, view: Any, rate: float) -> Film:
+    from rl_workbench.tools.policies import TEST_SEED
+    from rl_workbench.tools.recording import record_episode, step_rate
+
+    steps = step_rate(policy.env)
+    stride = max(1.0, steps / rate)
+    frames = record_episode(policy.env, policy.act, view, TEST_SEED + arguments.seed,
+                            stride=stride, max_steps=arguments.max_steps)  # fmt: skip
+    title = which if len(arguments.checkpoint) > 1 else ""
+    return Film(title, list(frames), steps / stride)
+
+
+def _pictures(
+    arguments: argparse.Namespace, policies: dict[str, Any], rate: float
+) -> Iterator[Film]:
+    from rl_workbench.tools.recording import PictureView
+
+    for which, policy in policies.items():
+        view = PictureView(policy.env, size=arguments.size)
+        yield _record(arguments, which, policy, view, rate)
+
+
+def _write_scene(
+    arguments: argparse.Namespace, policies: dict[str, Any], rate: float
+) -> list[Film]:
+    """Writes one HTML file with the episodes in 3-D, beside each other."""
+    from rl_workbench.storage import write_file
+    from rl_workbench.tools.recording import SceneView
+    from viewer.server import hidden_page
+
+    if arguments.size:
+        raise WorkbenchError("--size: a recording in 3-D is as large as the browser's window")
+    with hidden_page() as server:
+        views = [SceneView(each.env, server, index) for index, each in enumerate(policies.values())]
+        films = [
+            _record(arguments, which, policy, view, rate)
+            for (which, policy), view in zip(policies.items(), views, strict=True)
+        ]
+        recording = server.get_scene_serializer()
+        for moment, frames in enumerate(zip_longest(*(film.frames for film in films))):
+            if moment:
+                recording.insert_sleep(1.0 / films[0].rate)
+            for film, view, frame in zip(films, views, frames, strict=True):
+                if frame is not None:  # an episode that has ended stays as it is
+                    caption = "" if arguments.no_captions else frame.caption(film.title)
+                    view.show(frame.seen, caption)
+        recording.insert_sleep(END)
+        page = recording.as_html()
+    write_file(arguments.out, lambda stream: stream.write(page.encode()))
+    return films
+
+
+class SideBySide(Sequence["np.ndarray"]):
+    """The pictures of all films at once, (H, W, 3) of uint8; one that has ended shows its last."""
+
+    def __init__(self, films: Sequence[Film], captions: bool) -> None:
+        self._films, self._captions = films, captions
+
+    def __len__(self) -> int:
+        return max(len(film.frames) for film in self._films)
+
+    def __getitem__(self, index: Any) -> Any:
+        import numpy as np
+        from PIL import Image
+
+        if index >= len(self):
+            raise IndexError(index)
+        pictures = []
+        for film in self._films:
+            frame = film.frames[min(index, len(film.frames) - 1)]
+            picture = Image.open(BytesIO(frame.seen))
+            pictures.append(
+                _captioned(picture, frame.caption(film.title)) if self._captions else picture
+            )
+        size = sum(each.width for each in pictures), max(each.height for each in pictures)
+        sheet, left = Image.new("RGB", size, PAPER), 0
+        for each in pictures:
+            sheet.paste(each, (left, 0))
+            left += each.width
+        return np.asarray(sheet)
+
+
+def _captioned(picture: "Image", text: str) -> "Image":
+    """Adds a line of text below, in a size that fits the width."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    high = max(8, round(picture.height / LINES))
+    font = ImageFont.load_default(0.7 * high)
+    width, room = font.getlength(text), picture.width - high
+    if width > room > 0:
+        font = ImageFont.load_default(max(6.0, 0.7 * high * room / width))
+    sheet = Image.new("RGB", (picture.width, picture.height + high), PAPER)
+    sheet.paste(picture, (0, 0))
+    middle = picture.height + high / 2.0
+    ImageDraw.Draw(sheet).text((high / 2.0, middle), text, TEXT, font, anchor="lm")
+    return sheet
+
+
+def write_video(path: Path, frames: "Sequence[np.ndarray]", rate: float) -> None:
+    """Writes a video in the format of the file's suffix; replaces an older file as a whole.
+
+    Args:
+        path: the file.
+        frames: of one size, (H, W, 3) of uint8; at least one.
+        rate: of the frames [Hz].
+
+    Raises:
+        WorkbenchError: if the file can't be written.
+    """
+    from rl_workbench.storage import write_file
+
+    write = {".gif": _write_gif, ".mp4": _write_mp4, ".html": _write_html}[path.suffix.lower()]
+    write_file(path, lambda stream: write(stream, frames, rate))
+
+
+def _write_gif(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -> None:
+    """All frames share the colours of three of them, so that only what moves is stored."""
+    import numpy as np
+    from PIL import Image
+
+    some = np.concatenate([frames[0], frames[len(frames) // 2], frames[len(frames) - 1]])
+    palette = Image.fromarray(some).quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+    reduced = [
+        Image.fromarray(each).quantize(palette=palette, dither=Image.Dither.NONE) for each in frames
+    ]
+    # Frames last whole ticks, on average as long as they should.
+    ticks = accumulate([1000.0 / rate / GIF_TICK] * len(reduced), initial=0.0)
+    reduced[0].save(
+        stream, format="GIF", save_all=True, append_images=reduced[1:], loop=0, optimize=False,
+        duration=[GIF_TICK * (round(end) - round(begin)) for begin, end in pairwise(ticks)],
+    )  # fmt: skip
+
+
+def _write_html(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -> None:
+    """One file that needs no other: pictures as WebP in base64, and a script that shows them."""
+    from PIL import Image
+
+    height, width, _ = frames[0].shape
+    begin, end = PAGE.read_text(encoding="utf-8").split("@FRAMES@")
+    begin = begin.replace("@WIDTH@", str(width)).replace("@HEIGHT@", str(height))
+    stream.write(begin.replace("@RATE@", f"{rate:g}").encode())
+    for frame in frames:
+        packed = BytesIO()
+        Image.fromarray(frame).save(packed, "WEBP", quality=80)
+        stream.write(b'"' + base64.b64encode(packed.getvalue()) + b'",\n')
+    stream.write(end.encode())
+
+
+def _write_mp4(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -> None:
+    """Lets ffmpeg, which can't write to a stream, write a temporary file."""
+    from viewer.video import EncoderFailed, Mp4Writer
+
+    with tempfile.TemporaryDirectory(prefix="rl_workbench_") as folder:
+        path = Path(folder, "video.mp4")
+        writer = Mp4Writer(path, rate)
+        try:
+            for frame in frames:
+                writer.add(frame)
+            writer.close()
+        except EncoderFailed as error:
+            raise WorkbenchError(str(error)) from error
+        with path.open("rb") as made:
+            shutil.copyfileobj(made, stream)

@@ -1,0 +1,432 @@
+"""Episodes as they are seen, frame by frame: what `record` writes and what the page of `view` plays.
+
+For the page a thread records them, because an environment may be slower than its own time, and some have
+to stay in one thread.
+"""
+
+import contextlib
+import inspect
+import os
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import gymnasium
+import numpy as np
+from gymnasium.envs.registration import load_env_creator
+from PIL import Image
+
+from rl_workbench.env_ids import spec_of
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools.policies import (
+    RANDOM,
+    TEST_SEED,
+    Act,
+    environment_of,
+    episode_steps,
+    load_learned,
+)
+from rl_workbench.tools.runs import Run, open_run
+from rl_workbench.training import checkpoints
+from rl_workbench.training.folder import is_held
+
+if TYPE_CHECKING:
+    import viser
+
+Size = tuple[int, int]  # width and height [pixels]
+
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
+DEFAULT_RATE = 30.0  # [Hz] of an environment that doesn't say its own
+MAX_NUMBERS = 3  # of an action, in a caption
+DRAW = "draw_on"  # the method of an environment that draws itself on viser's pages
+CAMERA, LOOK_AT = (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)  # in front of a picture on a page
+HEIGHT, WIDTH = 1.2, 1.8  # of a picture on a page, at most
+FACING = (np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0)  # turns a picture's down to the page's, wxyz
+QUALITY = 85  # of JPEG on a page
+MAX_STEPS = 20_000  # of an episode on a page; some have no end
+MAX_BYTES = 2**28  # of its pictures
+BACKEND = "backend"  # the option by which an environment may move a robot outside of its process
+IN_PROCESS = ("bullet", "mujoco")
+
+
+class Frame(NamedTuple):
+    """A moment of an episode; the first one is the reset."""
+
+    step: int
+    seen: Any  # what the view took
+    total_reward: float
+    action: str  # empty at the reset
+    success: bool | None = None  # at the end, if the environment says
+
+    def caption(self, title: str = "") -> str:
+        """Returns a line of text for below the picture."""
+        action = [f"action {self.action}"] if self.action else []
+        parts = [title] if title else []
+        return "   ".join([*parts, f"step {self.step}", f"return {self.total_reward:.1f}", *action])
+
+
+class View(Protocol):
+    """Takes what is seen of an environment, and shows it on a page later, maybe in another thread."""
+
+    def take(self) -> Any:
+        """Returns what is seen now; small enough to keep thousands."""
+        ...
+
+    def show(self, seen: Any, caption: str = "") -> None:
+        """Shows it on the page."""
+        ...
+
+
+class PictureView:
+    """The pictures that `render` draws, in the middle of a page.
+
+    Args:
+        env: the environment.
+        server: of the page; none if nothing will be shown.
+        size: of the pictures; by default as the environment draws them.
+
+    Raises:
+        WorkbenchError: if the environment draws no pictures.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env[Any, Any],
+        server: "viser.ViserServer | None" = None,
+        size: Size | None = None,
+    ) -> None:
+        if env.render_mode != "rgb_array":
+            raise WorkbenchError("the environment draws no pictures")
+        self._env, self._server, self._size = env, server, size
+        self._shown: viser.ImageHandle | None = None
+
+    def take(self) -> bytes:
+        """Returns a PNG, because thousands are kept.
+
+        Raises:
+            WorkbenchError: if the environment can't be drawn.
+        """
+        try:
+            drawn: Any = self._env.render()
+        except (gymnasium.error.Error, WorkbenchError) as error:
+            raise WorkbenchError(f"the environment can't be drawn: {error}") from error
+        if not isinstance(drawn, np.ndarray):
+            raise WorkbenchError("the environment draws no pictures")
+        picture = Image.fromarray(drawn)
+        if self._size not in (None, picture.size):
+            picture = picture.resize(self._size, Image.Resampling.LANCZOS)
+        stream = BytesIO()
+        picture.convert("RGB").save(stream, "PNG", compress_level=1)
+        return stream.getvalue()
+
+    def show(self, seen: bytes, caption: str = "") -> None:
+        """Shows the picture; the page has captions of its own."""
+        assert self._server is not None
+        picture = np.asarray(Image.open(BytesIO(seen)))
+        if self._shown is not None:
+            self._shown.image = picture
+            return
+        high, wide = picture.shape[:2]
+        scale = min(HEIGHT / high, WIDTH / wide)
+        self._shown = self._server.scene.add_image(
+            "/picture", picture, wide * scale, high * scale, format="jpeg", jpeg_quality=QUALITY,
+            wxyz=FACING, cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+
+
+class SceneView:
+    """An environment that draws itself in 3-D on a page.
+
+    Args:
+        env: the environment.
+        server: of the page.
+        index: of the environment among those on the page.
+
+    Raises:
+        WorkbenchError: if the environment can't be drawn.
+    """
+
+    def __init__(
+        self, env: gymnasium.Env[Any, Any], server: "viser.ViserServer", index: int = 0
+    ) -> None:
+        try:
+            self._drawn = getattr(env.unwrapped, DRAW)(server, index)
+        except gymnasium.error.Error as error:
+            raise WorkbenchError(f"the environment can't be drawn: {error}") from error
+
+    def take(self) -> Any:
+        return self._drawn.look()
+
+    def show(self, seen: Any, caption: str = "") -> None:
+        self._drawn.show(seen, *([caption] if caption else []))
+
+
+def draws_itself(env: gymnasium.Env[Any, Any]) -> bool:
+    """Returns whether an environment can be seen in 3-D."""
+    return hasattr(env.unwrapped, DRAW)
+
+
+def make_view(server: "viser.ViserServer", env: gymnasium.Env[Any, Any]) -> View:
+    """Makes the best view that the environment has, seen from the front by those on the page already.
+
+    Raises:
+        WorkbenchError: if the environment can't be drawn.
+    """
+    if not draws_itself(env):
+        return PictureView(env, server)
+    view = SceneView(env, server)
+    front = server.initial_camera
+    for client in server.get_clients().values():
+        with client.atomic():
+            client.camera.position, client.camera.look_at = front.position, front.look_at
+            client.camera.fov = front.fov
+    return view
+
+
+def record_episode(
+    env: gymnasium.Env[Any, Any],
+    act: Act,
+    view: View,
+    seed: int,
+    *,
+    stride: float = 1.0,
+    max_steps: int = 0,
+) -> Iterator[Frame]:
+    """Plays one episode, and yields its frames.
+
+    Args:
+        env: the environment.
+        act: chooses the action for an observation.
+        view: of the environment.
+        seed: of the episode.
+        stride: steps from one frame to the next, on average; the last step has a frame in any case.
+        max_steps: number of steps after which the episode is cut off; 0 for never.
+
+    Raises:
+        WorkbenchError: if the environment can't be drawn.
+    """
+    total, due = 0.0, 0.0
+    for length, step in enumerate(episode_steps(env, act, seed, max_steps)):
+        total += step.reward
+        if length < due and not step.finished:
+            continue
+        action = "" if step.action is None else _action_text(step.action)
+        yield Frame(length, view.take(), total, action, step.success)
+        while due <= length:
+            due += stride
+
+
+def _action_text(action: Any) -> str:
+    numbers = np.ravel(action)
+    if np.issubdtype(numbers.dtype, np.integer):
+        words = [str(each) for each in numbers[:MAX_NUMBERS]]
+    else:
+        words = [f"{each:+.2f}" for each in numbers[:MAX_NUMBERS]]
+    return " ".join([*words, *(["..."] if len(numbers) > MAX_NUMBERS else [])])
+
+
+def step_rate(env: gymnasium.Env[Any, Any]) -> float:
+    """Returns the steps per second of simulated time [Hz]."""
+    return float(env.metadata.get("render_fps") or DEFAULT_RATE)
+
+
+def draw_without_display() -> None:
+    """Makes pygame use no screen, and MuJoCo none where there is none; call it before they are imported."""
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+    if not any(os.environ.get(name) for name in DISPLAYS):
+        os.environ.setdefault("MUJOCO_GL", "egl")
+
+
+def size_options(env_id: str, size: Size | None) -> dict[str, int]:
+    """Returns options for an environment to draw pictures of that size; empty if it has none."""
+    if size is None:
+        return {}
+    spec = spec_of(env_id)
+    entry_point = None if spec is None else spec.entry_point
+    maker = load_env_creator(entry_point) if isinstance(entry_point, str) else entry_point
+    if maker is None:
+        return {}
+    known = inspect.signature(maker).parameters
+    given = {"width": size[0], "height": size[1]}
+    takes_all = any(each.kind is each.VAR_KEYWORD for each in known.values())
+    return given if takes_all or given.keys() <= known.keys() else {}
+
+
+@dataclass
+class RecordedEpisode:
+    """An episode; its frames grow while it is played."""
+
+    which: str  # policy
+    seed: int
+    frames: list[Frame] = field(default_factory=list)
+    policy: str = ""  # in words
+    rate: float = DEFAULT_RATE  # [Hz] of its steps
+    is_over: bool = False
+    note: str = ""  # what went wrong, or that it was cut off
+
+    @property
+    def length(self) -> int:
+        """The number of steps so far."""
+        return max(0, len(self.frames) - 1)
+
+
+class Superseded(Exception):
+    """Another episode was asked for."""
+
+
+class EpisodeRecorder:
+    """Plays and records episodes of a run; only its thread touches the environment.
+
+    Args:
+        folder: of the run; its training needn't have begun.
+        server: of the page.
+        env_options: of the environment, on top of the training's own.
+    """
+
+    def __init__(
+        self, folder: Path, server: "viser.ViserServer", env_options: dict[str, Any]
+    ) -> None:
+        self._folder, self._server, self._env_options = folder, server, env_options
+        self._env: gymnasium.Env[Any, Any] | None = None
+        self.view: View | None = None
+        self._wanted: RecordedEpisode | None = None
+        self._changed = threading.Condition()
+        self._is_closed = False
+        self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+        self._thread.start()
+
+    def play(self, which: str, seed: int) -> RecordedEpisode:
+        """Returns an episode that is played from now on; the one before it is given up."""
+        episode = RecordedEpisode(which, seed)
+        with self._changed:
+            self._wanted = episode
+            self._changed.notify()
+        return episode
+
+    def close(self, patience: float) -> None:
+        """Ends the thread, within `patience` [s]."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify()
+        self._thread.join(patience)
+
+    def newest(self, which: str) -> tuple[int, ...]:
+        """Returns what identifies the checkpoint that would be played; empty if there is none."""
+        if which == RANDOM:
+            return (0,)
+        for path in checkpoints.candidates(self._folder, best_first=which == "best"):
+            try:
+                status = path.stat()
+            except OSError:  # the training has just replaced it
+                continue
+            return status.st_ino, status.st_mtime_ns
+        return ()
+
+    def _work(self) -> None:
+        try:
+            while True:
+                with self._changed:
+                    self._changed.wait_for(lambda: self._wanted is not None or self._is_closed)
+                    episode, self._wanted = self._wanted, None
+                    if self._is_closed or episode is None:
+                        return
+                try:
+                    self._play(episode)
+                except Superseded:
+                    continue
+                except (WorkbenchError, gymnasium.error.Error) as error:
+                    episode.note = str(error) or type(error).__name__
+                    self._close_environment()
+                finally:
+                    episode.is_over = True
+        finally:
+            self._close_environment()
+
+    def _close_environment(self) -> None:
+        """The next episode makes a new one."""
+        if self._env is not None:
+            env, self._env = self._env, None
+            with contextlib.suppress(WorkbenchError):  # a failure that was reported already
+                env.close()
+
+    def _play(self, episode: RecordedEpisode) -> None:
+        run = open_run(self._folder)
+        check_robot_is_free(run, {**run.env_kwargs, **self._env_options})
+        if self._env is None or self.view is None:
+            self._env = drawn_environment(run, self._env_options)
+            self._server.scene.reset()  # removes the view of an environment that has failed
+            self.view = make_view(self._server, self._env)
+        act = self._policy(run, episode, self._env)
+        episode.rate = step_rate(self._env)
+        try:
+            self._record(episode, self._env, act, self.view)
+        except WorkbenchError:
+            raise
+        except (ValueError, AssertionError, RuntimeError) as error:
+            raise WorkbenchError(f"the policy doesn't fit the environment: {error}") from error
+
+    def _record(
+        self, episode: RecordedEpisode, env: gymnasium.Env[Any, Any], act: Act, view: View
+    ) -> None:
+        size = 0
+        seed = TEST_SEED + episode.seed
+        for frame in record_episode(env, act, view, seed, max_steps=MAX_STEPS):
+            if self._wanted is not None or self._is_closed:
+                raise Superseded
+            episode.frames.append(frame)
+            size += len(frame.seen) if isinstance(frame.seen, bytes) else 0
+            if frame.step == MAX_STEPS or size > MAX_BYTES:
+                episode.note = f"cut off after {frame.step} steps"
+                return
+
+    def _policy(self, run: Run, episode: RecordedEpisode, env: gymnasium.Env[Any, Any]) -> Act:
+        if episode.which == RANDOM:
+            env.action_space.seed(episode.seed)
+            episode.policy = RANDOM
+            return lambda _: env.action_space.sample()
+        skipped: list[str] = []
+        learned = load_learned(run, episode.which, say=skipped.append, env=env)
+        episode.policy = f"{episode.which}, of step {learned.steps}"
+        episode.note = "; ".join(skipped)
+        return learned.act
+
+
+def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
+    """Makes sure that an episode doesn't move the robot of a running training.
+
+    An environment says so by `shares_robot`, but it has joined the training's world by then. So this
+    decides by the name of the backend.
+
+    Args:
+        run: the run.
+        options: of the environment that is to be played.
+
+    Raises:
+        WorkbenchError: if it would.
+    """
+    given = run.config["run"]
+    training = {**given["env_kwargs"], **given.get("train_env_kwargs", {})}
+    own = (None, *IN_PROCESS)
+    if options.get(BACKEND) in own or training.get(BACKEND) in own or not is_held(run.folder):
+        return
+    raise WorkbenchError(
+        f"no episodes while it trains: {BACKEND}={options[BACKEND]} is the training's own robot. "
+        f"`view --env-kwargs {BACKEND}={IN_PROCESS[0]}` plays another one, and so does --gui of a "
+        f"training with --train-env-kwargs {BACKEND}={training[BACKEND]} instead of --env-kwargs"
+    )
+
+
+def drawn_environment(run: Run, options: dict[str, Any]) -> gymnasium.Env[Any, Any]:
+    """Makes an environment that draws pictures.
+
+    Raises:
+        WorkbenchError: if it can't be made, or draws none.
+    """
+    try:
+        return environment_of(run, {**options, "render_mode": "rgb_array"})
+    except WorkbenchError as error:
+        environment_of(run, options).close()  # raises what else is wrong
+        raise WorkbenchError(f"the environment draws no pictures: {error}") from error

@@ -1,0 +1,281 @@
+"""The figures of runs, and Markdown tables of them: every run, and statistics of each group of seeds."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rl_workbench.env_ids import threshold
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.plotting import WINDOW
+from rl_workbench.statistics import Statistics, describe
+from rl_workbench.tools.policies import load_learned, play
+from rl_workbench.tools.runs import Run, cost_of, evaluation_curve, summary_of, training_curve
+from rl_workbench.training.evaluator import Evaluation
+from rl_workbench.training.history import LAST
+from rl_workbench.training.scalar_log import CONFIRMED, EVALUATION
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """The figures of one run. A figure that is missing is None, and `fault` says why."""
+
+    group: str  # of seeds that are compared with other groups
+    seed: int
+    run: str  # the name of the folder
+    score: float | None = None  # mean return of greedy episodes, by which groups are compared
+    success: float | None = None  # their success rate, 0 to 1, if the environment says
+    final: float | None = None  # mean return of the last checkpoint's greedy episodes
+    training_mean: float | None = None  # return of the last training episodes
+    evaluations: float | None = None  # mean of all evaluations during the training
+    avg20: float | None = None  # largest mean return of 20 consecutive training episodes
+    solved_step: int | None = None  # of the first (confirmed) evaluation at the threshold
+    solved_seconds: float | None = None  # until then, with evaluations, without pauses
+    steps: int | None = None
+    episodes: int | None = None
+    seconds: float | None = None
+    cpu_seconds: float | None = None
+    fault: str = ""
+
+
+def examine(
+    run: Run,
+    group: str,
+    episodes: int,
+    warn: Callable[[str], None],
+    which: str = "best",
+    also_last: bool = False,
+) -> RunResult:
+    """Collects the figures of a run; what can't be read becomes a fault in its row, not an error.
+
+    Args:
+        run: the run.
+        group: of the result.
+        episodes: greedy episodes on fresh seeds for each score; 0 to score a run by the mean of its
+            last training episodes.
+        warn: receives a line for each checkpoint that is skipped.
+        which: of its checkpoints, "best" or "last".
+        also_last: play the last checkpoint, too.
+    """
+    faults: list[str] = []
+
+    def attempt(find: Callable[[], Any]) -> Any:
+        try:
+            return find()
+        except WorkbenchError as error:
+            faults.append(str(error))
+            return None
+
+    summary = attempt(lambda: summary_of(run)) or {}
+    if not summary.get("complete"):
+        faults.append(str(summary.get("failure") or "not complete"))
+    returns, steps = np.array(summary.get("returns") or []), summary.get("steps")
+    if "returns" not in summary and (curve := attempt(lambda: training_curve(run))):
+        returns, steps = curve.values, int(curve.steps[-1])
+    trained = float(returns[-LAST:].mean()) if len(returns) else None
+    score, success, final = trained, summary.get(f"success_rate_last_{LAST}"), None
+    if episodes:
+        played = attempt(lambda: _greedy(run, episodes, which, warn))
+        score = played.mean_return if played else None
+        success = played.success_rate if played else None
+    if also_last and (last := attempt(lambda: _greedy(run, episodes, "last", warn))):
+        final = last.mean_return
+    solved_step, solved_seconds = attempt(lambda: _solved(run)) or (None, None)
+    return RunResult(
+        group=group, seed=run.seed, run=run.name,
+        score=score, success=success, final=final, training_mean=trained,
+        evaluations=attempt(lambda: _mean_evaluation(run)), avg20=_largest_mean(returns),
+        solved_step=solved_step, solved_seconds=solved_seconds,
+        steps=steps, episodes=summary.get("episodes") or len(returns) or None,
+        seconds=summary.get("seconds"), cpu_seconds=cost_of(run.folder).get("cpu_seconds"),
+        fault="; ".join(dict.fromkeys(faults)),
+    )  # fmt: skip
+
+
+def _greedy(run: Run, episodes: int, which: str, warn: Callable[[str], None]) -> Evaluation:
+    policy = load_learned(run, which, say=warn)
+    try:
+        return play(policy, episodes, run.seed)
+    finally:
+        policy.env.close()
+
+
+def _mean_evaluation(run: Run) -> float | None:
+    values = evaluation_curve(run).values
+    return float(values.mean()) if len(values) else None
+
+
+def _largest_mean(returns: np.ndarray) -> float | None:
+    if len(returns) < WINDOW:
+        return None
+    return float(np.convolve(returns, np.full(WINDOW, 1 / WINDOW), mode="valid").max())
+
+
+def _solved(run: Run) -> tuple[int, float | None] | None:
+    """Step and seconds of the first evaluation at the threshold; a confirmed one, if there are any."""
+    line = threshold(run.env_id)
+    curve = evaluation_curve(run, CONFIRMED)
+    if not len(curve.values):
+        curve = evaluation_curve(run, EVALUATION)
+    above = np.flatnonzero(curve.values >= (math.inf if line is None else line))
+    if not len(above):
+        return None
+    return int(curve.steps[above[0]]), _seconds_until(run, float(curve.times[above[0]]))
+
+
+def _seconds_until(run: Run, until: float) -> float | None:
+    """The time that it had trained, without the pauses of an interrupted benchmark [s]."""
+    began, spans = run.config.get("began"), cost_of(run.folder).get("spans", [])
+    if began is None:
+        return None
+    pauses = [
+        following - ended
+        for (_, ended), (following, _) in zip(spans[:-1], spans[1:], strict=True)
+        if began <= ended and following <= until  # before `began` there was no checkpoint
+    ]
+    return round(until - began - sum(pauses), 1)
+
+
+# The columns of each table: the name, and the field of RunResult. A benchmark's costs have a table of
+# their own, because they depend on the clock: its results are the same bytes however it was interrupted.
+COMPARE = {name: name for name in ("group", "run", "seed", "score", "success", "training_mean",
+                                   "episodes", "steps", "seconds", "solved_step", "fault")}  # fmt: skip
+_RUN = {"variant": "group", "seed": "seed"}
+RESULTS = {**_RUN, "best": "score"} | {name: name for name in (
+    "success", "final", "evaluations", "avg20", "solved_step", "steps", "episodes", "fault")}  # fmt: skip
+COSTS = _RUN | {name: name for name in ("solved_seconds", "seconds", "cpu_seconds")}
+SUCCESS = "success"  # a column of rates, left out where no environment says
+
+
+def grouped(results: Sequence[RunResult]) -> dict[str, list[RunResult]]:
+    """Returns the results by group, in the order in which groups appear."""
+    names = dict.fromkeys(each.group for each in results)
+    return {name: [each for each in results if each.group == name] for name in names}
+
+
+def statistics_of(results: Sequence[RunResult], field: str = "score") -> Statistics | None:
+    """Returns the statistics of a figure; None if no run has it."""
+    values = [value for each in results if (value := getattr(each, field)) is not None]
+    return describe(np.array(values)) if values else None
+
+
+def rows(results: Sequence[RunResult], columns: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Returns a table as plain values, for JSON."""
+    return [{name: getattr(each, field) for name, field in columns.items()} for each in results]
+
+
+def table(results: Sequence[RunResult], columns: Mapping[str, str]) -> str:
+    """Returns a Markdown table with a line for each run."""
+    shown = {name: field for name, field in columns.items() if _is_shown(results, name)}
+    lines = [
+        [_percent(value) if name == SUCCESS else _cell(value) for name, value in row.items()]
+        for row in rows(results, shown)
+    ]
+    return _markdown([[name.replace("_", " ") for name in shown], *lines])
+
+
+# A cell of a summary, made of the results of a group.
+Cell = Callable[[Sequence[RunResult]], str]
+
+
+def summary_table(
+    groups: Mapping[str, Sequence[RunResult]], columns: Sequence[tuple[str, Cell]]
+) -> str:
+    """Returns a Markdown table with a line for each group."""
+    every = [each for results in groups.values() for each in results]
+    shown = [(name, cell) for name, cell in columns if _is_shown(every, name)]
+    lines = [[cell(results) for _, cell in shown] for results in groups.values()]
+    return _markdown([[name for name, _ in shown], *lines])
+
+
+def _is_shown(results: Sequence[RunResult], column: str) -> bool:
+    return column != SUCCESS or any(each.success is not None for each in results)
+
+
+def _markdown(lines: list[list[str]]) -> str:
+    head, *rest = lines
+    return "\n".join(f"| {' | '.join(line)} |" for line in [head, ["---"] * len(head), *rest])
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0%}"
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.1f}" if isinstance(value, float) else str(value).replace("|", "/")
+
+
+def _of(field: str, show: Callable[[Statistics], str]) -> Cell:
+    """A statistic of a figure; says over how many seeds it is, if some lack the figure."""
+
+    def cell(results: Sequence[RunResult]) -> str:
+        found = statistics_of(results, field)
+        if found is None:
+            return "-"
+        return show(found) + (f" ({found.n} of {len(results)})" if found.n < len(results) else "")
+
+    return cell
+
+
+def _scored(results: Sequence[RunResult]) -> str:
+    count = sum(each.score is not None for each in results)
+    return str(count) if count == len(results) else f"{count} of {len(results)} (see faults)"
+
+
+def _solved_count(results: Sequence[RunResult]) -> str:
+    failed = sum(bool(each.fault) for each in results)
+    solved = sum(each.solved_step is not None for each in results)
+    return f"{solved} of {len(results)}" + (f", {failed} failed" if failed else "")
+
+
+def _steps_to_solve(reduce: Callable[[list[float]], Any]) -> Cell:
+    """Over all seeds; one that never solved it counts as infinite."""
+
+    def cell(results: Sequence[RunResult]) -> str:
+        found = reduce([each.solved_step or math.inf for each in results])
+        return "never" if found == math.inf else f"{found:.0f}"
+
+    return cell
+
+
+def _range(interval: tuple[float, float] | None) -> str:
+    return "needs two seeds" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}"
+
+
+def _iqm(found: Statistics) -> str:
+    interval = found.iqm_interval
+    return f"{found.iqm:.1f}" + (f" [{interval[0]:.1f}, {interval[1]:.1f}]" if interval else "")
+
+
+_SPREAD = _of("score", lambda each: f"{each.mean:.1f}" + f" ± {each.std:.1f}" * (each.n > 1))
+_SUCCESS_RATE = _of("success", lambda each: _percent(each.mean))
+COMPARE_SUMMARY = (
+    ("group", lambda results: results[0].group),
+    ("runs", _scored),
+    ("mean ± std", _SPREAD),
+    (SUCCESS, _SUCCESS_RATE),
+    ("median", _of("score", lambda each: f"{each.median:.1f}")),
+    ("IQM", _of("score", lambda each: f"{each.iqm:.1f}")),
+    ("95% of the mean", _of("score", lambda each: _range(each.mean_interval))),
+    ("95% of the IQM", _of("score", lambda each: _range(each.iqm_interval))),
+)
+RESULTS_SUMMARY = (
+    ("variant", lambda results: results[0].group),
+    ("seeds solved", _solved_count),
+    ("best: mean ± std", _SPREAD),
+    (SUCCESS, _SUCCESS_RATE),
+    ("IQM [95 %]", _of("score", _iqm)),
+    ("final: IQM [95 %]", _of("final", _iqm)),
+    ("evaluations: IQM [95 %]", _of("evaluations", _iqm)),
+    ("median steps to solve", _steps_to_solve(np.median)),
+    ("most", _steps_to_solve(max)),
+)
+COSTS_SUMMARY = (
+    ("variant", lambda results: results[0].group),
+    ("median seconds", _of("seconds", lambda each: f"{each.median:.1f}")),
+    ("most", lambda results: _cell(max(each.seconds or 0.0 for each in results) or None)),
+)

@@ -1,0 +1,263 @@
+"""The page of a run: recorded episodes of its policies, and the curves of its training."""
+
+import contextlib
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import viser
+
+from rl_workbench.env_ids import import_module_of
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt
+from rl_workbench.tools.recording import (
+    CAMERA,
+    LOOK_AT,
+    EpisodeRecorder,
+    RecordedEpisode,
+    draw_without_display,
+)
+from rl_workbench.tools.runs import open_run
+from rl_workbench.training.progress import tell, warn
+from viewer.address import PortInUse, find_address
+from viewer.curves import Curves
+from viewer.server import open_browser, serve, stop
+
+PERIOD = 1.0 / 30.0  # [s] between two pictures
+CURVES_PERIOD = 1.0  # [s] between two looks at the table
+IDLE_PERIOD = 0.25  # [s] between two looks whether anybody watches
+PATIENCE = 10.0  # [s] for the recording thread to end
+SPEEDS = {"0.1 ×": 0.1, "0.25 ×": 0.25, "0.5 ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "5 ×": 5.0}
+LINGER = 1.0  # [s] at the end of an episode
+MAX_SEED = 2**31 - 1
+
+
+def show_run(
+    folder: Path,
+    policies: tuple[str, ...],
+    seed: int,
+    episodes: int,
+    env_options: dict[str, Any],
+    *,
+    host: str,
+    port: int | None,
+    browser: bool,
+    interrupt: Interrupt,
+    beside_training: bool = False,
+) -> None:
+    """Serves the page until Ctrl-C, or until the training ends that has started it.
+
+    Args:
+        folder: of the run.
+        policies: to choose from; the first one is played first.
+        seed: of the first episode.
+        episodes: with seeds of their own, which are repeated.
+        env_options: of the environment, on top of the training's own.
+        host: to serve on.
+        port: to serve on; None for the first free one.
+        browser: whether to open one.
+        interrupt: ends it.
+        beside_training: a training has started this process and reads its output. The run folder may
+            still be empty, and this process ends when its standard input does.
+
+    Raises:
+        WorkbenchError: if there is no such run, or the page can't be served.
+    """
+    import torch
+
+    run = None if beside_training else open_run(folder)
+    draw_without_display()
+    if run is not None:
+        import_module_of(run.env_id)
+    torch.set_num_threads(1)  # networks this small are slower on more
+    interrupt.defer()
+    training_ended = threading.Event()
+    if beside_training:
+        threading.Thread(target=_await_end, args=(training_ended,), daemon=True).start()
+
+    def is_over() -> bool:
+        return training_ended.is_set() or interrupt.requested()
+
+    try:
+        address = find_address(host, port)
+        server = serve(address, folder.name, CAMERA, LOOK_AT)
+    except PortInUse as error:
+        raise WorkbenchError(str(error)) from error
+    with contextlib.ExitStack() as stack:
+        stack.callback(stop, server)
+        for line in address.advice("the run", "plays its episodes"):
+            tell(line)
+        if beside_training:
+            _close_output()
+        if browser:  # opening one may take until its user closes it
+            threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
+        while not server.get_clients():  # nothing is played until somebody watches
+            if is_over():
+                return
+            time.sleep(IDLE_PERIOD)
+        recorder = EpisodeRecorder(folder, server, env_options)
+        stack.callback(recorder.close, PATIENCE)
+        with server.gui.add_folder("Episode"):
+            playback = Playback(server.gui, recorder, policies, seed, episodes)
+        curves = Curves(server.gui, server.gui.add_folder("Training"))
+        curves.follow(folder)
+        ended = threading.Event()
+        stack.callback(ended.set)
+        threading.Thread(target=_draw, args=(server, curves, ended), daemon=True).start()
+        _play(server, playback, is_over)
+
+
+def _await_end(ended: threading.Event) -> None:
+    """The training holds the other end of standard input; however it ends, the kernel closes that."""
+    sys.stdin.buffer.read()
+    ended.set()
+
+
+def _close_output() -> None:
+    """The training reads the lines up to the end of the output."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
+
+
+def _play(server: viser.ViserServer, playback: "Playback", is_over: Callable[[], bool]) -> None:
+    last = time.monotonic()
+    while not is_over():
+        is_watched = bool(server.get_clients())
+        time.sleep(PERIOD if is_watched else IDLE_PERIOD)
+        now = time.monotonic()
+        if is_watched:
+            playback.tick(min(now - last, IDLE_PERIOD))
+        last = now
+
+
+def _draw(server: viser.ViserServer, curves: Curves, ended: threading.Event) -> None:
+    has_more = True
+    while not ended.wait(0.0 if has_more else CURVES_PERIOD):
+        has_more = bool(server.get_clients()) and curves.update()
+
+
+class Playback:
+    """The controls of the page. One thread calls `tick`; clicks come in threads of viser's.
+
+    Args:
+        gui: of the page.
+        recorder: records the episodes.
+        policies: to choose from; the first one is played.
+        seed: of the first episode.
+        episodes: after each episode the next seed follows, until these have been played.
+    """
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        recorder: EpisodeRecorder,
+        policies: tuple[str, ...],
+        seed: int,
+        episodes: int = 1,
+    ) -> None:
+        self._recorder, self._first, self._episodes = recorder, seed, episodes
+        self._lock = threading.RLock()
+        self._position = 0.0  # [steps] in the episode
+        self._waited = 0.0  # [s] at its end
+        self._is_playing = True
+        self._drawn: tuple[RecordedEpisode, int] | None = None
+        self._button = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
+        self._slider = gui.add_slider("Step", 0, 1, 1, 0)
+        self._speed = gui.add_dropdown("Speed", list(SPEEDS), initial_value="1 ×")
+        self._which = gui.add_dropdown("Policy", list(policies), initial_value=policies[0])
+        self._seed = gui.add_number("Seed", seed, min=0, max=MAX_SEED, step=1)
+        self._follow = gui.add_checkbox(
+            "Newest by itself", True, hint="play a checkpoint as soon as it is written"
+        )
+        newest = gui.add_button("Play the newest now", icon=viser.Icon.REFRESH)
+        self._about = gui.add_html("")  # below what is clicked, which must not move
+        self._button.on_click(lambda _: self.toggle())
+        self._slider.on_update(self._seek)
+        for choice in (self._which, self._seed):
+            choice.on_update(lambda event: self._start() if event.client else None)
+        newest.on_click(lambda _: self._start())
+        self._start()
+
+    def _start(self) -> None:
+        """Plays what is chosen, with the newest checkpoint."""
+        with self._lock:
+            self._checkpoint = self._recorder.newest(self._which.value)
+            self._episode = self._recorder.play(self._which.value, int(self._seed.value))
+            self._position = self._waited = 0.0
+
+    def toggle(self) -> None:
+        """Plays or pauses."""
+        with self._lock:
+            self._is_playing = not self._is_playing
+            if self._is_playing and self._is_at_end():
+                self._position = 0.0
+            self._button.label = "Pause" if self._is_playing else "Play"
+            self._button.icon = (
+                viser.Icon.PLAYER_PAUSE if self._is_playing else viser.Icon.PLAYER_PLAY
+            )
+
+    def _seek(self, event: viser.GuiEvent[Any]) -> None:
+        if event.client is not None:  # not by `_show`
+            with self._lock:
+                self._position = float(self._slider.value)
+
+    def _is_at_end(self) -> bool:
+        return self._episode.is_over and self._position >= self._episode.length
+
+    def tick(self, period: float) -> None:
+        """Shows what is due `period` [s] after the last tick."""
+        with self._lock:
+            episode = self._episode
+            if self._is_playing or not episode.frames:
+                self._advance(period)
+            if episode.frames:
+                self._show(episode, min(int(self._position), episode.length))
+            self._describe(episode)
+
+    def _advance(self, period: float) -> None:
+        episode = self._episode
+        if not self._is_at_end():
+            self._position += period * episode.rate * SPEEDS[self._speed.value]
+            self._position = min(self._position, float(episode.length))
+            return
+        if self._follow.value and self._recorder.newest(self._which.value) != self._checkpoint:
+            self._start()
+            return
+        self._waited += period
+        if self._waited >= LINGER and episode.frames:
+            self._position = self._waited = 0.0
+            if self._episodes > 1:
+                following = int(self._seed.value) + 1
+                is_last = following >= self._first + self._episodes
+                self._seed.value = self._first if is_last else following  # type: ignore[misc]
+                self._start()
+
+    def _show(self, episode: RecordedEpisode, index: int) -> None:
+        if self._slider.max != max(1, episode.length):
+            self._slider.max = max(1, episode.length)
+        if self._drawn is not None and self._drawn[0] is episode and self._drawn[1] == index:
+            return
+        self._drawn = (episode, index)
+        assert self._recorder.view is not None
+        self._recorder.view.show(episode.frames[index].seen)
+        self._slider.value = index  # type: ignore[misc]
+
+    def _describe(self, episode: RecordedEpisode) -> None:
+        lines = [f"{episode.policy or episode.which}, seed {episode.seed}"]
+        if episode.frames:
+            index = min(int(self._position), episode.length)
+            frame = episode.frames[index]
+            total = f"of {episode.length}" if episode.is_over else f"of {episode.length}+"
+            lines.append(f"step {index} {total}, return {frame.total_reward:.1f}")
+            lines.append(f"action {frame.action or '-'}")
+        if episode.note:
+            lines.append(episode.note)
+        text = f'<div style="padding: 0.4em 0.8em">{"<br>".join(map(escape, lines))}</div>'
+        if text != self._about.content:
+            self._about.content = text

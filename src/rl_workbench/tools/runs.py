@@ -1,0 +1,205 @@
+"""Run folders as trainings write them: config.json, scalars.csv as it grows, summary.json at the end."""
+
+import csv
+import glob
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from files.content import open_text
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.storage import CONFIG_RECORD
+from rl_workbench.training.scalar_log import EVALUATION, RETURN, SUCCESS
+from rl_workbench.training.scalar_log import NAME as SCALARS
+
+SUMMARY = "summary.json"
+RECORDED = {"env_id": str, "env_kwargs": dict, "exp_name": str, "seed": int}
+
+
+@dataclass(frozen=True)
+class Run:
+    """The folder of one training."""
+
+    folder: Path
+    algorithm: str  # of --algo
+    experiment: str
+    env_id: str
+    env_kwargs: dict[str, Any]  # of the evaluations
+    seed: int
+    config: dict[str, Any]  # the whole record
+
+    @property
+    def name(self) -> str:
+        """The name of the folder."""
+        return self.folder.name
+
+
+class Curve(NamedTuple):
+    """Values over steps of the environment; all (N,), float64."""
+
+    steps: np.ndarray
+    values: np.ndarray
+    times: np.ndarray  # wall-clock time [s since 1970]
+
+
+def open_run(folder: Path) -> Run:
+    """Reads the record of a training.
+
+    Raises:
+        WorkbenchError: if the folder isn't a run folder.
+    """
+    if not folder.is_dir():
+        raise WorkbenchError(f"{folder} is no run folder: there is no such folder")
+    folder = folder.resolve()
+    config = _read_json(folder / CONFIG_RECORD)
+    if config is None:
+        raise WorkbenchError(f"{folder} is no run folder: it has no {CONFIG_RECORD}")
+    try:
+        run = config["run"]
+        for name, kind in RECORDED.items():
+            if not isinstance(run[name], kind) or isinstance(run[name], bool):
+                raise TypeError(f"{name} is {run[name]!r}")
+        env_kwargs = {**run["env_kwargs"], **run.get("eval_env_kwargs", {})}
+        names = run["exp_name"], run["env_id"]
+        return Run(folder, config["algorithm"], *names, env_kwargs, run["seed"], config)
+    except KeyError as error:
+        raise WorkbenchError(f"{folder} is no run folder: its record lacks {error}") from error
+    except TypeError as error:
+        text = f"its record is damaged: {error}"
+        raise WorkbenchError(f"{folder} is no run folder: {text}") from error
+
+
+def _read_json(path: Path) -> Any:
+    """Returns None if there is no such file."""
+    try:
+        with open_text(path) as file:
+            return json.load(file)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
+    except ValueError as error:
+        raise WorkbenchError(f"{path} isn't JSON: {error}") from error
+
+
+def read_leniently(path: Path) -> dict[str, Any]:
+    """Returns the content of a JSON file; an empty dict if it can't be read."""
+    try:
+        content = _read_json(path)
+    except WorkbenchError:
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def summary_of(run: Run) -> dict[str, Any]:
+    """Returns what a training wrote at its end; empty until then.
+
+    Raises:
+        WorkbenchError: if it can't be read, or isn't a summary.
+    """
+    path = run.folder / SUMMARY
+    content = _read_json(path)
+    if content is None:
+        return {}
+    returns = content.get("returns", []) if isinstance(content, dict) else None
+    if not isinstance(returns, list) or not all(isinstance(each, int | float) for each in returns):
+        raise WorkbenchError(f"{path} isn't the summary of a training")
+    return dict(content)
+
+
+def cost_file(folder: Path) -> Path:
+    """Returns the file beside a run folder that says what its processes took."""
+    return folder.with_name(f"{folder.name}.cost.json")
+
+
+def cost_of(folder: Path) -> dict[str, Any]:
+    """Returns the seconds of the clock and of the processor, and when it ran; empty if not known."""
+    return read_leniently(cost_file(folder))
+
+
+def is_run(folder: Path) -> bool:
+    """Returns whether a training has written its record there."""
+    return (folder / CONFIG_RECORD).is_file()
+
+
+def find_runs(patterns: Sequence[str], warn: Callable[[str], None]) -> list[Run]:
+    """Returns the runs of run folders, of patterns such as 'runs/*dqn*', and of folders that hold runs.
+
+    Args:
+        patterns: as the user has typed them; what matches one and isn't a run is skipped.
+        warn: receives a line for each run that is skipped because its record is damaged.
+
+    Raises:
+        WorkbenchError: if a pattern matches no run, or names a run with a damaged record.
+    """
+    found: dict[Path, Run] = {}
+    for pattern in patterns:
+        runs = _matching(pattern, warn)
+        if not runs:
+            raise WorkbenchError(f"there is no run folder at {pattern}")
+        found.update((run.folder, run) for run in runs)
+    return list(found.values())
+
+
+def _matching(pattern: str, warn: Callable[[str], None]) -> list[Run]:
+    path = Path(pattern)
+    if is_run(path):
+        return [open_run(path)]
+    inside = glob.glob(pattern) if not path.is_dir() else [str(each) for each in path.iterdir()]
+    found = []
+    for folder in map(Path, sorted(inside)):
+        if is_run(folder):
+            try:
+                found.append(open_run(folder))
+            except WorkbenchError as error:  # a damaged run must not hide the others
+                warn(f"{error}; skipped")
+    return found
+
+
+def training_curve(run: Run) -> Curve:
+    """Returns the return of each finished training episode.
+
+    Raises:
+        WorkbenchError: if no episode has ended yet, or the table can't be read.
+    """
+    curve = _scalars(run, RETURN)
+    if not len(curve.values):
+        raise WorkbenchError(f"{run.folder}: no episode has ended yet")
+    return curve
+
+
+def success_curve(run: Run) -> Curve:
+    """Returns the success rate of the last 100 training episodes, at each one's end; may be empty."""
+    return evaluation_curve(run, SUCCESS)
+
+
+def evaluation_curve(run: Run, tag: str = EVALUATION) -> Curve:
+    """Returns the mean returns of the evaluations; may be empty.
+
+    Args:
+        tag: EVALUATION for all, CONFIRMED for those that chose the best policy.
+    """
+    if not (run.folder / SCALARS).exists():
+        return Curve(*np.empty((3, 0)))
+    return _scalars(run, tag)
+
+
+def _scalars(run: Run, tag: str) -> Curve:
+    path = run.folder / SCALARS
+    try:
+        with open_text(path) as file:
+            points = [
+                (float(row["step"]), float(row["value"]), float(row["wall_time"]))
+                for row in csv.DictReader(file)
+                # A running training may not have written the end of the last line yet.
+                if row["tag"] == tag and row["wall_time"]
+            ]
+    except OSError as error:
+        raise WorkbenchError(f"can't read {path}: {error.strerror}") from error
+    except (KeyError, ValueError, TypeError, csv.Error) as error:
+        raise WorkbenchError(f"{path} isn't the table of a training: {error}") from error
+    return Curve(*np.array(points, dtype=float).reshape(-1, 3).T)

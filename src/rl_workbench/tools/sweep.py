@@ -1,0 +1,481 @@
+"""`sweep`: Optuna searches for good options; every training is a run folder of its own.
+
+FOLDER/sweep.json         what is searched; the folder takes no other search
+FOLDER/study.journal      the study; the same command goes on with it
+FOLDER/trial_0000/seed_0  a training
+FOLDER/trials.json        the trials and their scores
+FOLDER/best.yaml          the best options, for --config
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import zlib
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from files.content import open_text
+from rl_workbench.env_ids import as_file_name
+from rl_workbench.errors import WorkbenchError, need
+from rl_workbench.option import key_values, unknown
+from rl_workbench.starting import Interrupt
+from rl_workbench.storage import as_json, as_text, check_writable, write_file
+from rl_workbench.tools.flags import add_job_flags, number
+from rl_workbench.tools.job import Job
+from rl_workbench.tools.jobs import JobPool, job_pool
+from rl_workbench.tools.runs import open_run
+from rl_workbench.training import folder as run_folder
+from rl_workbench.training.algorithms import ALGORITHMS
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.options import (
+    RunOptions,
+    default_file,
+    known_options,
+    read_section,
+    section_names,
+)
+from rl_workbench.training.progress import tell
+from rl_workbench.training.scalar_log import EVALUATION
+from viewer.table import GrowingTable
+
+RECORD, JOURNAL, STUDY = "sweep.json", "study.journal", "sweep"
+PRUNERS = ("median", "hyperband", "none")
+RANGES = "sweep.yaml"  # in the package's config
+RANGE_KEYS = ("low", "high", "log", "choices")
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags of the command."""
+    add = parser.add_argument
+    add("--algo", choices=tuple(ALGORITHMS), default="dqn", help="default dqn")
+    add("--env-id", default="CartPole-v1", metavar="ID", help="default CartPole-v1")
+    add("--params", nargs="+", default=[], metavar="KEY=VALUE",
+        help="options of every training, which are then not searched")  # fmt: skip
+    add("--ranges", type=Path, metavar="FILE", help="what is searched (config/sweep.yaml)")
+    add("--trials", type=number(1), default=20, metavar="N", help="in all (default 20)")
+    add("--seeds", type=number(1), default=1, metavar="N",
+        help="trainings of a trial; its score is their mean (default 1)")  # fmt: skip
+    add("--seed", type=number(0), default=0, metavar="N", help="of the search (default 0)")
+    add("--total-timesteps", type=number(1), metavar="N", help="of each training")
+    add("--pruner", choices=PRUNERS, default=PRUNERS[0],
+        help="ends trials whose evaluations fall behind those of others (default median)")  # fmt: skip
+    add_job_flags(parser)
+    add("--out", type=Path, metavar="FOLDER",
+        help="of the study; one that exists is continued (runs/sweep__ENV__ALGO)")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What is searched, and how much."""
+
+    folder: Path
+    algorithm: str
+    options: dict[str, Any]  # of every training
+    ranges: "dict[str, OptionRange]"
+    trials: int  # in all, those of earlier commands included
+    seeds: int  # trainings of one trial
+    seed: int  # of the search
+    pruner: str
+    section: str  # of best.yaml
+
+    def flags(self, values: dict[str, Any]) -> list[str]:
+        """Returns the flags of `train` for a trial, but for name, seed and folder."""
+        options = {**self.options, **values}
+        pairs = [f"{key}={value}" for key, value in options.items()]
+        return ["--algo", self.algorithm, "--params", *pairs]
+
+    def run_options(self, values: dict[str, Any]) -> RunOptions:
+        """Returns the run options of a trial."""
+        _, _, *rest = self.flags(values)
+        return choose(ALGORITHMS[self.algorithm], rest).run
+
+
+def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
+    """Searches until there are as many trials as wanted, or until interrupted.
+
+    Raises:
+        WorkbenchError: if something fails that the user can mend.
+    """
+    need("optuna", "Optuna", "sweep")
+    algorithm, env_id = arguments.algo, arguments.env_id
+    kind = ALGORITHMS[algorithm]
+    known = known_options(kind)
+    fixed: dict[str, Any] = {**key_values(arguments.params, "--params"), "env_id": env_id}
+    if arguments.total_timesteps:
+        fixed["total_timesteps"] = arguments.total_timesteps
+    known.read(fixed, "--params")  # else a mistake would show in every trial
+    ranges = read_ranges(arguments.ranges, algorithm, env_id, known.names)
+    ranges = {name: each for name, each in ranges.items() if name not in fixed}
+    folder = arguments.out or Path(f"runs/sweep__{as_file_name(env_id)}__{algorithm}")
+    sweep = Sweep(
+        folder.resolve(), algorithm, fixed, ranges, arguments.trials, arguments.seeds,
+        arguments.seed, arguments.pruner, kind.section.format(env_id=env_id),
+    )  # fmt: skip
+    sweep.run_options({})
+    check_writable(sweep.folder / RECORD)
+    with run_folder.held(sweep.folder, "another search"), _disk_errors(sweep.folder):
+        _claim(sweep)
+        study = open_study(sweep)
+        with job_pool(arguments, sweep.folder, interrupt) as pool:
+            interrupt.defer()
+            Search(sweep, study, pool, interrupt).run()
+        write_results(sweep, study)
+        if interrupt.requested():
+            tell("interrupted; the same command goes on")
+
+
+@contextlib.contextmanager
+def _disk_errors(folder: Path) -> Iterator[None]:
+    """Optuna writes to the folder, too.
+
+    Raises:
+        WorkbenchError: if the disk refuses.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise WorkbenchError(f"can't write to {folder}: {error.strerror}") from error
+
+
+def _claim(sweep: Sweep) -> None:
+    """Notes what is searched in the folder, or checks that it is the same.
+
+    Raises:
+        WorkbenchError: if it is another search.
+    """
+    wanted = {
+        "algorithm": sweep.algorithm,
+        "options": sweep.options,
+        "ranges": {name: each._asdict() for name, each in sweep.ranges.items()},
+        "seeds": sweep.seeds,
+        "seed": sweep.seed,
+    }
+    path = sweep.folder / RECORD
+    try:
+        with open_text(path) as file:
+            found = json.load(file)
+    except FileNotFoundError:
+        write_file(path, as_json(wanted))
+        return
+    except (OSError, ValueError) as error:
+        raise WorkbenchError(f"can't read {path}: {error}") from error
+    if found != json.loads(json.dumps(wanted)):
+        raise WorkbenchError(
+            f"{sweep.folder} holds a search with other options, ranges or seeds; name another folder "
+            "with --out"
+        )
+
+
+def open_study(sweep: Sweep) -> Any:
+    """Opens or creates the study of a sweep, an `optuna.Study`.
+
+    Raises:
+        WorkbenchError: if there is one that can't be read.
+    """
+    import optuna
+    from optuna.storages.journal import JournalFileBackend
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    path = sweep.folder / JOURNAL
+    _repair(path)
+    try:
+        return optuna.create_study(
+            storage=optuna.storages.JournalStorage(JournalFileBackend(str(path))),
+            study_name=STUDY,
+            direction="maximize",
+            load_if_exists=True,
+            sampler=_seeded_sampler(sweep.seed),
+            pruner=_pruner(sweep),
+        )
+    except OSError:
+        raise
+    except Exception as error:
+        raise WorkbenchError(f"{path} isn't a study that can be used") from error
+
+
+def _repair(path: Path) -> None:
+    """Removes what a kill leaves: the lock, which nobody else can hold, and half a line at the end."""
+    path.with_name(f"{path.name}.lock").unlink(missing_ok=True)
+    with contextlib.suppress(FileNotFoundError):
+        content = path.read_bytes()
+        whole = content.rfind(b"\n") + 1
+        if not whole and content[:1] not in (b"", b"{"):
+            raise WorkbenchError(f"{path} isn't a study that can be used")
+        os.truncate(path, whole)
+
+
+def _seeded_sampler(seed: int) -> Any:
+    """TPE whose draws depend on the trial and the option alone: a search that is killed draws the same."""
+    import numpy as np
+    from optuna.samplers import BaseSampler, TPESampler
+
+    class SeededSampler(BaseSampler):
+        def infer_relative_search_space(self, study: Any, trial: Any) -> dict[str, Any]:
+            return {}
+
+        def sample_relative(self, study: Any, trial: Any, search_space: Any) -> dict[str, Any]:
+            return {}
+
+        def sample_independent(self, study: Any, trial: Any, name: str, distribution: Any) -> Any:
+            entropy = (seed, trial.number, zlib.crc32(name.encode()))
+            (own,) = np.random.SeedSequence(entropy).generate_state(1)
+            sampler = TPESampler(seed=int(own))
+            return sampler.sample_independent(study, trial, name, distribution)
+
+    return SeededSampler()
+
+
+def _pruner(sweep: Sweep) -> Any:
+    from optuna import pruners
+
+    if sweep.pruner == "median":
+        return pruners.MedianPruner()
+    if sweep.pruner == "hyperband":
+        options = sweep.run_options({})
+        least = max(options.eval_frequency, 1)
+        length = options.total_timesteps
+        return pruners.HyperbandPruner(least, max(length, least) if length else "auto")
+    return pruners.NopPruner()
+
+
+class SearchInterrupted(BaseException):
+    """Leaves a trial as it is; Optuna would take an Exception for the trial's failure."""
+
+
+class Search:
+    """Runs the trials of a study.
+
+    Args:
+        sweep: what is wanted.
+        study: from `open_study`.
+        pool: runs the trainings.
+        interrupt: ends the search; trials that are running go on with the next command.
+    """
+
+    def __init__(self, sweep: Sweep, study: Any, pool: JobPool, interrupt: Interrupt) -> None:
+        self._sweep, self._study, self._pool, self._interrupt = sweep, study, pool, interrupt
+
+    def run(self) -> None:
+        """Finishes the trials that an earlier command has left, and makes new ones.
+
+        Raises:
+            OSError: if the disk refuses.
+            WorkbenchError: if a training can't be started.
+        """
+        from optuna.trial import TrialState
+
+        trials = self._study.get_trials(deepcopy=False)
+        left = [each for each in trials if each.state == TrialState.RUNNING]
+        tell(
+            f"{len(trials) - len(left)} of {self._sweep.trials} trials are done: {self._sweep.folder}"
+        )
+        with contextlib.suppress(SearchInterrupted):
+            with ThreadPoolExecutor(self._pool.at_once) as threads:
+                list(threads.map(self._finish, left))
+            self._study.optimize(
+                self._objective,
+                n_trials=max(self._sweep.trials - len(trials), 0),
+                n_jobs=self._pool.at_once,
+                catch=(WorkbenchError,),
+            )
+        if self._pool.failure is not None:  # Optuna loses those of its last trials
+            raise self._pool.failure
+
+    def _finish(self, left: Any) -> None:
+        import optuna
+
+        trial = optuna.trial.Trial(self._study, left._trial_id)
+        with contextlib.suppress(WorkbenchError):
+            try:
+                self._study.tell(trial, self._objective(trial))
+            except optuna.TrialPruned:
+                self._study.tell(trial, state=optuna.trial.TrialState.PRUNED)
+            except WorkbenchError:
+                self._study.tell(trial, state=optuna.trial.TrialState.FAIL)
+
+    def _objective(self, trial: Any) -> float:
+        """Trains all seeds of a trial one after the other; the first one decides whether it is pruned."""
+        import optuna
+
+        sweep = self._sweep
+        values = {name: each.suggest(trial, name) for name, each in sweep.ranges.items()}
+        name = f"trial_{trial.number:04d}"
+        frequency = sweep.run_options(values).eval_frequency
+        judge = Judge(self._study, trial, sweep.folder / name / "seed_0", frequency)
+        scores = []
+        try:
+            for seed in range(sweep.seeds):
+                flags = (f"--exp-name={name}", f"--seed={seed}", *sweep.flags(values))
+                job = Job(f"{name}, seed {seed}", sweep.folder / name / f"seed_{seed}", flags)
+                failure = self._pool.run(job, *([] if seed else [judge.is_promising]))
+                if self._interrupt.requested():
+                    raise SearchInterrupted
+                if not seed and not judge.is_promising():
+                    tell(f"trial {trial.number}: pruned at step {judge.last_step}, {values}")
+                    raise optuna.TrialPruned
+                if failure:
+                    raise WorkbenchError(failure)
+                scores.append(score_of(job))
+        except WorkbenchError as error:
+            trial.set_user_attr("failure", str(error))
+            tell(f"trial {trial.number} failed: {error}")
+            raise
+        score = sum(scores) / len(scores)
+        tell(f"trial {trial.number}: {score:.2f} with {values}")
+        return score
+
+
+class Judge:
+    """Reports the evaluations of a training to Optuna as they come.
+
+    Args:
+        study: of the trial.
+        trial: an `optuna.Trial`.
+        folder: of the run; may not exist yet.
+        frequency: steps between two evaluations that are due; 0 if only the end is evaluated.
+    """
+
+    def __init__(self, study: Any, trial: Any, folder: Path, frequency: int) -> None:
+        self._trial, self._frequency = trial, frequency
+        self._table = GrowingTable(folder)
+        known = study.get_trials(deepcopy=False)[trial.number].intermediate_values
+        self._steps = set(known)
+        self._is_pruned = bool(known) and trial.should_prune()
+
+    @property
+    def last_step(self) -> int:
+        """The step of the last evaluation that was reported."""
+        return max(self._steps, default=0)
+
+    def is_promising(self) -> bool:
+        """Reports new evaluations; returns whether the trial goes on."""
+        has_more = True
+        while has_more:
+            update = self._table.read()
+            has_more = update.has_more
+            for step, tag, value in update.points:
+                if tag == EVALUATION and self._frequency and not self._is_pruned:
+                    # Episodes and vectors pass over some steps: the one that was due is comparable.
+                    self._report(int(step) // self._frequency * self._frequency, value)
+        return not self._is_pruned
+
+    def _report(self, step: int, value: float) -> None:
+        if step not in self._steps:
+            self._steps.add(step)
+            self._trial.report(value, step)
+            self._is_pruned = self._trial.should_prune()
+
+
+def score_of(job: Job) -> float:
+    """Returns the mean return of the best evaluation.
+
+    Raises:
+        WorkbenchError: if the training failed, or was never evaluated.
+    """
+    summary = job.summary()
+    if summary.get("best"):
+        return float(summary["best"][1])
+    open_run(job.folder)  # says what is wrong with it, if something is
+    raise WorkbenchError(
+        f"{job.folder} was never evaluated: eval_frequency is larger than its length"
+    )
+
+
+def write_results(sweep: Sweep, study: Any) -> None:
+    """Writes trials.json and best.yaml, and says which trial was the best."""
+    import yaml
+    from optuna.trial import TrialState
+
+    trials = study.get_trials(deepcopy=False)
+    rows = [
+        {
+            "number": trial.number,
+            "state": trial.state.name.lower(),
+            "score": trial.value,
+            "options": trial.params,
+            "failure": trial.user_attrs.get("failure"),
+            "pruned_at": trial.last_step if trial.state == TrialState.PRUNED else None,
+        }
+        for trial in trials
+    ]
+    write_file(sweep.folder / "trials.json", as_json(rows))
+    if not any(trial.state == TrialState.COMPLETE for trial in trials):
+        tell("no trial has reached its end")
+        return
+    best, path = study.best_trial, sweep.folder / "best.yaml"
+    write_file(path, as_text(yaml.safe_dump({sweep.section: dict(best.params)})))
+    names = [row["state"] for row in rows]
+    counts = ", ".join(f"{names.count(name)} {name}" for name in dict.fromkeys(names))
+    tell(f"{counts}; best: trial {best.number}, {best.value:.2f}; its options are in {path}")
+
+
+class OptionRange(NamedTuple):
+    """The values that an option may have: from low to high, or one of the choices."""
+
+    low: float | int
+    high: float | int
+    log: bool
+    choices: tuple[Any, ...]
+
+    def suggest(self, trial: Any, name: str) -> Any:
+        """Lets Optuna's trial pick a value."""
+        if self.choices:
+            return trial.suggest_categorical(name, self.choices)
+        if isinstance(self.low, int) and isinstance(self.high, int):
+            return trial.suggest_int(name, self.low, self.high, log=self.log)
+        return trial.suggest_float(name, self.low, self.high, log=self.log)
+
+
+def read_ranges(
+    path: Path | None, algorithm: str, env_id: str, known: list[str]
+) -> dict[str, OptionRange]:
+    """Reads the ranges for an algorithm in an environment, or else those for the algorithm.
+
+    learning_rate: {low: 1.0e-4, high: 1.0e-2, log: true}
+    n_step: {low: 1, high: 5}                  # whole numbers, since both ends are
+    hidden_sizes: {choices: ["64,64", "128,128"]}
+
+    Raises:
+        WorkbenchError: if there are none, an option is unknown, or a range makes no sense.
+    """
+    origin = path or default_file(RANGES)
+    names = section_names(f"{algorithm} {{env_id}}", env_id)
+    section = read_section(origin, (*names, algorithm), None)
+    if not section:
+        raise WorkbenchError(f"{origin} has no section {algorithm!r} nor {names[-1]!r}")
+    for name in section:
+        if name not in known:
+            raise WorkbenchError(f"{origin}: {unknown('option', str(name), known)}")
+    return {name: _range(value, f"{origin}: {name}") for name, value in section.items()}
+
+
+def _range(value: Any, origin: str) -> OptionRange:
+    if not isinstance(value, dict) or not value:
+        raise WorkbenchError(f"{origin} needs low and high, or choices, not {value!r}")
+    for key in value:
+        if key not in RANGE_KEYS:
+            raise WorkbenchError(f"{origin}: {unknown('key', str(key), list(RANGE_KEYS))}")
+    choices = value.get("choices")
+    if choices is not None:
+        if not isinstance(choices, list) or not choices:
+            raise WorkbenchError(f"{origin}: choices are a list, not {choices!r}")
+        if any(isinstance(each, list | dict) for each in choices):
+            text = 'choices are single values; sizes are a text, as in "64,64"'
+            raise WorkbenchError(f"{origin}: {text}")
+        return OptionRange(0, 0, False, tuple(choices))
+    low: Any = value.get("low")
+    high: Any = value.get("high")
+    if not _is_number(low) or not _is_number(high) or low > high:
+        raise WorkbenchError(f"{origin} needs numbers low <= high, not {low!r} and {high!r}")
+    log = bool(value.get("log", False))
+    if log and low <= 0:
+        raise WorkbenchError(f"{origin}: a logarithmic range begins above 0, not at {low!r}")
+    return OptionRange(low, high, log, ())
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

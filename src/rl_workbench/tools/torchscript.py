@@ -1,0 +1,303 @@
+"""A run's policy as a TorchScript file, with a description of the policy in the same file.
+
+The content of the file is compared with the policy before it is written.
+"""
+
+import copy
+import io
+import json
+import warnings
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from torch import nn
+
+from files.content import open_file
+from rl_workbench.agents.greedy import Choice
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools.policies import TEST_SEED, LearnedPolicy
+from rl_workbench.tools.runs import Run
+from rl_workbench.training.environments import as_float32
+from rl_workbench.training.folder import LIBRARIES, versions
+
+FORMAT = "rl_workbench policy 1"  # changes when older files can't be read any more
+METADATA = "metadata.json"  # its name within the file
+SAMPLES = 1000  # observations for the comparison
+ROUNDING = 1e-4  # the most that another order of the same float32 sums makes
+Observation = Any  # of one step: a float32 array, or a dict of those
+_DAMAGED = (RuntimeError, ValueError, KeyError, zipfile.BadZipFile, zlib.error)
+
+
+class ExportedPolicy(NamedTuple):
+    """A policy from a file."""
+
+    act: Callable[[Observation], Any]  # greedily, for one observation
+    metadata: dict[str, Any]  # see `export`
+
+
+class Agreement(NamedTuple):
+    """How the actions of a file compare with those of the policy."""
+
+    observations: int
+    equal: int  # observations with bit-identical actions
+    largest_difference: float  # of continuous actions, as a share of the distance of their bounds
+
+
+def open_exported(path: Path) -> ExportedPolicy:
+    """Reads an exported policy. TorchScript is a program: open only files that you trust.
+
+    Raises:
+        WorkbenchError: if there is none, or it is damaged or something else.
+    """
+    try:
+        with open_file(path) as file:
+            content = file.read()
+        # torch doesn't check the sums of a file that it reads.
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            if archive.testzip():
+                raise WorkbenchError(f"{path} is damaged")
+        module, metadata = read(content)
+    except OSError as error:
+        raise WorkbenchError(f"can't read {path}: {error.strerror or error}") from error
+    except _DAMAGED as error:
+        raise WorkbenchError(f"{path} is damaged, or no exported policy") from error
+    if metadata.get("format") != FORMAT:
+        raise WorkbenchError(f"{path} is no exported policy of this version")
+
+    @torch.no_grad()
+    def act(observation: Observation) -> Any:
+        return module(batch([observation]))[0].numpy()[()]
+
+    return ExportedPolicy(act, metadata)
+
+
+def written(module: nn.Module, metadata: dict[str, Any]) -> bytes:
+    """Returns the content of the file."""
+    memory = io.BytesIO()
+    text = json.dumps(metadata, indent=1, allow_nan=False)
+    with _no_deprecation():
+        torch.jit.save(torch.jit.script(module), memory, _extra_files={METADATA: text})
+    return memory.getvalue()
+
+
+def read(content: bytes) -> tuple[torch.jit.ScriptModule, dict[str, Any]]:
+    """Reads what `written` has returned.
+
+    Raises:
+        RuntimeError, ValueError: if it is something else.
+    """
+    extra: dict[str, Any] = {METADATA: ""}
+    with _no_deprecation():
+        module = torch.jit.load(io.BytesIO(content), map_location="cpu", _extra_files=extra)
+    metadata = json.loads(extra[METADATA])
+    return module, metadata if isinstance(metadata, dict) else {}
+
+
+@contextmanager
+def _no_deprecation() -> Iterator[None]:
+    """torch recommends its newer exporters wherever TorchScript is used."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        yield
+
+
+def batch(observations: Sequence[Observation]) -> Any:
+    """Returns observations as a module takes them: a tensor (N, ...), or a dict of those."""
+    first = observations[0]
+    if isinstance(first, dict):
+        return {
+            name: torch.from_numpy(np.stack([each[name] for each in observations]))
+            for name in first
+        }
+    return torch.from_numpy(np.stack(observations))
+
+
+def described(space: spaces.Space[Any]) -> dict[str, Any]:
+    """Returns a space for JSON; infinite bounds are null."""
+    kind = type(space).__name__
+    match space:
+        case spaces.Dict():
+            return {"kind": kind, "spaces": {name: described(each) for name, each in space.items()}}
+        case spaces.Box():
+            bounds = {"low": _finite(space.low), "high": _finite(space.high)}
+            return {"kind": kind, "shape": list(space.shape), "dtype": str(space.dtype), **bounds}
+        case spaces.Discrete():
+            return {"kind": kind, "n": int(space.n), "start": int(space.start)}
+        case spaces.MultiDiscrete():
+            return {"kind": kind, "nvec": space.nvec.tolist()}
+        case spaces.MultiBinary():
+            return {"kind": kind, "shape": list(space.shape)}
+    return {"kind": kind}
+
+
+def _finite(bounds: Any) -> Any:
+    if isinstance(bounds, np.ndarray):
+        return [_finite(each) for each in bounds]
+    return bounds.item() if np.isfinite(bounds) else None
+
+
+class OfVectors(nn.Module):
+    """Maps observations (N, D) of any number type to greedy actions (N, ...)."""
+
+    def __init__(self, network: nn.Module) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        return self.network(self.joined(observations))
+
+    def joined(self, observations: torch.Tensor) -> torch.Tensor:
+        """Returns the input of the network."""
+        return observations.float()
+
+
+class OfDicts(nn.Module):
+    """Maps observations, a dict of (N, ...) of any number type, to greedy actions (N, ...).
+
+    Args:
+        network: takes the parts side by side.
+        names: of the parts, in the network's order.
+    """
+
+    def __init__(self, network: nn.Module, names: Sequence[str]) -> None:
+        super().__init__()
+        self.network, self.names = network, list(names)
+
+    def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
+        return self.network(self.joined(observations))
+
+    def joined(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
+        """Returns the input of the network."""
+        parts = [observations[name].float().flatten(1) for name in self.names]
+        return torch.cat(parts, dim=1)
+
+
+def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement]:
+    """Returns the content of the file, and how it compares with the policy.
+
+    Args:
+        run: the policy's.
+        policy: its environment is stepped.
+        seed: of the observations for the comparison.
+
+    Raises:
+        WorkbenchError: if the environment fails, its observations can't be exported, or the file
+            would act differently.
+    """
+    space, original = policy.env.observation_space, policy.env.unwrapped.observation_space
+    module = _module(policy.network, space, run.env_id)
+    # Read back, because the content of the file is what has to agree.
+    agreement = _compare(read(written(module, {}))[0], module, policy, _observations(policy, seed))
+    metadata = {
+        "format": FORMAT,
+        "env_id": run.env_id,
+        "env_kwargs": run.env_kwargs,
+        "algorithm": run.algorithm,
+        "experiment": run.experiment,
+        "seed": run.seed,
+        "checkpoint": policy.checkpoint.name,
+        "steps": policy.steps,
+        "observation_space": described(space),
+        "flattened_from": None if original == space else described(original),
+        "action_space": described(policy.env.action_space),
+        "agreement": agreement._asdict(),
+        "versions": {name: each for name, each in versions().items() if name in LIBRARIES},
+    }
+    return written(module, metadata), agreement
+
+
+def _module(network: nn.Module, space: spaces.Space[Any], env_id: str) -> OfVectors | OfDicts:
+    own = copy.deepcopy(network).cpu().eval().requires_grad_(False)
+    for layer in own.modules():
+        if isinstance(layer, nn.Linear):  # TorchScript doesn't know NumPy's integers
+            layer.in_features, layer.out_features = int(layer.in_features), int(layer.out_features)
+    if not isinstance(space, spaces.Dict):
+        return OfVectors(own)
+    for name, part in space.items():
+        if not isinstance(part, spaces.Box) or not np.issubdtype(part.dtype, np.floating):
+            raise WorkbenchError(
+                f"a policy of {env_id} can't be exported: part {name} of its observations is {part}"
+            )
+    return OfDicts(own, list(space))
+
+
+def _observations(policy: LearnedPolicy, seed: int) -> list[Observation]:
+    """Half of them from episodes with greedy and random actions in turn, half scattered around those."""
+    env = policy.env
+    env.action_space.seed(seed)
+    met: list[Observation] = []
+    observation, _ = env.reset(seed=TEST_SEED + seed)
+    while len(met) < SAMPLES // 2:
+        met.append(as_float32(observation))
+        action = policy.act(met[-1]) if len(met) % 2 else env.action_space.sample()
+        observation, _, terminated, truncated, _ = env.step(action)
+        if terminated or truncated:
+            observation, _ = env.reset()
+    return met + _scattered(met, np.random.default_rng(seed))
+
+
+def _scattered(met: list[Observation], generator: np.random.Generator) -> list[Observation]:
+    if isinstance(met[0], dict):
+        parts = [_scattered([each[name] for each in met], generator) for name in met[0]]
+        return [dict(zip(met[0], each, strict=True)) for each in zip(*parts, strict=True)]
+    vectors = np.stack(met)
+    spread = 3.0 * vectors.std(axis=0) + 0.1
+    return list((vectors + spread * generator.normal(size=vectors.shape)).astype(np.float32))
+
+
+def _compare(
+    file: torch.jit.ScriptModule,
+    module: OfVectors | OfDicts,
+    policy: LearnedPolicy,
+    observations: list[Observation],
+) -> Agreement:
+    """Compares the file, for all observations at once and for single ones, with the policy.
+
+    Raises:
+        WorkbenchError: if actions differ by more than rounding.
+    """
+    wanted = np.stack([np.asarray(policy.act(each)) for each in observations])
+    with torch.no_grad():
+        together = file(batch(observations)).numpy()
+        singly = torch.cat([file(batch([each])) for each in observations]).numpy()
+    results = [_differences(found, wanted, policy.env.action_space) for found in (together, singly)]
+    equal = np.logical_and(*(same for same, _ in results))
+    distances = np.maximum(*(distance for _, distance in results))
+    if isinstance(module.network, Choice):  # where two actions are as good as tied, either is right
+        with torch.no_grad():
+            margins = module.network.margins(module.joined(batch(observations)))
+        close = margins.numpy() <= ROUNDING
+    else:
+        close = distances <= ROUNDING
+    others = int((~equal & ~close).sum())
+    if others:
+        raise WorkbenchError(
+            f"not written: in {others} of {len(wanted)} observations the file acts otherwise than "
+            "the run's policy"
+        )
+    return Agreement(len(wanted), int(equal.sum()), float(distances.max()))
+
+
+def _differences(
+    found: np.ndarray, wanted: np.ndarray, space: spaces.Space[Any]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which actions are the same, (N,), and how far continuous ones are apart, see `Agreement`: (N,)."""
+    if found.shape != wanted.shape:
+        raise WorkbenchError(
+            f"not written: the shape of its actions is {found.shape[1:]}, that of the run's "
+            f"{wanted.shape[1:]}"
+        )
+    same = (found == wanted).reshape(len(wanted), -1).all(axis=1)
+    if not isinstance(space, spaces.Box):
+        return same, np.zeros(len(wanted))
+    extent = space.high.astype(float) - space.low
+    extent = np.where(np.isfinite(extent) & (extent > 0.0), extent, 1.0)
+    distances = np.abs(found.astype(float) - wanted) / extent
+    return same, distances.reshape(len(wanted), -1).max(axis=1)

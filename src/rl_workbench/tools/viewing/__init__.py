@@ -1,1 +1,0 @@
-"""A run on a page in the browser: its curves, and episodes of its policies."""

@@ -1,0 +1,203 @@
+"""What the frame of a training (training.py) asks of an algorithm, and what it offers to it.
+
+The frame opens and resumes, evaluates, saves and reports. An algorithm says what it is made of, what its
+loop does, and what a checkpoint holds.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import gymnasium
+import numpy as np
+from torch import nn
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.options import TrainingOptions
+from rl_workbench.training.scalar_log import ScalarLog
+
+Say = Callable[[str], None]  # reports a line to the user
+
+
+class Frame(Protocol):
+    """The frame, as an algorithm sees it while it learns."""
+
+    @property
+    def log(self) -> ScalarLog:
+        """For the algorithm's own figures."""
+        ...
+
+    @property
+    def folder(self) -> Path:
+        """The run folder, for the algorithm's own files."""
+        ...
+
+    def is_over(self) -> bool:
+        """Returns whether to stop: the training is complete, or the user interrupts."""
+        ...
+
+    def is_interrupted(self) -> bool:
+        """Returns whether the user interrupts."""
+        ...
+
+    def episode_done(
+        self,
+        total_reward: float,
+        length: int,
+        scalars: Mapping[str, float],
+        note: str = "",
+        success: bool | None = None,
+        step: int | None = None,
+    ) -> None:
+        """Records an episode.
+
+        Args:
+            total_reward: The undiscounted return.
+            length: Its steps.
+            scalars: The algorithm's own figures, logged at the step of the episode's end.
+            note: Shown in the line of every 20th episode, instead of the speed.
+            success: Whether it reached its goal; None if the environment doesn't say.
+            step: The step of its end; None means now.
+        """
+        ...
+
+    def step_done(self) -> None:
+        """Evaluates and saves what is due. The training must be able to continue from here."""
+        ...
+
+
+class Algorithm(ABC):
+    """One algorithm at work in its environments."""
+
+    env: gymnasium.Env[Any, Any]  # learned in, and evaluated in where there is no other
+
+    @property
+    @abstractmethod
+    def steps(self) -> int:
+        """Steps of the environment that were learned from."""
+
+    @property
+    def stride(self) -> int:
+        """Steps between the last two calls of `step_done`."""
+        return 1
+
+    @abstractmethod
+    def start_environment(self, state: Any, say: Say) -> None:
+        """Seeds the environment, then brings it to where `environment_state` found it.
+
+        Args:
+            state: What that returned; None in a new training.
+            say: Is called if the environment can't be brought there.
+        """
+
+    @abstractmethod
+    def learn(self, frame: Frame) -> None:
+        """Learns until it is over. It calls `frame.step_done()` wherever it can be saved.
+
+        Raises:
+            WorkbenchError: If the environment or the arithmetic fails.
+        """
+
+    @abstractmethod
+    def act_greedily(self, observation: np.ndarray) -> Any:
+        """Returns the best action for an observation (D,)."""
+
+    def check_weights(self) -> None:
+        """Refuses NaN in the weights, where learning doesn't check for it.
+
+        Raises:
+            WorkbenchError: If a weight isn't finite.
+        """
+        return
+
+    @abstractmethod
+    def state_dict(self) -> dict[str, Any]:
+        """Returns all that it learned, as plain values and tensors."""
+
+    @abstractmethod
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Loads what `state_dict` returned, from a checkpoint that may hold more.
+
+        Raises:
+            WorkbenchError: If the state doesn't fit.
+        """
+
+    @abstractmethod
+    def environment_state(self) -> Any:
+        """Returns where the environment is, as plain values and tensors."""
+
+    def leave_environment(self) -> Any:
+        """Returns what `restore_environment` needs after an evaluation in this environment."""
+        return self.environment_state()
+
+    def restore_environment(self, state: Any, say: Say) -> None:
+        """Brings the environment back after an evaluation in it.
+
+        Args:
+            state: What `leave_environment` returned.
+            say: Is called if the environment can't be brought back.
+        """
+        raise NotImplementedError
+
+    def settle(self) -> bool:
+        """Discards what was under way when something failed.
+
+        Returns:
+            Whether the training can be saved now and continued.
+        """
+        return False
+
+    def export(self, folder: Path) -> None:
+        """Writes the networks in further formats, if it has any.
+
+        Raises:
+            OSError: If a file can't be written.
+        """
+        return
+
+    def close(self) -> None:
+        """Closes the environments."""
+        self.env.close()
+
+
+def make_algorithm(options: TrainingOptions) -> Algorithm:
+    """Makes a new training's algorithm with its environments.
+
+    Raises:
+        WorkbenchError: If an environment can't be made, or doesn't suit.
+    """
+    made: Algorithm = import_module(options.kind.implementation).make(options)
+    return made
+
+
+class Policy(NamedTuple):
+    """A learned policy."""
+
+    act: Callable[[Any], Any]  # greedily, for one observation: (D,), or a dict as it learned from
+    preference: Callable[[np.ndarray], np.ndarray]  # of (N, D): (N,), see meaning
+    meaning: str  # of the preference: positive is the last action, or a push to the right
+    network: nn.Module  # for TorchScript: of (N, D), float32, a Dict's parts side by side: (N, ...)
+
+
+def load_policy(
+    options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any], origin: str
+) -> Policy:
+    """Makes the policy of a checkpoint.
+
+    Args:
+        options: Of its training.
+        content: Of the checkpoint.
+        env: An environment like the one that it learned in.
+        origin: The checkpoint's file, for errors.
+
+    Raises:
+        WorkbenchError: If the checkpoint doesn't fit the options or the environment.
+    """
+    try:
+        made: Policy = import_module(options.kind.implementation).load_policy(options, content, env)
+        return made
+    except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
+        reason = str(error).split("\n")[0]
+        raise WorkbenchError(f"{origin} doesn't fit {options.run.env_id}: {reason}") from error

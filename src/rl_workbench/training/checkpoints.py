@@ -1,0 +1,189 @@
+"""Checkpoints of a training that can be resumed: whole or absent, checked when read.
+
+    RUN_DIR/checkpoints/step_000005000.pt   the newest few
+    RUN_DIR/last.pt, RUN_DIR/best.pt        further names of two of them
+
+Each holds everything; `last.pt` is the newest, `best.pt` the one of the best evaluation.
+"""
+
+import contextlib
+import errno
+import os
+import pickle
+import shutil
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from files.content import open_file
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.storage import save_tensors
+
+LAST, BEST, FAILURE = "last.pt", "best.pt", "failure.pt"
+FOLDER = "checkpoints"
+LEFTOVERS = (".*.pt.*", ".*.pt.new", ".*.pth.*", ".*.json.*", ".*.png.*")  # of a kill while writing
+FORMAT = "rl_workbench 2"  # changes when older files can't be read any more
+_DAMAGED = (RuntimeError, pickle.UnpicklingError, EOFError, ValueError, KeyError, TypeError,
+            AttributeError, IndexError, zipfile.BadZipFile, zlib.error)  # fmt: skip
+_MISFITS = (LookupError, TypeError, ValueError, RuntimeError, AttributeError, ArithmeticError)
+
+
+class Checkpoints:
+    """Writes the checkpoints of one run, while its folder is the one in which the run began.
+
+    Args:
+        run: the run's folder.
+        keep: how many of the newest stay; 0: all.
+    """
+
+    def __init__(self, run: Path, keep: int) -> None:
+        self._run = run
+        self._keep = keep
+        self._place = run.stat()
+
+    def are_in_place(self) -> bool:
+        """Whether the folder is still where it was."""
+        try:
+            return os.path.samestat(self._run.stat(), self._place)
+        except FileNotFoundError:
+            return False
+
+    def check_place(self) -> None:
+        """Another run may lie there by now, which is not to be written over.
+
+        Raises:
+            OSError: if the folder isn't the one in which the training began.
+        """
+        if not self.are_in_place():
+            moved = "the folder was moved or removed"
+            raise FileNotFoundError(errno.ENOENT, moved, str(self._run))
+
+    def save(self, step: int, content: dict[str, Any], best: bool = False) -> None:
+        """Writes a checkpoint, and makes it the last one and, if so told, the best one.
+
+        Raises:
+            OSError: if the disk refuses, or it is another folder; the earlier checkpoints are untouched.
+        """
+        self.check_place()
+        path = self._run / FOLDER / f"step_{step:09d}.pt"
+        path.parent.mkdir(exist_ok=True)
+        save_tensors(path, {"format": FORMAT, **content})
+        # The last one last: killed in between, a training goes on from before its best step.
+        for name in (BEST, LAST) if best else (LAST,):
+            give_name(path, self._run / name)
+        if self._keep:
+            for old in _numbered(self._run)[self._keep :]:
+                if old != path:
+                    old.unlink()
+
+    def save_failure(self, content: dict[str, Any]) -> None:
+        """Writes `failure.pt`: what was learned until something failed, in the midst of a step.
+
+        No training goes on from it: from `last.pt` it comes to the same place again, exactly.
+        """
+        path = self._run / FAILURE
+        with contextlib.suppress(OSError):  # a full disk may well be the failure
+            self.check_place()
+            save_tensors(path, {"format": FORMAT, **content})
+
+    def remove_leftovers(self) -> None:
+        """Removes what a training that was killed had begun to write; nobody else may write.
+
+        Raises:
+            OSError: if the disk refuses.
+        """
+        for folder in (self._run, self._run / FOLDER):
+            for pattern in LEFTOVERS:
+                for path in folder.glob(pattern):
+                    path.unlink()
+
+
+def give_name(path: Path, name: Path) -> None:
+    """Gives a file a second name, in one step; a copy where the disk knows no second names."""
+    temporary = name.with_name(f".{name.name}.new")
+    temporary.unlink(missing_ok=True)
+    try:
+        os.link(path, temporary)
+    except OSError:
+        shutil.copyfile(path, temporary)
+    os.replace(temporary, name)
+
+
+def _numbered(run: Path) -> list[Path]:
+    """The checkpoints of a run by number, the newest first."""
+    paths = (run / FOLDER).glob("step_*.pt")
+    return sorted(paths, key=lambda path: (len(path.name), path.name), reverse=True)
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Reads one checkpoint into main memory, safely: it can't run code.
+
+    Raises:
+        WorkbenchError: if there is none, or it is damaged or something else.
+    """
+    try:
+        # torch doesn't look at the check sums of a file that it reads.
+        with open_file(path) as file:
+            with zipfile.ZipFile(file) as archive:
+                bad = archive.testzip()
+            if bad:
+                raise WorkbenchError(f"{path} is damaged")
+            file.seek(0)
+            content = torch.load(file, map_location="cpu", weights_only=True)
+    except OSError as error:
+        raise WorkbenchError(f"can't read {path}: {error.strerror or error}") from error
+    except _DAMAGED as error:
+        raise WorkbenchError(f"{path} is damaged, or no checkpoint") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise WorkbenchError(f"{path} is no checkpoint of this version")
+    return content
+
+
+@contextlib.contextmanager
+def fitting(what: str) -> Iterator[None]:
+    """Tells in one line if what is taken over from a checkpoint doesn't fit.
+
+    Args:
+        what: is taken over, for the error.
+
+    Raises:
+        WorkbenchError: if it doesn't.
+    """
+    try:
+        yield
+    except _MISFITS as error:
+        text = str(error).split("\n")[0] or type(error).__name__
+        raise WorkbenchError(f"the checkpoint holds another {what}: {text}") from error
+
+
+def read_newest(run: Path, say: Callable[[str], None]) -> dict[str, Any]:
+    """The last checkpoint, or the newest before it that can be read; says what is passed over.
+
+    Raises:
+        WorkbenchError: if there is none.
+    """
+    for path in candidates(run):
+        try:
+            return read(path)
+        except WorkbenchError as error:
+            say(f"{error}; looking for an earlier one")
+    raise WorkbenchError(f"{run} holds no checkpoint to go on from")
+
+
+def candidates(run: Path, best_first: bool = False) -> list[Path]:
+    """Checkpoints in the order in which to try them; each file once, whatever its names.
+
+    That is last.pt, the numbered ones from the newest on, and best.pt at the end or, if so told,
+    at the beginning.
+    """
+    best, others = [run / BEST], [run / LAST, *_numbered(run)]
+    found: dict[tuple[int, int], Path] = {}
+    for path in best + others if best_first else others + best:
+        with contextlib.suppress(FileNotFoundError):
+            status = path.stat()
+            found.setdefault((status.st_dev, status.st_ino), path)
+    return list(found.values())

@@ -1,1 +1,0 @@
-"""Many machines: a cluster of Ray's, joined or started here."""

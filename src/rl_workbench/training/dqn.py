@@ -1,0 +1,156 @@
+"""DQN at work: one step of the environment at a time, and what follows from it."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from rl_workbench.agents.dqn_agent import DQNAgent, Learned
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import number, sequence
+from rl_workbench.training.algorithm import Algorithm, Frame, Policy, Say
+from rl_workbench.training.checkpoints import fitting
+from rl_workbench.training.environments import (
+    as_vector,
+    discrete_actions,
+    in_its_environments,
+    succeeded,
+)
+from rl_workbench.training.options import TrainingOptions
+from rl_workbench.training.repeatable import RepeatableEnvironment
+
+
+def make(options: TrainingOptions) -> "DQNTraining":
+    """A new training; see `make_algorithm`."""
+    return in_its_environments(
+        options, lambda envs: DQNTraining(options, envs[0], make_agent(options, envs[0]))
+    )
+
+
+def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> DQNAgent:
+    """A new agent for an environment.
+
+    Raises:
+        WorkbenchError: if the environment's actions don't suit DQN, or torch lacks the device.
+    """
+    run = options.run
+    actions = discrete_actions(env, run.env_id, "DQN")
+    shape = env.observation_space.shape or (0,)
+    try:
+        return DQNAgent(options.hyperparameters, shape[0], actions, run.seed, run.device)
+    except (RuntimeError, AssertionError) as error:
+        text = str(error).splitlines()[0]
+        raise WorkbenchError(f"torch can't use the device {run.device!r}: {text}") from error
+
+
+def load_policy(
+    options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
+) -> Policy:
+    """The policy of a checkpoint; see `policy.load_policy`."""
+    agent = make_agent(options, env)
+    agent.load_policy_state(content)
+
+    def preference(observations: np.ndarray) -> np.ndarray:
+        values = agent.q_values(observations)
+        return np.asarray(values[:, -1] - values[:, 0])
+
+    network = agent.greedy_network()
+    return Policy(agent.act_greedily, preference, "Q(right) - Q(left)", network)
+
+
+class DQNTraining(Algorithm):
+    """Steps the environment and lets the agent learn.
+
+    Args:
+        options: what the user chose.
+        env: is learned in.
+        agent: it counts the steps.
+    """
+
+    def __init__(
+        self, options: TrainingOptions, env: gymnasium.Env[Any, Any], agent: DQNAgent
+    ) -> None:
+        self.env, self._agent = env, agent
+        self._seed, self._log_frequency = options.run.seed, options.run.log_frequency
+        self._place = RepeatableEnvironment(env)
+        self._observation: np.ndarray | None = None  # None: an episode has to be begun
+        self._reward = 0.0  # of the episode so far
+        self._last: Learned | None = None
+
+    @property
+    def steps(self) -> int:
+        """See `Algorithm.steps`."""
+        return self._agent.steps
+
+    def act_greedily(self, observation: np.ndarray) -> int:
+        """See `Algorithm.act_greedily`."""
+        return self._agent.act_greedily(observation)
+
+    def learn(self, frame: Frame) -> None:
+        """See `Algorithm.learn`."""
+        while not frame.is_over():
+            self._step(frame)
+            if self._last is not None and self.steps % self._log_frequency == 0:
+                frame.log.add(
+                    self.steps,
+                    {"losses/td_loss": self._last.td_loss, "losses/q_values": self._last.q_values},
+                )
+            frame.step_done()
+
+    def _step(self, frame: Frame) -> None:
+        agent, place = self._agent, self._place
+        observation = self._observation
+        if observation is None:
+            observation = as_vector(place.reset()[0])
+        action = agent.act(observation)
+        seen, reward, terminated, truncated, info = place.step(action)
+        following, reward = as_vector(seen), float(reward)
+        self._reward += reward
+        agent.observe((observation, action, reward), following, bool(terminated), bool(truncated))
+        if agent.is_due:
+            self._last = agent.learn()
+        self._observation = following
+        if terminated or truncated:
+            agent.episode_done()
+            total, self._reward, self._observation = self._reward, 0.0, None
+            scalars, note = {"charts/epsilon": agent.epsilon}, f"ε: {agent.epsilon:.3f}"
+            frame.episode_done(total, place.length, scalars, note, succeeded(info))
+
+    def state_dict(self) -> dict[str, Any]:
+        """See `Algorithm.state_dict`."""
+        return self._agent.state_dict()
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """See `Algorithm.load_state_dict`."""
+        with fitting("agent"):
+            self._agent.load_state_dict(state)
+
+    def environment_state(self) -> dict[str, Any]:
+        """The episode under way, if there is one, the generator, and the last loss."""
+        under_way = self._observation is not None
+        return {
+            "episode": self._place.state_dict() if under_way else None,
+            "generator": self._place.generator,
+            "reward": self._reward,
+            "last": None if self._last is None else list(self._last),
+        }
+
+    def start_environment(self, state: dict[str, Any] | None, say: Say) -> None:
+        """See `Algorithm.start_environment`."""
+        self._place.reset(seed=self._seed)  # the episodes' own resets go on from here
+        if state is not None:
+            self.restore_environment(state, say)
+
+    def restore_environment(self, state: dict[str, Any], say: Say) -> None:
+        """Repeats the episode under way; says so if it goes another way."""
+        last = state["last"]
+        self._last = None if last is None else Learned(*map(number, sequence(last, 2)))
+        self._place.generator = state["generator"]
+        if state["episode"] is None:
+            return
+        self._observation = self._place.load_state_dict(state["episode"])
+        self._reward = number(state["reward"])
+        if self._observation is None:
+            say("the environment doesn't repeat itself: the episode under way is given up")
+            self._reward = 0.0
+            self._agent.episode_done()

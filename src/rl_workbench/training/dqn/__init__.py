@@ -1,1 +1,0 @@
-"""A training by DQN."""

@@ -1,0 +1,278 @@
+"""The environments of a training: made by Gymnasium's id, in the form that an agent needs.
+
+Environments may have attributes that they are asked for by name: `shares_robot` (true if all copies move the
+same robot), `own_robot_options` (the options by which a copy has a robot of its own), and
+`side_by_side(count)` (a context manager within which that many start, or close, at the same time).
+"""
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
+from typing import Any, TypeGuard, TypeVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from rl_workbench.env_ids import import_module_of, unknown_environment
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, installing
+from rl_workbench.training.checked import CheckedEnvironment
+from rl_workbench.training.options import TrainingOptions
+
+FLAT = (spaces.Box, spaces.Discrete, spaces.MultiBinary, spaces.MultiDiscrete)
+# What constructors raise about options that make no sense to them.
+_REFUSED = (gymnasium.error.Error, ImportError, TypeError, ValueError, LookupError, AssertionError)
+Made = TypeVar("Made")
+
+
+def make_environment(
+    env_id: str, options: Mapping[str, Any] | None = None, *, keep_dict: bool = False
+) -> CheckedEnvironment:
+    """Makes an environment that refuses observations and rewards that aren't finite.
+
+    Args:
+        env_id: Gymnasium's, also as module:id.
+        options: Of the environment.
+        keep_dict: Leave a Dict of arrays as it is. Other observations are flattened to a vector (D,).
+
+    Raises:
+        WorkbenchError: If there is no such environment, something that it needs isn't installed, or its
+            options make no sense.
+    """
+    import_module_of(env_id)
+    try:
+        env: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **(options or {}))
+    except gymnasium.error.DependencyNotInstalled as error:
+        # Without ws, Gymnasium's own text names the command.
+        workspace = os.environ.get("CARTPOLE_WS")
+        hint = f" ({installing(env_id)} may install them)" if workspace else ""
+        raise WorkbenchError(f"{env_id} needs more packages{hint}: {error}") from error
+    except (gymnasium.error.UnregisteredEnv, gymnasium.error.DeprecatedEnv) as error:
+        raise WorkbenchError(unknown_environment(env_id)) from error
+    except _REFUSED as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise WorkbenchError(f"can't make {env_id}: {reason}") from error
+    except (Exception, SystemExit) as error:
+        raise EnvironmentFailure(f"can't make {env_id}: {error_line(error)}") from error
+    space = env.observation_space
+    if (
+        keep_dict
+        and isinstance(space, spaces.Dict)
+        and all(_is_box(part) for part in space.values())
+    ):
+        return CheckedEnvironment(env, env_id)
+    if not (_is_box(space) and len(space.shape or ()) == 1):
+        if not _is_numbers(space):
+            env.close()
+            raise WorkbenchError(
+                f"{env_id} observes {space}; agents learn only from vectors of numbers"
+            )
+        env = gymnasium.wrappers.FlattenObservation(env)
+    return CheckedEnvironment(env, env_id)
+
+
+def environment_for(options: TrainingOptions, given: Mapping[str, Any]) -> CheckedEnvironment:
+    """Makes an environment as a training's algorithm observes it.
+
+    Args:
+        options: Of the training.
+        given: The environment's own options.
+
+    Raises:
+        WorkbenchError: See `make_environment`.
+    """
+    return make_environment(options.run.env_id, given, keep_dict=options.kind.keeps_dict)
+
+
+def in_its_environments(
+    options: TrainingOptions, make: Callable[[list[gymnasium.Env[Any, Any]]], Made]
+) -> Made:
+    """Makes an algorithm in new environments. It closes them if they don't suit the algorithm.
+
+    Raises:
+        WorkbenchError: If the environments can't be made, or don't suit.
+    """
+    envs = training_environments(options)
+    with ExitStack() as making:
+        making.callback(close_all, envs)
+        made = make(envs)
+        making.pop_all()
+    return made
+
+
+def training_environments(options: TrainingOptions) -> list[gymnasium.Env[Any, Any]]:
+    """Makes the `num_envs` environments of a training, each with a robot of its own.
+
+    The caller closes them with `close_all`.
+
+    Raises:
+        WorkbenchError: If they can't be made, or all would move the same robot.
+    """
+    run, given = options.run, options.run.training_environment
+    first = environment_for(options, given)
+    count = run.num_envs
+    if count == 1:
+        return [first]
+    made = [first]
+    with ExitStack() as making:
+        making.callback(close_all, made)
+        if shares_robot(first):
+            own_robot = _attribute(first, "own_robot_options")
+            if not own_robot:
+                raise WorkbenchError(
+                    f"{run.env_id} moves a robot that there is only one of: num_envs must be 1, not {count}"
+                )
+            made.pop().close()
+            given = {**given, **own_robot}
+        with _side_by_side(first, count - len(made)):
+            for index in range(len(made), count):
+                with _numbered(index, count):
+                    made.append(environment_for(options, given))
+        making.pop_all()
+    return [NumberedEnvironment(env, index, count) for index, env in enumerate(made)]
+
+
+class NumberedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """One of several environments: its errors have its number.
+
+    Args:
+        env: The environment.
+        index: Its number, from 0 on.
+        count: How many there are.
+    """
+
+    env: CheckedEnvironment
+
+    def __init__(self, env: CheckedEnvironment, index: int, count: int) -> None:
+        super().__init__(env)
+        self._index, self._count = index, count
+
+    def begin_step(self, action: Any) -> None:
+        """Begins a step; see `CheckedEnvironment.begin_step`."""
+        with _numbered(self._index, self._count):
+            self.env.begin_step(action)
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        with _numbered(self._index, self._count):
+            return self.env.step(action)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        with _numbered(self._index, self._count):
+            return self.env.reset(seed=seed, options=options)
+
+    def close(self) -> None:
+        with _numbered(self._index, self._count):
+            self.env.close()
+
+
+@contextmanager
+def _numbered(index: int, count: int) -> Iterator[None]:
+    try:
+        yield
+    except WorkbenchError as error:
+        text = f"environment {index + 1} of {count}: {error}"
+        raise type(error)(text) from error.__cause__
+
+
+def close_all(envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
+    """Closes environments, the others too if one fails.
+
+    Raises:
+        WorkbenchError: If one fails.
+    """
+    if not envs:
+        return
+    with _side_by_side(envs[0], len(envs)), ExitStack() as closing:
+        for env in envs:
+            closing.callback(env.close)
+
+
+@contextmanager
+def _side_by_side(env: gymnasium.Env[Any, Any], count: int) -> Iterator[None]:
+    """Lets environments like `env` start or close at the same time, if they can."""
+    waiting = _attribute(env, "side_by_side")
+    try:
+        with waiting(count) if waiting else nullcontext():
+            yield
+    except gymnasium.error.Error as error:  # its text is made for the user
+        raise WorkbenchError(str(error) or type(error).__name__) from error
+
+
+def shares_robot(env: gymnasium.Env[Any, Any]) -> bool:
+    """Returns whether another environment of this kind would move the same robot."""
+    return bool(_attribute(env, "shares_robot"))
+
+
+def _attribute(env: gymnasium.Env[Any, Any], name: str) -> Any:
+    return env.get_wrapper_attr(name) if env.has_wrapper_attr(name) else None
+
+
+# --- spaces -------------------------------------------------------------------------------------
+
+
+def _is_box(space: gymnasium.Space[Any]) -> TypeGuard[spaces.Box]:
+    return isinstance(space, spaces.Box)
+
+
+def _is_numbers(space: gymnasium.Space[Any]) -> bool:
+    if isinstance(space, spaces.Dict | spaces.Tuple):
+        parts = space.values() if isinstance(space, spaces.Dict) else space
+        return all(map(_is_numbers, parts))
+    return isinstance(space, FLAT)
+
+
+def has_goal(space: gymnasium.Space[Any]) -> bool:
+    """Returns whether observations contain a goal, in Gymnasium-Robotics' form."""
+    goal = {"observation", "achieved_goal", "desired_goal"}
+    return isinstance(space, spaces.Dict) and goal <= space.keys()
+
+
+def is_continuous(space: gymnasium.Space[Any]) -> TypeGuard[spaces.Box]:
+    """Returns whether actions are arrays of real numbers."""
+    return isinstance(space, spaces.Box) and np.issubdtype(space.dtype, np.floating)
+
+
+def discrete_actions(env: gymnasium.Env[Any, Any], env_id: str, algorithm: str) -> int:
+    """Returns the number of discrete actions.
+
+    Raises:
+        WorkbenchError: If the actions aren't the numbers from 0 on. The text names algorithms that fit.
+    """
+    space = env.action_space
+    if isinstance(space, spaces.Discrete) and space.start == 0:
+        return int(space.n)
+    fits = "Stable-Baselines3's ppo or a2c"
+    if isinstance(space, spaces.Box):
+        fits = "reinforce, or Stable-Baselines3's ppo, a2c, sac, td3 or ddpg"
+    raise WorkbenchError(
+        f"{algorithm} needs discrete actions, Discrete(n); {env_id} has {space}. "
+        f"--algo {fits}: these fit it"
+    )
+
+
+# --- observations and results -------------------------------------------------------------------
+
+
+def as_float32(observation: Any) -> Any:
+    """Returns an observation as networks take it: an array, or a dict of arrays."""
+    if isinstance(observation, dict):
+        return {name: np.asarray(part, np.float32) for name, part in observation.items()}
+    return np.asarray(observation, np.float32)
+
+
+def as_vector(observation: Any) -> np.ndarray:
+    """Returns all numbers of an observation, (D,), float32.
+
+    It is a copy: an environment may well write into the array that it returned.
+    """
+    if isinstance(observation, dict):
+        return np.concatenate([np.ravel(part) for part in observation.values()], dtype=np.float32)
+    return np.array(observation, dtype=np.float32)
+
+
+def succeeded(info: Mapping[str, Any]) -> bool | None:
+    """Returns whether the episode that ends with this info succeeded; None if it doesn't say."""
+    value = info.get("is_success")
+    return None if value is None else bool(np.all(value))

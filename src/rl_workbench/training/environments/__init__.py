@@ -1,1 +1,0 @@
-"""Gymnasium's environments, as agents want them."""

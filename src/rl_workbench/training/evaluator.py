@@ -1,0 +1,158 @@
+"""What a policy is worth: greedy episodes that leave nothing behind in the training."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.algorithm import Algorithm, Say
+from rl_workbench.training.environments import as_float32, environment_for, shares_robot, succeeded
+from rl_workbench.training.generators import random_states, restore_random_states
+from rl_workbench.training.options import TrainingOptions
+
+EVALUATION_SEED = 1_000_000  # added to the training's: other episodes than those learned from
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Lengths [steps], undiscounted returns and successes, one for each episode."""
+
+    lengths: list[int]
+    returns: list[float]
+    successes: list[bool] = field(default_factory=list)  # of those that say whether they are one
+
+    @property
+    def mean_length(self) -> float:
+        return float(np.mean(self.lengths))
+
+    @property
+    def mean_return(self) -> float:
+        return float(np.mean(self.returns))
+
+    @property
+    def success_rate(self) -> float | None:
+        """Between 0 and 1; None if no episode says."""
+        return float(np.mean(self.successes)) if self.successes else None
+
+
+def run_greedily(
+    env: gymnasium.Env[Any, Any],
+    act: Callable[[Any], Any],
+    seed: int,
+    episodes: int,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> Evaluation | None:
+    """Runs episodes in any environment, seeded once; None if told to stop."""
+    found = Evaluation([], [])
+    for index in range(episodes):
+        observation, _ = env.reset(seed=seed if index == 0 else None)
+        length, total, finished = 0, 0.0, False
+        while not finished:
+            if should_stop():
+                return None
+            observation, reward, terminated, truncated, info = env.step(
+                act(as_float32(observation))
+            )
+            length, total = length + 1, total + float(reward)
+            finished = terminated or truncated
+        found.lengths.append(length)
+        found.returns.append(total)
+        success = succeeded(info)
+        if success is not None:
+            found.successes.append(success)
+    return found
+
+
+class Score(NamedTuple):
+    """An evaluation, and the mean return by which policies are compared."""
+
+    evaluation: Evaluation
+    confirmed: float
+
+
+class Evaluator:
+    """Evaluates an algorithm's policy, in an environment of its own wherever there can be one.
+
+    Over ROS there is one robot in one simulator: an evaluation there moves the training's, which
+    is brought back to where it was afterwards.
+
+    Args:
+        options: how many episodes, in which environment, from which seed.
+        algorithm: acts greedily.
+        should_stop: is asked before each step.
+        say: is told if there can be no second environment.
+
+    Raises:
+        WorkbenchError: if the second environment can't be made, and has to be another one.
+    """
+
+    def __init__(
+        self,
+        options: TrainingOptions,
+        algorithm: Algorithm,
+        should_stop: Callable[[], bool],
+        say: Say,
+    ) -> None:
+        self._run, self._algorithm, self._should_stop = options.run, algorithm, should_stop
+        self._is_guest = shares_robot(algorithm.env)
+        self._env = algorithm.env
+        is_same = self._run.evaluation_environment == self._run.training_environment
+        if not (self._is_guest and is_same):
+            try:
+                self._env = environment_for(options, self._run.evaluation_environment)
+            except WorkbenchError as error:
+                if not is_same:
+                    raise
+                self._is_guest = True
+                say(
+                    f"evaluated in the training's own environment, since a second one fails: {error}"
+                )
+
+    def evaluate(self, best: float, say: Say, is_last: bool = False) -> Score | None:
+        """Runs greedy episodes; None if interrupted.
+
+        A policy that is perfect in ten episodes may well fall in the next ninety: one that seems
+        to be the best so far is confirmed over more, if the options say so.
+
+        Args:
+            best: mean return of the best policy so far.
+            say: is told if the episode under way can't be brought back.
+            is_last: there is no episode under way that would have to be.
+
+        Raises:
+            WorkbenchError: if the environment fails, or the policy isn't one any more.
+        """
+        self._algorithm.check_weights()
+        with self._undisturbed(say, is_last):
+            found = self._episodes(self._run.eval_episodes, 0)
+            if found is None:
+                return None
+            if found.mean_return <= best or not self._run.confirm_episodes:
+                return Score(found, found.mean_return)
+            confirmed = self._episodes(self._run.confirm_episodes, 1)
+            return None if confirmed is None else Score(found, confirmed.mean_return)
+
+    @contextmanager
+    def _undisturbed(self, say: Say, is_last: bool) -> Iterator[None]:
+        """What is done inside is forgotten afterwards, also by generators that all share."""
+        must_return = self._is_guest and not is_last
+        place = self._algorithm.leave_environment() if must_return else None
+        states = random_states()
+        yield
+        if must_return:
+            self._algorithm.restore_environment(place, say)
+        restore_random_states(states)
+
+    def _episodes(self, episodes: int, stream: int) -> Evaluation | None:
+        seed = self._run.seed + EVALUATION_SEED * (1 + stream)
+        act = self._algorithm.act_greedily
+        return run_greedily(self._env, act, seed, episodes, self._should_stop)
+
+    def close(self) -> None:
+        """Closes the environment, if it is this one's own."""
+        if self._env is not self._algorithm.env:
+            self._env.close()

@@ -1,0 +1,215 @@
+"""What a training has seen so far, as its record and its checkpoints hold it."""
+
+import contextlib
+import math
+import shlex
+import traceback
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import torch
+
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, replaying, watching
+from rl_workbench.plotting import as_png, learning_curve
+from rl_workbench.states import array, number, sequence, whole
+from rl_workbench.storage import as_json, write_atomically
+from rl_workbench.training.checkpoints import candidates
+from rl_workbench.training.evaluator import Evaluation
+from rl_workbench.training.folder import versions
+from rl_workbench.training.options import RunOptions, TrainingOptions
+from rl_workbench.training.progress import tell
+
+WINDOW = 20  # [episodes] over which a mean length counts
+LAST = 100  # [episodes] over which successes and the summary's mean return count
+
+
+@dataclass
+class History:
+    """Episodes, evaluations and wall time of a training."""
+
+    returns: list[float] = field(default_factory=list)
+    lengths: list[int] = field(default_factory=list)
+    successes: list[bool] = field(
+        default_factory=list
+    )  # of the episodes that say whether they are one
+    evaluations: list[tuple[int, float]] = field(default_factory=list)  # step, mean return
+    best: tuple[int, float] | None = None  # of the evaluations
+    seconds: float = 0.0  # of wall time until it was last resumed
+
+    @property
+    def steps(self) -> int:
+        """Of all finished episodes."""
+        return sum(self.lengths)
+
+    @property
+    def best_return(self) -> float:
+        """The mean return of the best evaluation; minus infinity before the first."""
+        return self.best[1] if self.best else -math.inf
+
+    @property
+    def success_rate(self) -> float:
+        """Of the last 100 episodes that say it; there is one at least."""
+        recent = self.successes[-LAST:]
+        return sum(recent) / len(recent)
+
+    def was_evaluated(self, steps: int) -> bool:
+        """Whether the last evaluation was at this step."""
+        return bool(self.evaluations) and self.evaluations[-1][0] == steps
+
+    def is_complete(self, run: RunOptions, steps: int) -> bool:
+        """Whether what the user asked for is reached.
+
+        Args:
+            run: what they asked for.
+            steps: done so far, those of an unfinished episode included.
+        """
+        recent = self.lengths[-WINDOW:]
+        return (
+            bool(run.total_timesteps and steps >= run.total_timesteps)
+            or bool(run.episodes and len(self.returns) >= run.episodes)
+            or (run.stop_at_return is not None and self.best_return >= run.stop_at_return)
+            or (
+                bool(run.stop_at_length)
+                and len(recent) == WINDOW
+                and sum(recent) >= run.stop_at_length * WINDOW
+            )
+        )
+
+    def state_dict(self) -> dict[str, Any]:
+        """Plain numbers and tensors."""
+        return {
+            "returns": torch.tensor(self.returns, dtype=torch.float64),
+            "lengths": torch.tensor(self.lengths, dtype=torch.int64),
+            "successes": torch.tensor(self.successes, dtype=torch.bool),
+            "evaluations": [list(each) for each in self.evaluations],
+            "best": None if self.best is None else list(self.best),
+            "seconds": self.seconds,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Takes over what `state_dict` gave.
+
+        Raises:
+            TypeError, ValueError, LookupError: if it gave something else.
+        """
+        self.returns = array(state["returns"], torch.float64, (None,)).tolist()
+        lengths = array(state["lengths"], torch.int64, (len(self.returns),))
+        self.lengths = [whole(each) for each in lengths.tolist()]
+        if "successes" in state:  # earlier versions didn't count them
+            self.successes = array(state["successes"], torch.bool, (None,)).tolist()
+        self.evaluations = [evaluation_of(each) for each in sequence(state["evaluations"])]
+        self.best = None if state["best"] is None else evaluation_of(state["best"])
+        self.seconds = number(state["seconds"])
+        if self.seconds < 0:
+            raise ValueError(f"{self.seconds} s of wall time")
+
+
+def evaluation_of(state: Any) -> tuple[int, float]:
+    """Step and mean return, from a checkpoint.
+
+    Raises:
+        ValueError: if it holds something else.
+    """
+    step, mean = sequence(state, 2)
+    return whole(step), number(mean)
+
+
+TRACEBACK = "failure.txt"  # of an environment that failed
+
+
+class TrainingOutcome(NamedTuple):
+    """A training at its end, whatever ended it."""
+
+    options: TrainingOptions
+    folder: Path
+    history: History
+    steps: int
+    is_complete: bool
+    is_interrupted: bool
+    evaluation: Evaluation | None  # the last one
+    is_in_place: bool = True  # else another folder is where its own was
+
+    def write(self, failure: str | None) -> None:
+        """Writes learning_curve.png and summary.json.
+
+        Raises:
+            OSError: if the disk refuses.
+        """
+        history, run = self.history, self.options.run
+        if history.returns:
+            title = f"{self.options.kind.name}, {run.env_id}, seed {run.seed}"
+            figure = learning_curve(history.lengths, history.returns, title, history.successes)
+            write_atomically(self.folder / "learning_curve.png", as_png(figure))
+        summary = {
+            **self.options.record(),
+            "versions": versions(),
+            "failure": failure,
+            "complete": self.is_complete,
+            "interrupted": self.is_interrupted,
+            "episodes": len(history.returns),
+            "steps": self.steps,
+            "seconds": round(history.seconds, 3),
+            f"mean_return_last_{LAST}": _mean(history.returns[-LAST:]),
+            f"mean_length_last_{WINDOW}": _mean(history.lengths[-WINDOW:]),
+            f"success_rate_last_{LAST}": history.success_rate if history.successes else None,
+            "best": history.best,
+            "evaluations": history.evaluations,
+            "evaluation": asdict(self.evaluation) if self.evaluation else None,
+            "lengths": history.lengths,
+            "returns": history.returns,
+            "successes": history.successes,
+        }
+        write_atomically(self.folder / "summary.json", as_json(summary))
+
+    def tell(self) -> None:
+        """Says how far it came, what it is worth, and what can be done with it."""
+        history, evaluation = self.history, self.evaluation
+        line = f"trained {len(history.returns)} episodes, {self.steps} steps in "
+        line += f"{history.seconds:.1f} s"
+        if history.best:
+            line += f"; best evaluation {history.best[1]:.1f} at step {history.best[0]}"
+        if evaluation:
+            line += f"; the last one over {len(evaluation.lengths)} greedy episodes: length "
+            line += f"{evaluation.mean_length:.1f}, return {evaluation.mean_return:.1f}"
+            if evaluation.success_rate is not None:
+                line += f", success {evaluation.success_rate:.0%}"
+        tell(line)
+        if not self.is_in_place:
+            return
+        tell(f"everything lies in {self.folder}")
+        if self.is_interrupted:
+            tell(f"interrupted{self._how_to_go_on()}")
+        tell(f"watch: {replaying(self.folder)}")
+        tell(f"curves: {watching(self.folder)}")
+
+    def what_is_left(self, is_written: bool) -> str:
+        """Of a training that failed.
+
+        Args:
+            is_written: whether all could be written.
+        """
+        text = f"stopped after {self.steps} steps, {len(self.history.returns)} episodes"
+        if is_written:
+            text += f", what was learned is saved in {self.folder}"
+        return text + self._how_to_go_on()
+
+    def _how_to_go_on(self) -> str:
+        if not self.is_in_place or not candidates(self.folder):
+            return ""
+        return f"; --resume {shlex.quote(str(self.folder))} goes on from the last checkpoint"
+
+
+def write_traceback(folder: Path, failure: WorkbenchError) -> str:
+    """Writes that of an environment's own code into the folder; returns the words for it."""
+    if not isinstance(failure, EnvironmentFailure):
+        return ""
+    path, text = folder / TRACEBACK, "".join(traceback.format_exception(failure.__cause__))
+    with contextlib.suppress(OSError):  # what can't be written isn't what the user has to hear of
+        write_atomically(path, lambda stream: stream.write(text.encode(errors="replace")))
+        return f"; the traceback is in {path}"
+    return ""
+
+
+def _mean(values: list[float] | list[int]) -> float | None:
+    return sum(values) / len(values) if values else None

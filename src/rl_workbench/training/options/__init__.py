@@ -1,1 +1,0 @@
-"""Options from flags, rosparams, KEY=VALUE and YAML."""

@@ -1,0 +1,199 @@
+"""A policy gradient at work: run an episode, learn from it."""
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from rl_workbench.agents.document import Episode, Losses, PolicyGradientAgent
+from rl_workbench.agents.policy_networks import Bounds
+from rl_workbench.agents.reinforce import ReinforceAgent
+from rl_workbench.agents.settings import DocumentSettings
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import whole
+from rl_workbench.storage import save_tensors
+from rl_workbench.training.algorithm import Algorithm, Frame, Policy, Say
+from rl_workbench.training.checkpoints import fitting
+from rl_workbench.training.environments import discrete_actions, in_its_environments, is_continuous
+from rl_workbench.training.episodes import Agent, EpisodeSource, LocalEpisodes
+from rl_workbench.training.options import TrainingOptions
+
+
+def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
+    """A new agent for an environment.
+
+    Raises:
+        WorkbenchError: if the environment doesn't suit it; says what does.
+    """
+    run, settings = options.run, options.hyperparameters
+    (size,) = env.observation_space.shape or (0,)
+    space = env.action_space
+    if is_continuous(space) and not isinstance(settings, DocumentSettings):
+        actions: int | Bounds = Bounds(space.low, space.high)
+    else:
+        actions = discrete_actions(env, run.env_id, "REINFORCE")
+    if isinstance(settings, DocumentSettings):
+        if (size, actions) != (4, 2):
+            raise WorkbenchError(
+                f"{options.kind.name} is made for 4 observations and 2 actions; {run.env_id} has {size} "
+                f"and {actions}: --algo reinforce learns in it"
+            )
+        return PolicyGradientAgent(run.seed, settings)
+    if settings.observation_scale and len(settings.observation_scale) != size:
+        raise WorkbenchError(
+            f"observation_scale has {len(settings.observation_scale)} numbers, the observations of "
+            f"{run.env_id} {size}"
+        )
+    scale = settings.observation_scale or (1.0,) * size
+    return ReinforceAgent(run.seed, scale, settings, actions, run.num_envs)
+
+
+def load_policy(
+    options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
+) -> Policy:
+    """The policy of a checkpoint; see `policy.load_policy`."""
+    agent = make_agent(options, env)
+    agent.load_state_dict(content["agent"])
+    network = agent.greedy_network()
+    if is_continuous(env.action_space):
+        return Policy(
+            agent.act_greedily,
+            lambda seen: np.array([np.ravel(agent.act_greedily(each))[0] for each in seen]),
+            "action",
+            network,
+        )
+
+    def preference(observations: np.ndarray) -> np.ndarray:
+        found = [agent.probabilities(each) for each in observations]
+        return np.array([each[-1] - each[0] for each in found])
+
+    return Policy(agent.act_greedily, preference, "P(right) - P(left)", network)
+
+
+class PolicyGradientTraining(Algorithm):
+    """Runs episodes and learns from each, in rounds of one from each environment; saved between two rounds.
+
+    Args:
+        options: what the user chose.
+        env: of the kind that is learned in; evaluations take place there, where there is no other.
+        agent: acts and learns.
+        source: of the episodes.
+    """
+
+    def __init__(
+        self,
+        options: TrainingOptions,
+        env: gymnasium.Env[Any, Any],
+        agent: Agent,
+        source: EpisodeSource,
+    ) -> None:
+        self.env, self._agent, self._source = env, agent, source
+        self._save_every = options.hyperparameters.save_every
+        self._episodes = self._steps = self._stride = 0
+
+    @property
+    def steps(self) -> int:
+        """See `Algorithm.steps`."""
+        return self._steps
+
+    @property
+    def stride(self) -> int:
+        """The lengths of the last round's episodes together."""
+        return self._stride
+
+    def act_greedily(self, observation: np.ndarray) -> Any:
+        """See `Algorithm.act_greedily`."""
+        return self._agent.act_greedily(observation)
+
+    def learn(self, frame: Frame) -> None:
+        """See `Algorithm.learn`."""
+        self._source.mark()
+        while not frame.is_over():
+            episodes = self._source.collect(frame.is_interrupted)
+            if episodes is None:
+                break
+            losses = self._agent.learn(*episodes)
+            self._stride = 0
+            for episode in episodes:
+                self._take_down(episode, losses if episode is episodes[-1] else None, frame)
+            self._source.mark()
+            frame.step_done()
+        self._source.rewind()
+
+    def _take_down(self, episode: Episode, losses: Losses | None, frame: Frame) -> None:
+        """Of a round, the last episode has the losses: batches end with it."""
+        self._steps += episode.length
+        self._stride += episode.length
+        by_episode = {"Reward": episode.total_reward}  # the tags of the existing script
+        by_step = {}
+        if losses is not None:
+            by_episode |= {"Value Loss": losses.value, "Policy Loss": losses.policy}
+            by_step = {"losses/value_loss": losses.value, "losses/policy_loss": losses.policy}
+        frame.log.add(self._episodes, by_episode)
+        frame.episode_done(episode.total_reward, episode.length, by_step, success=episode.success)
+        self._save_networks_if_due(frame.folder)
+        self._episodes += 1
+
+    def _save_networks_if_due(self, folder: Path) -> None:
+        if self._save_every and self._episodes % self._save_every == 0:
+            self._save_networks(folder, f"_episode_{self._episodes}")
+
+    def _save_networks(self, folder: Path, suffix: str = "") -> None:
+        networks = {"policy_network": self._agent.policy, "value_network": self._agent.value}
+        for name, network in networks.items():
+            save_tensors(folder / f"{name}{suffix}.pth", network.state_dict())
+
+    def export(self, folder: Path) -> None:
+        """Writes policy_network.pth and value_network.pth."""
+        self._save_networks(folder)
+
+    def settle(self) -> bool:
+        """Takes back the draws of the round that failed."""
+        self._source.rewind()
+        return True
+
+    def state_dict(self) -> dict[str, Any]:
+        """See `Algorithm.state_dict`."""
+        return {
+            "agent": self._agent.state_dict(),
+            "episodes": self._episodes,
+            "stride": self._stride,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """See `Algorithm.load_state_dict`."""
+        with fitting("agent"):
+            self._agent.load_state_dict(state["agent"])
+            self._episodes, self._stride = whole(state["episodes"]), whole(state["stride"])
+            self._steps = whole(state["steps"])
+
+    def environment_state(self) -> Any:
+        """The states of the environments' generators; there is no episode under way."""
+        return self._source.state()
+
+    def start_environment(self, state: Any, say: Say) -> None:
+        """See `Algorithm.start_environment`."""
+        self._source.seed()  # the episodes' own resets go on from here
+        if state is not None:
+            self._source.load_state(state)
+        self._source.mark()
+
+    def restore_environment(self, state: Any, say: Say) -> None:
+        """See `Algorithm.restore_environment`; the next episode begins with a reset anyway."""
+        self._source.load_state(state)
+
+    def close(self) -> None:
+        """Closes all environments."""
+        self._source.close()
+
+
+def make(options: TrainingOptions) -> PolicyGradientTraining:
+    """A new training; see `make_algorithm`."""
+
+    def learning_in(envs: list[gymnasium.Env[Any, Any]]) -> PolicyGradientTraining:
+        agent = make_agent(options, envs[0])
+        source = LocalEpisodes(envs, agent, options.run.seed)
+        return PolicyGradientTraining(options, envs[0], agent, source)
+
+    return in_its_environments(options, learning_in)

@@ -1,0 +1,138 @@
+"""The environment of a training, with what brings back the episode under way.
+
+No environment has a way to be saved in the middle of an episode. But the same start and the
+same actions bring it back there: that is what is kept.
+"""
+
+import json
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium import spaces
+
+from rl_workbench.states import array, whole
+from rl_workbench.training.environments import as_vector
+
+
+class EpisodeMark(NamedTuple):
+    """A place in an episode, cheap to remember."""
+
+    start: str
+    seed: int | None
+    actions: list[Any]  # those that come later, too
+    length: int  # of it [steps]
+    last: np.ndarray
+    generator: Any
+
+
+class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """An environment that can be brought back into the middle of an episode.
+
+    What is done with the environment inside, past this wrapper, is no part of the episode.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
+        super().__init__(env)
+        self._actions: list[Any] = []
+        self._start = ""  # the generator before the reset; nothing where that is seeded
+        self._seed: int | None = None  # of the reset, if it had one
+        self._last = np.empty(0, np.float32)  # observation
+
+    @property
+    def length(self) -> int:
+        """Steps of the episode so far."""
+        return len(self._actions)
+
+    @property
+    def generator(self) -> str:
+        """The state of the environment's generator, as JSON."""
+        return json.dumps(self.env.unwrapped.np_random.bit_generator.state, default=_plain)
+
+    @generator.setter
+    def generator(self, text: str) -> None:
+        self.env.unwrapped.np_random.bit_generator.state = json.loads(text)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begins an episode."""
+        self._actions, self._seed = [], seed
+        self._start = self.generator if seed is None else ""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._last = as_vector(observation)
+        return observation, info
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """One step, which is remembered."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self._actions.append(np.array(action))
+        self._last = as_vector(observation)
+        return observation, reward, terminated, truncated, info
+
+    def mark(self) -> EpisodeMark:
+        """Remembers the place in the episode under way."""
+        generator = self.env.unwrapped.np_random.bit_generator.state
+        return EpisodeMark(
+            self._start, self._seed, self._actions, self.length, self._last.copy(), generator
+        )
+
+    def take_back(self, mark: EpisodeMark) -> None:
+        """Forgets what was done since `mark`: `state_dict` tells of that place again.
+
+        The environment itself isn't moved: this is for the end of a training.
+        """
+        self._start, self._seed, self._last = mark.start, mark.seed, mark.last
+        self._actions = mark.actions[: mark.length]
+        self.env.unwrapped.np_random.bit_generator.state = mark.generator
+
+    def state_dict(self) -> dict[str, Any]:
+        """How the episode began, its actions, and where they led."""
+        shape = (self.length, *(self.action_space.shape or ()))
+        actions = np.array(self._actions, dtype=self.action_space.dtype).reshape(shape)
+        return {
+            "start": self._start,
+            **({} if self._seed is None else {"seed": self._seed}),
+            "actions": torch.from_numpy(actions),
+            "observation": torch.from_numpy(self._last.copy()),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> np.ndarray | None:
+        """Repeats the episode.
+
+        Returns:
+            Its last observation as a vector, or None if it went another way: then there is no episode, and
+            the generator is as it was.
+        """
+        after = self.generator
+        if self.env.spec is not None and self.env.spec.nondeterministic:
+            return None
+        if state["start"]:
+            self.generator = state["start"]
+        seed = state.get("seed")
+        self.reset(seed=None if seed is None else whole(seed))
+        wanted = array(state["observation"], torch.float32, self._last.shape)
+        actions = self._read_actions(state["actions"])
+        for action in actions:
+            _, _, terminated, truncated, _ = self.step(action)
+            if terminated or truncated:
+                break
+        if self.length == len(actions) and np.array_equal(self._last, wanted):
+            return self._last
+        self.generator = after
+        return None
+
+    def _read_actions(self, value: Any) -> list[Any]:
+        space = self.action_space
+        dtype = torch.from_numpy(np.empty(0, space.dtype)).dtype
+        found = array(value, dtype, (None, *(space.shape or ())))
+        actions = found.tolist() if isinstance(space, spaces.Discrete) else list(found)
+        if not all(map(space.contains, actions)):
+            raise ValueError(f"an episode with other actions than {space}")
+        return actions
+
+
+def _plain(value: Any) -> Any:
+    """For generators whose state holds arrays."""
+    return value.tolist()

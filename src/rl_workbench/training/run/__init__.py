@@ -1,1 +1,0 @@
-"""What all trainings share: folder, checkpoints, log, progress, evaluation."""

@@ -1,0 +1,302 @@
+"""Stable-Baselines3 in our frame: its own loop, with a callback that reports to the frame.
+
+It is evaluated and saved between two rollouts, and continues from there bit-identical.
+"""
+
+import math
+from operator import attrgetter
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.states import array, check_optimizer, number, whole
+from rl_workbench.storage import write_atomically
+from rl_workbench.training.algorithm import Algorithm, Frame, Say
+from rl_workbench.training.checkpoints import fitting
+from rl_workbench.training.environments import succeeded
+from rl_workbench.training.options import TrainingOptions
+from rl_workbench.training.sb3.acting import load_policy
+from rl_workbench.training.sb3.models import checked_environment, make_learning_model
+from rl_workbench.training.sb3.positions import (
+    ModelMark,
+    Positions,
+    buffer_state,
+    restore_buffer,
+)
+
+__all__ = ["load_policy", "make"]
+
+# What the library raises while it learns: weights or options that are no good.
+_LEARNING = (ArithmeticError, AssertionError, LookupError, RuntimeError, TypeError, ValueError)
+MODEL = "model.zip"  # for Stable-Baselines3's own load()
+COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_n_calls", "stride")
+ENTROPY = "log_ent_coef"  # SAC's, not part of a network
+LOSSES = {  # Stable-Baselines3's names: our tags
+    "train/loss": "losses/loss",
+    "train/value_loss": "losses/value_loss",
+    "train/policy_loss": "losses/policy_loss",
+    "train/policy_gradient_loss": "losses/policy_loss",
+    "train/actor_loss": "losses/actor_loss",
+    "train/critic_loss": "losses/critic_loss",
+}
+
+
+def make(options: TrainingOptions) -> "SB3Training":
+    """Makes a new training; see `make_algorithm`."""
+    if not options.run.total_timesteps:
+        raise WorkbenchError(
+            f"{options.kind.name} needs total_timesteps: its schedules depend on them"
+        )
+    model = make_learning_model(options)
+    return SB3Training(options, model, checked_environment(model.get_env()))
+
+
+class SB3Training(Algorithm):
+    """A model of Stable-Baselines3, evaluated and saved between two rollouts.
+
+    Args:
+        options: What the user chose.
+        model: With its environments.
+        env: The first of them.
+    """
+
+    def __init__(self, options: TrainingOptions, model: Any, env: gymnasium.Env[Any, Any]) -> None:
+        self._run, self._name, self._model, self.env = options.run, options.kind.name, model, env
+        self._positions = Positions(model)
+        self._callback: FrameCallback | None = None
+
+    @property
+    def steps(self) -> int:
+        return int(self._model.num_timesteps)
+
+    @property
+    def stride(self) -> int:
+        return int(self._model.stride)
+
+    def act_greedily(self, observation: np.ndarray) -> Any:
+        return self._model.policy.predict(observation, deterministic=True)[0]
+
+    def learn(self, frame: Frame) -> None:
+        remaining = max(self._run.total_timesteps - self.steps, 0)
+        self._callback = FrameCallback(frame, self._positions, self._run.log_frequency)
+        try:
+            # The callback logs losses between two rollouts, so the library doesn't.
+            self._model.learn(
+                remaining, callback=self._callback, log_interval=None, reset_num_timesteps=False
+            )
+        except WorkbenchError:
+            raise
+        except _LEARNING as error:
+            self.check_weights()  # torch's own text about NaN helps nobody
+            text = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise WorkbenchError(f"{self._name} failed: {text}") from error
+
+    def settle(self) -> bool:
+        """Takes back the steps since the last rollout. A half-finished update can't be taken back."""
+        return self._callback is not None and self._callback.go_back()
+
+    def check_weights(self) -> None:
+        if not all(torch.isfinite(each).all() for each in self._model.policy.parameters()):
+            raise WorkbenchError(
+                "the weights are NaN or infinite: a smaller learning_rate may help"
+            )
+
+    def state_dict(self) -> dict[str, Any]:
+        self.check_weights()
+        model = self._model
+        parameters = model.get_parameters()
+        policy = parameters.pop("policy")
+        entropy = getattr(model, ENTROPY, None)
+        return {
+            "policy": policy,
+            "optimizers": parameters,
+            "entropy": None if entropy is None else entropy.detach(),
+            "counters": {name: getattr(model, name) for name in COUNTERS if hasattr(model, name)},
+            "losses": _pending_losses(model),
+            "buffer": buffer_state(getattr(model, "replay_buffer", None)),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        model = self._model
+        with fitting("model"):
+            new = self.state_dict()
+            for part in ("optimizers", "counters"):
+                if not isinstance(state[part], dict) or set(state[part]) != set(new[part]):
+                    raise ValueError(f"{part} are {state[part]!r}")
+            for name, optimizer in state["optimizers"].items():
+                check_optimizer(attrgetter(name)(model), optimizer)
+            model.set_parameters({"policy": state["policy"], **state["optimizers"]})
+            if new["entropy"] is not None:
+                entropy = array(state["entropy"], new["entropy"].dtype, tuple(new["entropy"].shape))
+                getattr(model, ENTROPY).data.copy_(torch.from_numpy(entropy))
+            if state["counters"]["num_timesteps"] != whole(state["steps"]):
+                raise ValueError(f"{state['counters']['num_timesteps']} steps of {state['steps']}")
+            for name, value in state["counters"].items():
+                setattr(model, name, whole(value))
+            if not isinstance(state["losses"], dict) or not set(state["losses"]) <= set(LOSSES):
+                raise ValueError(f"losses are {state['losses']!r}")
+            for name, value in state["losses"].items():
+                model.logger.record(name, number(value))
+            if new["buffer"] is not None:
+                restore_buffer(model.replay_buffer, state["buffer"])
+        if model.num_timesteps:  # schedules depend on the progress
+            model._update_current_progress_remaining(model.num_timesteps, self._run.total_timesteps)
+            if hasattr(model, "exploration_schedule"):
+                progress = model._current_progress_remaining
+                model.exploration_rate = model.exploration_schedule(progress)
+
+    def environment_state(self) -> dict[str, Any] | None:
+        """Returns where all environments are; None before their first episodes."""
+        return self._positions.state_dict()
+
+    def start_environment(self, state: dict[str, Any] | None, say: Say) -> None:
+        """Repeats the episodes under way. In a new training the model seeds and begins them."""
+        if state is not None:
+            for index in self._positions.load_state_dict(state):
+                self._say_lost(index, say)
+
+    def _say_lost(self, index: int, say: Say) -> None:
+        count = self._model.n_envs
+        which = "the environment" if count == 1 else f"environment {index + 1} of {count}"
+        say(f"{which} doesn't repeat itself: the episode under way is cut off")
+
+    def leave_environment(self) -> Any:
+        # Evaluations only move the first environment.
+        return self._positions.leave(0) if self._model._last_obs is not None else None
+
+    def restore_environment(self, state: Any, say: Say) -> None:
+        if state is not None and not self._positions.bring_back(state):
+            self._say_lost(0, say)
+
+    def export(self, folder: Path) -> None:
+        write_atomically(folder / MODEL, self._model.save)
+
+    def close(self) -> None:
+        self._model.get_env().close()
+
+
+def _pending_losses(model: Any) -> dict[str, float]:
+    """Returns the losses that the model has recorded since they were last logged, by its own names."""
+    recorded = model.logger.name_to_value
+    return {name: float(recorded[name]) for name in LOSSES if name in recorded}
+
+
+class EndedEpisode(NamedTuple):
+    """An episode that ended within a rollout."""
+
+    step: int
+    total_reward: float
+    length: int  # [steps]
+    success: bool | None  # None if the environment doesn't say
+
+
+class FrameCallback(BaseCallback):
+    """Lets the frame evaluate and save between two rollouts, and stops when the frame says so.
+
+    On-policy, an interrupt discards the rollout under way: its episodes are reported when it is complete.
+    Off-policy, rollouts are short and change what was learned, so they are completed.
+
+    Args:
+        frame: Of the training.
+        positions: Of its model.
+        log_frequency: Steps between two points of losses.
+    """
+
+    def __init__(self, frame: Frame, positions: Positions, log_frequency: int) -> None:
+        super().__init__()
+        self._frame, self._positions, self._log_frequency = frame, positions, log_frequency
+        self._ended: list[EndedEpisode] = []  # not reported yet
+        self._episodes = 0
+        self._held: int | None = None  # learning_starts, while hindsight has no whole episode
+        self._mark: ModelMark | None = None
+        self._can_go_back = False  # everything since the mark can be taken back
+
+    def _on_training_start(self) -> None:
+        model: Any = self.model
+        self._arrived = model.num_timesteps
+        self._is_on_policy = isinstance(model, OnPolicyAlgorithm)
+        lengths = getattr(getattr(model, "replay_buffer", None), "ep_length", None)
+        # Hindsight can't sample before the first episode has ended.
+        if lengths is not None and not lengths.any():
+            self._held, model.learning_starts = model.learning_starts, math.inf
+
+    def goes_on(self) -> bool:
+        """Returns whether there is to be another rollout. Called between two of them."""
+        if self.model.num_timesteps > self._arrived:
+            self._arrive()
+        self._set_mark()
+        return not self._frame.is_over()
+
+    def _arrive(self) -> None:
+        model: Any = self.model
+        model.stride = model.num_timesteps - self._arrived
+        self._arrived = model.num_timesteps
+        self._log_losses(model)
+        self._set_mark()
+        self._frame.step_done()
+
+    def _set_mark(self) -> None:
+        self._mark, self._can_go_back = self._positions.mark(), True
+
+    def go_back(self) -> bool:
+        """Takes back what was done since the last rollout; returns whether it could."""
+        if self._can_go_back and self._mark is not None:
+            self._positions.take_back(self._mark)
+        return self._can_go_back
+
+    def _log_losses(self, model: Any) -> None:
+        found = {LOSSES[name]: value for name, value in _pending_losses(model).items()}
+        for tag, value in found.items():
+            _check_finite(tag, value)
+        steps, frequency = self._arrived, self._log_frequency
+        if found and steps // frequency > (steps - model.stride) // frequency:
+            self._frame.log.add(steps, found)
+            model.logger.dump(steps)  # it has no outputs: it forgets them
+
+    def _on_step(self) -> bool:
+        for info in self.locals["infos"]:
+            if "episode" in info:  # Monitor's figures
+                found, success = info["episode"], succeeded(info)
+                self._ended.append(
+                    EndedEpisode(self.model.num_timesteps, float(found["r"]), int(found["l"]), success)
+                )  # fmt: skip
+        if self._is_on_policy:
+            return not self._frame.is_interrupted()
+        self._can_go_back = False
+        self._report()
+        if self.locals["dones"].any():
+            self._release()
+        return True
+
+    def _on_rollout_end(self) -> None:
+        self._can_go_back = False
+        self._report()
+
+    def _report(self) -> None:
+        for episode in self._ended:
+            self._episodes += 1
+            _check_finite(f"the return of episode {self._episodes}", episode.total_reward)
+            step, total_reward, length, success = episode
+            self._frame.episode_done(total_reward, length, {}, success=success, step=step)
+        self._ended = []
+
+    def _on_training_end(self) -> None:
+        self._release()
+        if not self.go_back() and self.model.num_timesteps > self._arrived:
+            self._arrive()
+
+    def _release(self) -> None:
+        model: Any = self.model
+        if self._held is not None:
+            self._held, model.learning_starts = None, self._held
+
+
+def _check_finite(name: str, value: float) -> None:
+    if not math.isfinite(value):
+        raise WorkbenchError(f"{name} is {value}: a smaller learning_rate may help")

@@ -1,0 +1,232 @@
+"""Stable-Baselines3's models, made from our options."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import gymnasium
+import numpy as np
+import stable_baselines3
+import torch
+from gymnasium import spaces
+from stable_baselines3 import HerReplayBuffer
+from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.noise import NormalActionNoise
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
+from stable_baselines3.common.type_aliases import RolloutReturn
+from stable_baselines3.common.vec_env import DummyVecEnv
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.algorithms import ALGORITHMS
+from rl_workbench.training.checked import BEGIN_STEP, COMPUTE_REWARD, CheckedEnvironment
+from rl_workbench.training.environments import (
+    NumberedEnvironment,
+    close_all,
+    has_goal,
+    training_environments,
+)
+from rl_workbench.training.options import TrainingOptions
+from rl_workbench.training.repeatable import RepeatableEnvironment
+from rl_workbench.training.sb3.hyperparameters import ON_POLICY
+
+_DISCRETE = (spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
+FITS = {
+    "ppo": (spaces.Box, *_DISCRETE),
+    "a2c": (spaces.Box, *_DISCRETE),
+    "sac": (spaces.Box,),
+    "td3": (spaces.Box,),
+    "ddpg": (spaces.Box,),
+    "dqn-sb3": (spaces.Discrete,),
+}
+
+
+class StoppableOnPolicy(OnPolicyAlgorithm):
+    """Mix-in for algorithms that learn from a rollout and forget it: the callback may end the training.
+
+    Only between two rollouts can everything be saved: a rollout under way has no state that could.
+    """
+
+    stride = 0  # steps of the last rollout, in all environments
+
+    def collect_rollouts(
+        self, env: Any, callback: Any, rollout_buffer: Any, n_rollout_steps: int
+    ) -> bool:
+        return callback.goes_on() and super().collect_rollouts(
+            env, callback, rollout_buffer, n_rollout_steps
+        )
+
+
+class StoppableOffPolicy(OffPolicyAlgorithm):
+    """Mix-in for algorithms with a replay buffer, whose rollouts are `train_freq` long."""
+
+    stride = 0  # steps of the last rollout, in all environments
+
+    def collect_rollouts(
+        self, env: Any, callback: Any, *arguments: Any, **named: Any
+    ) -> RolloutReturn:
+        if not callback.goes_on():
+            return RolloutReturn(0, 0, continue_training=False)
+        return super().collect_rollouts(env, callback, *arguments, **named)
+
+
+class ParallelVecEnv(DummyVecEnv):
+    """Begins a step in all environments before it waits for the first.
+
+    So steps that take time in other processes run at the same time.
+
+    Args:
+        envs: Each moves a robot of its own.
+    """
+
+    def __init__(self, envs: Sequence[gymnasium.Env[Any, Any]]) -> None:
+        super().__init__([partial(_given, env) for env in envs])
+        self._begins = [env.get_wrapper_attr(BEGIN_STEP) for env in envs] if len(envs) > 1 else []
+
+    def step_async(self, actions: np.ndarray) -> None:
+        super().step_async(actions)
+        for begin, action in zip(self._begins, actions, strict=False):
+            begin(action)
+
+    def close(self) -> None:
+        close_all(self.envs)
+
+
+def _given(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
+    return env
+
+
+def algorithm_class(name: str) -> Any:
+    """Returns Stable-Baselines3's class by the value of --algo."""
+    return getattr(stable_baselines3, ALGORITHMS[name].hyperparameters().library_class)
+
+
+def make_learning_model(options: TrainingOptions) -> Any:
+    """Makes a new model with its environments. The caller closes `model.get_env()`.
+
+    Raises:
+        WorkbenchError: If the environments can't be made, the algorithm doesn't fit them, or an option
+            makes no sense.
+    """
+    name = options.kind.name
+    # Monitor counts the episodes inside, so that a repeated episode brings its counts back.
+    vector = ParallelVecEnv(
+        [RepeatableEnvironment(Monitor(env)) for env in training_environments(options)]
+    )
+    try:
+        _check_fit(options, vector.action_space)
+        own = algorithm_class(name)
+        mixin = StoppableOnPolicy if name in ON_POLICY else StoppableOffPolicy
+        stoppable = type(own.__name__, (mixin, own), {})
+        arguments = options.hyperparameters.own | _hindsight(options, vector)
+        return _model_in(vector, options, arguments, stoppable)
+    except WorkbenchError:
+        vector.close()
+        raise
+
+
+def make_acting_model(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Any:
+    """Makes a model that only acts, in another environment than those that it learned in.
+
+    Raises:
+        WorkbenchError: If the algorithm doesn't fit the environment, or an option makes no sense.
+    """
+    vector = DummyVecEnv([lambda: env])
+    _check_fit(options, vector.action_space)
+    arguments = options.hyperparameters.own
+    if options.kind.name in ON_POLICY:  # as many steps of one environment as of all
+        arguments["n_steps"] *= options.run.num_envs
+    else:
+        arguments["buffer_size"] = 1  # nothing is learned, so nothing is kept
+    return _model_in(vector, options, arguments, algorithm_class(options.kind.name))
+
+
+def checked_environment(vector: Any) -> CheckedEnvironment:
+    """Returns a model's first environment, below what counts, repeats and numbers it."""
+    env = vector.envs[0].env.env
+    checked = env.env if isinstance(env, NumberedEnvironment) else env
+    assert isinstance(checked, CheckedEnvironment)
+    return checked
+
+
+def _check_fit(options: TrainingOptions, space: gymnasium.Space[Any]) -> None:
+    name = options.kind.name
+    if isinstance(space, FITS[name]):
+        return
+    others = [other for other, kinds in FITS.items() if isinstance(space, kinds)]
+    others += ["dqn", "reinforce"] if isinstance(space, spaces.Discrete) else []
+    hint = f"{', '.join(others)} fit it" if others else "none here fits it"
+    raise WorkbenchError(
+        f"{name} can't choose from {space}, the actions of {options.run.env_id}; {hint}"
+    )
+
+
+def _model_in(
+    vector: Any, options: TrainingOptions, arguments: dict[str, Any], made_class: Any
+) -> Any:
+    run = options.run
+    network = {name: arguments.pop(name) for name in ("net_arch", "log_std_init")}
+    network = {name: value for name, value in network.items() if value is not None}
+    if "net_arch" in network:
+        network["net_arch"] = _layers(network["net_arch"])
+    if options.hyperparameters.lr_schedule == "linear":
+        arguments["learning_rate"] = linear(arguments["learning_rate"])
+    if arguments.get("action_noise") is not None:
+        shape = vector.action_space.shape or ()
+        deviation = np.full(shape, arguments["action_noise"])
+        arguments["action_noise"] = NormalActionNoise(np.zeros(shape), deviation)
+    if isinstance(arguments.get("train_freq"), list):  # a number and a unit
+        arguments["train_freq"] = tuple(arguments["train_freq"])
+    sees_dict = isinstance(vector.observation_space, spaces.Dict)
+    try:
+        torch.empty(0, device=run.device)  # where there is none, the model would take the CPU
+        model = made_class(
+            "MultiInputPolicy" if sees_dict else "MlpPolicy", vector, seed=run.seed,
+            device=run.device, policy_kwargs=network or None, **arguments,
+        )  # fmt: skip
+    except WorkbenchError:
+        raise
+    except (TypeError, ValueError, AssertionError, RuntimeError, ArithmeticError) as error:
+        text = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise WorkbenchError(f"{options.kind.name} can't be made: {text}") from error
+    model.set_logger(Logger(None, []))  # it keeps what the model records
+    return model
+
+
+def _hindsight(options: TrainingOptions, vector: Any) -> dict[str, Any]:
+    """Returns the arguments for hindsight experience replay, if it is asked for."""
+    settings, env_id = options.hyperparameters, options.run.env_id
+    if not getattr(settings, "her", False):
+        return {}
+    if not has_goal(vector.observation_space):
+        raise WorkbenchError(
+            f"her needs goals: a Dict of observation, achieved_goal and desired_goal; {env_id} observes "
+            f"{' '.join(str(vector.observation_space).split())}"
+        )
+    if not checked_environment(vector).can_compute_reward:
+        raise WorkbenchError(
+            f"her needs {env_id}'s method {COMPUTE_REWARD}(achieved_goal, desired_goal, info)"
+        )
+    names = ("n_sampled_goal", "goal_selection_strategy")
+    return {
+        "replay_buffer_class": HerReplayBuffer,
+        "replay_buffer_kwargs": {name: getattr(settings, name) for name in names},
+    }
+
+
+def _layers(value: Any) -> Any:
+    """Reads widths of layers, also as the text 64,64. Stable-Baselines3 checks any other form."""
+    if not isinstance(value, str | int):
+        return value
+    try:
+        return [int(each) for each in str(value).split(",")]
+    except ValueError:
+        raise WorkbenchError(
+            f"net_arch must be whole numbers, as in 64,64, not {value!r}"
+        ) from None
+
+
+def linear(start: float) -> Callable[[float], float]:
+    """Returns a rate that falls to 0 with what remains; the last rollout may go beyond the end."""
+    return lambda remaining: start * max(remaining, 0.0)

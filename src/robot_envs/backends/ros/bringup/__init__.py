@@ -1,1 +1,0 @@
-"""What an environment needs in a simulator's world: the world, robots with their controllers, objects."""

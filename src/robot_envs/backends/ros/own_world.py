@@ -1,0 +1,308 @@
+"""Robots in a simulator of their own, which is replaced when it dies, hangs or answers nonsense."""
+
+import contextlib
+import logging
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import rospy
+
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.simulator import NANOSECONDS
+from robot_envs.backends import backend
+from robot_envs.backends.backend import ticks_per_action
+from robot_envs.backends.ros.bringup import bring_up
+from robot_envs.backends.ros.gazebo import physics_step
+from robot_envs.backends.ros.lockstep import LockstepWorld
+from robot_envs.backends.ros.own_simulator import OwnSimulator, check_memory
+from robot_envs.backends.ros.shared_world import SharedWorld
+from robot_envs.backends.world_files import world_models
+from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, SimulatorHangs
+from robot_envs.scene import Scene
+from robot_envs.variation import Variation
+from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
+from ros_calls import master
+
+DEADLINE = 30.0  # [s] of wall time for an answer, beside 10 ms for each tick; others may need the processor
+SEED = 0  # of the simulator's own random numbers, as for the backend "ros"
+BOUND = 1e9  # [rad, m, rad/s, m/s, N m, N]; no joint of a world of metres and seconds gets there
+
+logger = logging.getLogger(__name__)
+Result = TypeVar("Result")
+
+
+@dataclass
+class Journal:
+    """What the simulator was asked since the episode began: enough to bring another one to the same state."""
+
+    variation: Variation = field(default_factory=Variation)  # all that were applied, merged
+    initial: InitialState | None = None  # None: no episode has begun
+    commands: list[Commands] = field(default_factory=list)  # of each step
+    last: WorldState | None = None  # the state after them
+
+    def forget_episode(self) -> None:
+        """Forgets all but the variation."""
+        self.initial, self.commands, self.last = None, [], None
+
+    def replay(self, world: LockstepWorld, step: int) -> None:
+        """Brings another simulator to the same state.
+
+        Args:
+            world: of that simulator, just brought up.
+            step: simulated time of one action [ns].
+
+        Raises:
+            SimulatorFault: if it fails, or comes to another state.
+        """
+        if not self.variation.is_nominal:
+            world.vary(self.variation)
+        if self.initial is None:
+            return
+        state = checked(world.reset(self.initial), 0)
+        for count, commands in enumerate(self.commands, 1):
+            state = checked(world.act(commands), count * step)
+        if repr(state) == repr(self.last):  # shows all bits of a number, and tells -0.0 from 0.0
+            return
+        pairs = zip(WorldState._fields, state, self.last or (), strict=False)
+        difference = next(
+            f"{name} {here!r}, not {there!r}" for name, here, there in pairs if repr(here) != repr(there)
+        )  # fmt: skip
+        raise SimulatorFault(
+            f"the same reset and {len(self.commands)} steps lead to another state, as where a plugin draws "
+            f"random numbers: {difference}"
+        )
+
+
+def checked(state: WorldState, expected: int) -> WorldState:
+    """Returns a simulator's answer if it is plausible: finite, within bounds, and of the expected time.
+
+    Args:
+        state: the answer.
+        expected: simulated time since the episode began [ns].
+
+    Raises:
+        SimulatorFault: if it isn't.
+    """
+    if not math.isfinite(state.time) or round(state.time * NANOSECONDS) != expected:
+        raise SimulatorFault(
+            f"its time stands at {state.time:.9g} s of the episode, and {expected / NANOSECONDS:.9g} s were "
+            "asked for"
+        )
+    for name, numbers in state.joints.items():
+        position, velocity, effort = numbers
+        if not (
+            -BOUND < position < BOUND and -BOUND < velocity < BOUND and -BOUND < effort < BOUND
+        ):
+            finite = all(map(math.isfinite, numbers))
+            raise SimulatorFault(
+                f"the joint '{name}' is {'out of all bounds' if finite else 'not finite'}: position "
+                f"{position:g}, velocity {velocity:g}, effort {effort:g}"
+            )
+    return state
+
+
+class OwnWorld:
+    """A `LockstepWorld` with a simulator of its own, which survives one failure of it at a time.
+
+    When the simulator dies, doesn't answer in time or answers nonsense, another one with the same seed takes
+    its place in the middle of the episode: it replays the journal, and no bit differs. A warning reports
+    that, and `restarts` counts it. If the other one fails as well, an error describes both failures, and the
+    next reset begins with a new simulator.
+
+    Args:
+        scene: the robots and objects.
+        control_period: simulated time of one action [s].
+        deadline: wall time that an answer may take, beside 10 ms for each tick [s]; None: 30 s.
+
+    Raises:
+        ValueError: if the period isn't a whole number of physics steps.
+        RobotEnvError: if there is no memory for the simulator, it doesn't start, or the robots can't be
+            brought up.
+    """
+
+    deterministic, shared = True, False
+
+    def __init__(self, scene: Scene, control_period: float, deadline: float | None = None) -> None:
+        self.scene = scene
+        self.restarts = 0
+        self._period = control_period  # [s]
+        self._deadline = DEADLINE if deadline is None else deadline
+        world_models(scene.robots[0].world)  # an unreadable file is reported before anything starts
+        self._slot = backend.next_slot()
+        if self._slot.number == 1:
+            check_memory(self._slot.of)
+        self._query = StateQuery()
+        self._journal = Journal()
+        self._world: LockstepWorld | None = None  # None: not connected
+        self._failed = self._closed = False
+        self._simulator = self._start()
+        try:
+            backend.connect_in_turn(self)
+        except BaseException:  # Ctrl-C, too
+            self.close()
+            raise
+
+    @property
+    def simulator(self) -> OwnSimulator:
+        """The one that moves the robots now."""
+        return self._simulator
+
+    def _start(self) -> OwnSimulator:
+        return OwnSimulator(self._slot, self.scene.robots[0].world, SEED)
+
+    def connect(self) -> None:
+        """Waits for the simulator, and brings the robots up.
+
+        Raises:
+            ValueError: if the period isn't a whole number of its physics steps.
+            RobotEnvError: if something doesn't start.
+        """
+        self._perform(lambda world: None)
+
+    def look(self, query: StateQuery) -> None:
+        """See `RobotBackend.look`.
+
+        Raises:
+            ValueError: for a link that is named twice.
+            SimulatorError: for an unknown name, or if two simulators fail.
+        """
+        before, self._query = self._query, query
+        if self._world is None and not self._failed:  # it is still starting, and `connect` asks
+            return
+        try:
+            self._perform(lambda world: world.look(query))
+        except BaseException:
+            self._query = before
+            raise
+
+    def vary(self, variation: Variation) -> None:
+        """See `RobotBackend.vary`."""
+        self._journal.forget_episode()  # a reset follows
+        self._perform(lambda world: world.vary(variation))
+        self._journal.variation = self._journal.variation.merged(variation)
+
+    def reset(self, initial: InitialState) -> WorldState:
+        """See `RobotBackend.reset`; the state reached is exactly the one asked for.
+
+        Raises:
+            ValueError: for an unknown joint.
+            SimulatorError: if the reset is refused, or two simulators fail.
+        """
+        self._journal.forget_episode()
+        state = self._perform(lambda world: checked(world.reset(initial), 0))
+        self._journal.initial, self._journal.last = initial, state
+        return state
+
+    def begin(self, commands: Commands) -> None:
+        """See `RobotBackend.begin`; if the simulator fails, `act` replaces it.
+
+        Raises:
+            SimulatorError: if no episode has begun.
+            ValueError: if a step is under way.
+        """
+        self._need_episode()
+        if self._world is not None:
+            with contextlib.suppress(SimulatorFault), master.using(self._simulator.uri):
+                self._world.begin(commands)
+
+    def act(self, commands: Commands) -> WorldState:
+        """See `RobotBackend.act`.
+
+        Raises:
+            SimulatorError: if the step is refused, or two simulators fail.
+        """
+        self._need_episode()
+        journal = self._journal
+        then = (len(journal.commands) + 1) * self._step
+        journal.last = self._perform(lambda world: checked(world.act(commands), then))
+        journal.commands.append(commands)
+        return journal.last
+
+    def poses(self, links: Sequence[str]) -> list[Pose]:
+        """See `RobotBackend.poses`.
+
+        Raises:
+            SimulatorError: if there is no such link, or two simulators fail.
+        """
+        return self._perform(lambda world: world.poses(links))
+
+    def _need_episode(self) -> None:
+        if self._journal.initial is None:
+            raise SimulatorError(f"{self._simulator} has no episode; begin one with reset()")
+
+    def _perform(self, action: Callable[[LockstepWorld], Result]) -> Result:
+        """Performs an action in the simulator, or in the one that replaces it: the one place that decides.
+
+        An action that a healthy simulator refuses is the caller's error. A failure is answered by one
+        replacement, unless the simulator never came up and another one would do the same.
+        """
+        if self._closed:
+            raise SimulatorError(f"{self._simulator} was closed")
+        failures: list[str] = []
+        while True:
+            try:
+                world = self._world or self._connect()
+                with master.using(self._simulator.uri):
+                    return action(world)
+            except RobotEnvError as error:
+                starting, hangs = self._world is None, isinstance(error, SimulatorHangs)
+                if not isinstance(error, SimulatorFault) and not (
+                    starting and (failures or self._simulator.has_died())
+                ):
+                    raise
+                self._disconnect()
+                self._failed = True
+                end = self._simulator.post_mortem(hangs)
+                failures.append(f"{self._simulator} failed: {error}; {end}")
+                if len(failures) == 2 or (starting and (hangs or self._simulator.gave_up)):
+                    self._journal.forget_episode()
+                    raise SimulatorError("; before that ".join(reversed(failures))) from error
+            self.restarts += 1
+            _warn(f"{failures[0]}; another one takes its place")
+
+    def _connect(self) -> LockstepWorld:
+        """Waits for the simulator, starting another one if it has failed, and replays the journal."""
+        if self._failed:
+            self._simulator, self._failed = self._start(), False
+        try:
+            self._simulator.wait()
+            with master.using(self._simulator.uri):
+                step = physics_step()
+                ticks = ticks_per_action(self._period, step)
+                self._step = ticks * round(step * NANOSECONDS)  # [ns] of one action
+                bring_up(self.scene, logger.debug)
+                world = LockstepWorld(self.scene, ticks, SharedWorld(), self._deadline)
+                self._world = world
+                world.look(self._query)
+                self._journal.replay(world, self._step)
+            return world
+        except BaseException as error:
+            if not isinstance(error, RobotEnvError):  # Ctrl-C: the simulator is in an unknown state
+                self._disconnect()
+                self._failed = True
+                self._simulator.terminate()
+            raise
+
+    def _disconnect(self) -> None:
+        if self._world is not None:
+            self._world.disconnect()
+            self._world = None
+
+    def close(self) -> None:
+        """Ends the simulator; may be called twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._disconnect()
+        self._journal.forget_episode()
+        self._simulator.terminate()
+        backend.join_in_turn(self._simulator.join)
+
+
+def _warn(text: str) -> None:
+    if rospy.core.is_initialized():  # then rospy has taken over Python's logging
+        rospy.logwarn("%s", text)
+    else:
+        logger.warning("%s", text)

@@ -1,0 +1,324 @@
+"""A robot in a simulator that runs in real time, by Gazebo's own services and topics alone."""
+
+import contextlib
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import rospy
+from gazebo_msgs.msg import ModelState
+from gazebo_msgs.srv import GetLinkState, SetModelConfiguration, SetModelState
+from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
+from geometry_msgs.msg import Pose as PoseMsg
+from sensor_msgs.msg import JointState as JointStateMsg
+from std_msgs.msg import Float64, Float64MultiArray
+from std_srvs.srv import Empty
+
+from bullet_gazebo.physics.pose import Pose
+from robot_envs.backends.ros.bringup import full_name, ready
+from robot_envs.backends.ros.gazebo import RunningSimulator, SimulatorService
+from robot_envs.backends.ros.messages import JointStateReader, pose_of
+from robot_envs.backends.ros.properties import RosVariation
+from robot_envs.backends.ros.shared_world import SharedWorld
+from robot_envs.errors import RobotEnvError, SimulatorError
+from robot_envs.scene import Scene
+from robot_envs.variation import Variation
+from robot_envs.world_state import (
+    Commands,
+    InitialState,
+    JointState,
+    Motion,
+    StateQuery,
+    WorldState,
+)
+
+STATE_TIMEOUT = 5.0  # [s] of wall time without a joint state
+RESET_WAIT = 0.5  # [s] of wall time for the joint state that a reset publishes
+_SAME = 1e-6  # [m], [rad]
+_EARLY = 1e-6  # [s]; of rounding
+_ONLY_JOINTS = "a world in real time gives the joints alone (backend 'ros-realtime')"
+
+
+class JointStates:
+    """Subscribes to a robot's joint states, and keeps the newest.
+
+    Args:
+        scene: of one robot.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._read = JointStateReader(scene)
+        self._newest: tuple[JointStateMsg, float] | None = None  # with its wall time [s]
+        self._arrived = threading.Condition()
+        self._subscriber = rospy.Subscriber(
+            full_name(scene.robots[0], "joint_states"),
+            JointStateMsg,
+            self._receive,
+            queue_size=1,
+            tcp_nodelay=True,
+        )
+
+    def _receive(self, message: JointStateMsg) -> None:
+        # Messages of joint_state_publisher are all zero, and carry no velocities.
+        if message.velocity:
+            with self._arrived:
+                self._newest = (message, time.monotonic())
+                self._arrived.notify_all()
+
+    @property
+    def time(self) -> float | None:
+        """Simulated time of the newest [s]; None if there is none."""
+        with self._arrived:
+            return None if self._newest is None else self._newest[0].header.stamp.to_sec()
+
+    def forget_unless_at(self, positions: Mapping[str, float]) -> None:
+        """Waits a moment for a joint state with these positions; if none comes, forgets the newest."""
+        with self._arrived:
+            if not self._arrived.wait_for(lambda: self._is_at(positions), RESET_WAIT):
+                self._newest = None
+
+    def _is_at(self, positions: Mapping[str, float]) -> bool:
+        if self._newest is None:
+            return False
+        found = self._read(self._newest[0])
+        return all(abs(joint.position - positions[name]) < _SAME for name, joint in found.items())
+
+    def wait_until(self, due: float | None) -> tuple[float, dict[str, JointState]]:
+        """Waits for the joint state of a simulated time [s]; None: takes any.
+
+        There is no bound on a long control period as long as joint states come.
+
+        Returns:
+            Its simulated time [s], and the joints.
+
+        Raises:
+            SimulatorError: if they stop coming.
+        """
+        with self._arrived:
+            while True:
+                there = self._arrived.wait_for(lambda: self._is_there(due), STATE_TIMEOUT)
+                newest = self._newest
+                if newest is None or time.monotonic() - newest[1] > STATE_TIMEOUT:
+                    raise SimulatorError(
+                        f"no joint state on /joint_states for {STATE_TIMEOUT:g} s: "
+                        f"{ready(self._scene).missing() or 'is the world running?'}"
+                    )
+                if there:
+                    break
+        return newest[0].header.stamp.to_sec(), self._read(newest[0])
+
+    def _is_there(self, due: float | None) -> bool:
+        if self._newest is None:
+            return False
+        return due is None or self._newest[0].header.stamp.to_sec() > due - _EARLY
+
+    def close(self) -> None:
+        """Unsubscribes."""
+        self._subscriber.unregister()
+
+
+class CommandTopic:
+    """The topic on which a controller listens for commands.
+
+    Args:
+        scene: the robots.
+        controller: its full name.
+        single: whether it takes one number instead of a list.
+    """
+
+    def __init__(self, scene: Scene, controller: str, single: bool) -> None:
+        self._scene, self._controller, self._single = scene, controller, single
+        self._publisher = self._advertise()
+
+    def _advertise(self) -> rospy.Publisher:
+        kind = Float64 if self._single else Float64MultiArray
+        return rospy.Publisher(f"{self._controller}/command", kind, queue_size=1)
+
+    def publish(self, value: Any) -> None:
+        """Commands the controller."""
+        self._publisher.publish(Float64(value) if self._single else Float64MultiArray(data=value))
+
+    def wait(self) -> None:
+        """Waits until the controller listens; advertises the topic anew halfway.
+
+        rospy turns a subscriber away that connects after one environment's end and before the next one's
+        beginning in the same process, and doesn't try again.
+
+        Raises:
+            SimulatorError: if the controller doesn't listen in time.
+        """
+        if self._is_linked(STATE_TIMEOUT / 2):
+            return
+        self._publisher.unregister()
+        self._publisher = self._advertise()
+        if not self._is_linked(STATE_TIMEOUT / 2):
+            raise SimulatorError(
+                f"nobody listens on {self._publisher.resolved_name}: {ready(self._scene).missing()}"
+            )
+
+    def _is_linked(self, bound: float) -> bool:
+        """Whether somebody subscribes within a time [s]."""
+        deadline = time.monotonic() + bound
+        while self._publisher.get_num_connections() == 0:
+            if time.monotonic() > deadline:
+                return False
+            time.sleep(0.01)
+        return True
+
+    def close(self) -> None:
+        """Leaves the topic."""
+        self._publisher.unregister()
+
+
+class RealtimeWorld:
+    """Moves a robot as the existing script does, with nothing but Gazebo's services and topics.
+
+    An action unpauses the world, publishes the commands, and takes the newest joint state. How much simulated
+    time passes depends on the machine.
+
+    Args:
+        scene: the robot, which is there, with its controllers running.
+        control_period: simulated time from one joint state to the next one that is taken [s]; 0 takes the
+            newest one without waiting.
+        world: shared with the other environments of this process.
+
+    Raises:
+        RobotEnvError: for several robots.
+    """
+
+    deterministic, shared = False, True
+
+    def __init__(self, scene: Scene, control_period: float, world: SharedWorld) -> None:
+        if scene.several:
+            raise RobotEnvError(f"{_ONLY_JOINTS}, and those of one robot")
+        self.scene, self._world = scene, world
+        self._period = control_period or None
+        self._simulator = RunningSimulator()
+        self._variation = RosVariation(scene)
+        self._pause = SimulatorService("/gazebo/pause_physics", Empty)
+        self._unpause = SimulatorService("/gazebo/unpause_physics", Empty)
+        self._reset_world = SimulatorService("/gazebo/reset_world", Empty)
+        self._set_joints = SimulatorService(
+            "/gazebo/set_model_configuration", SetModelConfiguration
+        )
+        self._set_model = SimulatorService("/gazebo/set_model_state", SetModelState)
+        self._get_link = SimulatorService("/gazebo/get_link_state", GetLinkState)
+        self._held: dict[str, Any] = {}
+        self._begin = 0.0  # [s] of the episode
+        self._topics = {
+            name: CommandTopic(scene, full_name(robot, port.name), port.single)
+            for name, (robot, port) in scene.ports.items()
+        }
+        world.join(self)
+        self._states = JointStates(scene)
+
+    def reset(self, initial: InitialState) -> WorldState:
+        """See `RobotBackend.reset`; leaves the world paused, and joints at rest.
+
+        Waits for the joint state that the reset publishes. If the simulator publishes none while it is
+        paused, the joints are taken to be where they were put.
+
+        Raises:
+            ValueError: for an unknown joint.
+            SimulatorError: if the simulator refuses, or doesn't answer.
+        """
+        positions = {name: at for name, (at, _) in self.scene.placed_joints(initial).items()}
+        with self._simulator:
+            self._world.claim(self)
+            for topic in self._topics.values():
+                topic.wait()
+            self._pause()
+            self._reset_world()
+            for name, motion in self.scene.placed_models(initial).items():
+                self._place_model(name, motion)
+            self._place_joints(positions)
+        self._states.forget_unless_at(positions)
+        joints = {name: JointState(positions[name], 0.0, 0.0) for name in self.scene.joints}
+        self._held = self.scene.starting_commands(joints)
+        self._begin = self._states.time or 0.0
+        return WorldState(0.0, joints, self._held)
+
+    def _place_model(self, name: str, motion: Motion) -> None:
+        pose, (linear, angular) = motion
+        at = PoseMsg(Point(*pose.position), Quaternion(*pose.orientation))
+        wanted = ModelState(name, at, Twist(Vector3(*linear), Vector3(*angular)), "world")
+        _check(self._set_model(wanted), f"model '{name}' can't be placed")
+
+    def _place_joints(self, positions: Mapping[str, float]) -> None:
+        """Puts all joints at their positions [rad, m], by name in the scene, at rest."""
+        robot = self.scene.robots[0]
+        own = {name: positions[key] for key, (_, name) in self.scene.moved.items()}
+        answer = self._set_joints(
+            robot.model, full_name(robot, robot.description), list(own), list(own.values())
+        )
+        _check(answer, f"the robot '{robot.model}' can't be reset")
+
+    def begin(self, commands: Commands) -> None:
+        """See `RobotBackend.begin`; does nothing."""
+
+    def act(self, commands: Commands) -> WorldState:
+        """See `RobotBackend.act`.
+
+        Raises:
+            SimulatorError: if joint states stop coming, the simulator doesn't answer, or another environment
+                has moved the robot since the reset.
+        """
+        self._world.check_holder(self)
+        with self._simulator:
+            self._unpause()
+            last = self._states.time
+            due = None if self._period is None or last is None else last + self._period
+            for name, command in commands.items():
+                self._topics[name].publish(command)
+            self._held = {**self._held, **commands}
+            now, joints = self._states.wait_until(due)
+        return WorldState(max(0.0, now - self._begin), joints, self._held)
+
+    def look(self, query: StateQuery) -> None:
+        """See `RobotBackend.look`.
+
+        Raises:
+            RobotEnvError: for any query that isn't empty.
+        """
+        if query != StateQuery():
+            raise RobotEnvError(f"{_ONLY_JOINTS}: links, models and contacts aren't told")
+
+    def vary(self, variation: Variation) -> None:
+        """See `RobotBackend.vary`."""
+        with self._simulator:
+            self._world.claim(self)  # undoes what others have varied
+        self._variation(variation)
+
+    def restore(self) -> None:
+        """See `SharedBackend.restore`."""
+        self._variation.undo()
+
+    def poses(self, links: Sequence[str]) -> list[Pose]:
+        """See `RobotBackend.poses`; makes a call for each.
+
+        Raises:
+            SimulatorError: if the simulator doesn't answer, or has no such link.
+        """
+        found = []
+        with self._simulator:
+            for link in links:
+                answer = self._get_link(link, "world")
+                _check(answer, f"the pose of '{link}' isn't known")
+                found.append(pose_of(answer.link_state.pose))
+        return found
+
+    def close(self) -> None:
+        """Leaves the topics, and restores robot and objects; the world stays paused or running."""
+        self._states.close()
+        for topic in self._topics.values():
+            topic.close()
+        self._variation.undo()
+        with contextlib.suppress(SimulatorError):  # a simulator that is gone has no objects either
+            self._world.leave(self)
+
+
+def _check(answer: Any, what: str) -> None:
+    if not answer.success:
+        raise SimulatorError(f"{what}: {answer.status_message}")

@@ -1,1 +1,0 @@
-"""A robot whose time runs by itself, moved by Gazebo's own services and topics alone."""

@@ -1,0 +1,272 @@
+"""What a process's environments over ROS share: master, simulator and robots, started if they don't run."""
+
+import atexit
+import contextlib
+import os
+import re
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+
+import rospy
+
+from robot_envs.backends.backend import RobotBackend, ticks_per_action
+from robot_envs.backends.ros import gazebo, node, windows
+from robot_envs.backends.ros.bringup import Say, bring_up
+from robot_envs.backends.ros.gazebo import STEP_SERVICE, RunningSimulator, Undo
+from robot_envs.backends.ros.shared_world import SharedWorld
+from robot_envs.errors import RobotEnvError
+from robot_envs.robot import Robot
+from robot_envs.scene import Scene
+from ros_calls.service import TIMEOUT
+from ros_utils import ros_gazebo
+
+START_TIMEOUT = 60.0  # [s] for the simulator to come up
+
+
+class RosSession:
+    """Starts master, simulator, robots and controllers where they don't run; `close` ends what it started.
+
+    Once started it is the process's session: environments of these robots that are made with the backend
+    "ros" ("ros-realtime" if `realtime`) use it.
+
+    Args:
+        robots: the robot, or several that share a world.
+        name: this process's node name, with namespace.
+        argv: the process's arguments, with roslaunch's remappings.
+        realtime: let the world run in real time, instead of in lock-step.
+        gui: open the simulator's window, if it isn't open.
+        seed: of a simulator that is started here.
+        rviz: show the robot in RViz.
+        curves: a run folder, whose curves the window shows beside the robot, whoever opened it.
+    """
+
+    def __init__(
+        self,
+        robots: Robot | Sequence[Robot],
+        name: str,
+        argv: list[str],
+        realtime: bool,
+        gui: bool,
+        seed: int,
+        rviz: bool = False,
+        curves: Path | None = None,
+    ) -> None:
+        self._scene = Scene([robots] if isinstance(robots, Robot) else robots)
+        self._world = SharedWorld()
+        self._name, self._argv = name, argv
+        self._realtime, self._gui, self._seed = realtime, gui, seed
+        self._rviz, self._curves = rviz, curves
+        self._undo = contextlib.ExitStack()
+        # Outlives the world, since a process can become a node only once.
+        self._node = contextlib.ExitStack()
+        self._started_simulator = False
+
+    def start(self, say: Say) -> None:
+        """Starts what is missing, and makes this the process's session.
+
+        If the simulator was started here and dies before its robots are there, another one is started once.
+
+        Args:
+            say: is called with a line for each thing that is started.
+
+        Raises:
+            RobotEnvError: if something can't be started, or what runs doesn't fit; `close` ends what was
+                started before.
+        """
+        try:
+            self._start(say)
+        except RobotEnvError as error:
+            if not self._started_simulator or _simulator_runs():
+                raise
+            rospy.logwarn("%s; another simulator is started in its place", error)
+            self._undo.close()
+            self._start(say)
+
+    def _start(self, say: Say) -> None:
+        robot = self._scene.robots[0]
+        if rospy.core.is_initialized() and rospy.is_shutdown():
+            raise RobotEnvError(
+                "this process's ROS node has ended, and a process becomes one only once; keep a "
+                "session until the end, or begin another process"
+            )
+        if self._rviz:
+            windows.check_rviz(robot)
+        self._started_simulator = not _simulator_runs()
+        if self._started_simulator:
+            say("starting the simulator")
+            self._start_simulator()
+        self._become_node()
+        self._check_mode()
+        gazebo.check_world(robot)
+        if self._curves is not None:
+            self._undo.callback(windows.show_curves(self._curves))
+        changes = bring_up(self._scene, say)
+        if not self._started_simulator:  # otherwise it ends with all that is in it
+            running = RunningSimulator()
+            for undo in (*changes, lambda: self._world.place_objects(())):
+                self._undo.callback(_undo_if_running, running, undo)
+        if self._gui:
+            self._show_window(say)
+        if self._rviz:
+            say("opening RViz")
+            self._undo.callback(windows.open_rviz(robot))
+        _sessions().append(self)
+        self._undo.callback(_sessions().remove, self)
+
+    def _start_simulator(self) -> None:
+        """Starts the simulator, and the master if there is none."""
+
+        def write(text: str) -> str:
+            with NamedTemporaryFile("w", suffix=".world", delete=False) as file:
+                file.write(text)
+            self._undo.callback(os.unlink, file.name)
+            return file.name
+
+        started = ros_gazebo.launch_Gazebo(
+            paused=True, gui=self._gui, output="log", launch_new_term=False,
+            custom_world_path=gazebo.world_path(self._scene.robots[0].world, write),
+            lockstep=not self._realtime, seed=self._seed, timeout=START_TIMEOUT,
+        )  # fmt: skip
+        if isinstance(started, bool):
+            raise RobotEnvError("the simulator didn't start; see the messages above")
+        running = RunningSimulator()
+
+        def end() -> None:
+            if started.pid is not None and running.is_registered():
+                ros_gazebo.close_Gazebo()
+            else:  # another simulator has taken its name, and isn't ours to end
+                started.close()
+
+        self._undo.callback(end)
+
+    def _become_node(self) -> None:
+        """Makes this process a node, unless it is one; the training handles signals itself."""
+        if rospy.core.is_initialized():
+            return
+        node.refuse_twin(self._name)
+        rospy.init_node(os.path.basename(self._name), argv=["", *self._argv], disable_signals=True)
+        self._node.callback(rospy.signal_shutdown, "training ended")
+
+    def _check_mode(self) -> None:
+        """Raises RobotEnvError if the running simulator doesn't move as the environments need it."""
+        lockstep = node.service_is_registered(STEP_SERVICE)
+        if self._realtime and lockstep:
+            raise RobotEnvError(
+                f"the running simulator moves in lock-step (it has {STEP_SERVICE}): its time would stand "
+                "still; train without --realtime, or start it with lockstep:=false"
+            )
+        if not self._realtime and not lockstep:
+            raise RobotEnvError(
+                f"the running simulator has no {STEP_SERVICE}: start it with lockstep:=true "
+                "(roslaunch gazebo_ros empty_world.launch takes it), or train with --realtime"
+            )
+
+    def _show_window(self, say: Say) -> None:
+        if self._started_simulator:
+            windows.report_opening(say, registered=False)
+        elif windows.is_open():
+            windows.report_open(say)
+        else:
+            self._undo.callback(windows.open_window(say))
+            windows.report_opening(say, registered=True)
+
+    def serves(self, scene: Scene, realtime: bool) -> bool:
+        """Whether it has these robots, and moves as asked."""
+        return self.moves(scene.robots) and self._realtime == realtime
+
+    def moves(self, robots: Sequence[Robot]) -> bool:
+        """Whether it has these robots."""
+        return self._scene.robots == tuple(robots)
+
+    def connect(
+        self, scene: Scene, control_period: float, deadline: float | None = None
+    ) -> RobotBackend:
+        """Makes a backend that moves the robots; the caller closes it.
+
+        Args:
+            scene: the session's robots, and objects, which are in the world during this backend's episodes.
+            control_period: simulated time of one action [s]; in real time 0 takes the newest joint state
+                without waiting.
+            deadline: wall time that an answer in lock-step may take, beside 10 ms for each tick [s].
+
+        Raises:
+            ValueError: if the period isn't a whole number of physics steps.
+            RobotEnvError: if the simulator doesn't answer, or an object can't be spawned.
+        """
+        ticks = ticks_per_action(control_period, gazebo.physics_step()) if control_period else 0
+        if self._realtime:
+            from robot_envs.backends.ros.realtime import RealtimeWorld
+
+            return RealtimeWorld(scene, control_period, self._world)
+        from robot_envs.backends.ros.lockstep import LockstepWorld
+
+        return LockstepWorld(scene, ticks, self._world, deadline or TIMEOUT)
+
+    def make_room(self) -> None:
+        """Ends what `start` started, except the node, for another world.
+
+        Raises:
+            RobotEnvError: if an environment still uses it.
+        """
+        if self._world.is_used:
+            raise RobotEnvError(
+                "over ROS a process moves one world at a time, and an environment of "
+                f"'{self._scene.robots[0].model}' is open; close() it first, or put several robots into "
+                "one world: RobotEnv([first, second], task)"
+            )
+        self._undo.close()
+
+    def close(self) -> None:
+        """Ends what `start` started; may be called twice."""
+        try:
+            self._undo.close()
+        finally:
+            self._node.close()
+
+
+def running_session(scene: Scene, realtime: bool) -> RosSession:
+    """The process's session, started if there is none; it runs until the process ends.
+
+    If its simulator has died, another one is started. A session of other robots ends.
+
+    Raises:
+        RobotEnvError: if something can't be started, what runs doesn't fit, or an environment of other robots
+            is open.
+    """
+    for session in reversed(_sessions()[:]):
+        answers = gazebo.simulator_answers()
+        if session.serves(scene, realtime):
+            if answers:
+                return session
+            break
+        if answers and not session.moves(scene.robots):
+            session.make_room()
+    model = re.sub(r"\W", "_", scene.robots[0].model, flags=re.ASCII).strip("_") or "robot"
+    name = f"/{model}_env_{os.getpid()}"
+    session = RosSession(scene.robots, name, [], realtime=realtime, gui=False, seed=0)
+    try:
+        session.start(rospy.loginfo)
+    except BaseException:  # Ctrl-C, too
+        session.close()
+        raise
+    atexit.register(session.close)
+    return session
+
+
+def _simulator_runs() -> bool:
+    return node.master_is_up() and gazebo.simulator_answers()
+
+
+def _undo_if_running(running: RunningSimulator, undo: Undo) -> None:
+    """Undoes a change, unless the simulator has died meanwhile or was replaced."""
+    with contextlib.suppress(RobotEnvError, rospy.ServiceException, rospy.ROSException, OSError):
+        if running.is_registered() and gazebo.simulator_answers():
+            undo()
+
+
+@lru_cache(maxsize=1)
+def _sessions() -> list[RosSession]:
+    """The process's sessions, oldest first."""
+    return []

@@ -1,1 +1,0 @@
-"""Between the messages of ROS and what backends know."""

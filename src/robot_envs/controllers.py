@@ -1,0 +1,168 @@
+"""Controllers as a robot's parameters describe them: checked, loaded, and commanded."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from bullet_gazebo.control.controllers import find_type
+from bullet_gazebo.control.controllers.base import Controller
+from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.control.hardware import RobotHardware
+from bullet_gazebo.control.manager import STRICT, ControllerManager
+from bullet_gazebo.state import did_you_mean
+
+KINDS = ("Float64", "Float64MultiArray")  # of command topics that take numbers
+QUANTITIES = ("position", "velocity", "effort")  # that they command
+Loaded = dict[str, Controller]
+
+
+class CommandPort(NamedTuple):
+    """What takes a controller's commands.
+
+    Args:
+        name: of the controller.
+        joints: as many numbers, in this order.
+        single: whether it takes one number, and no list.
+        quantity: what the numbers are: "position", "velocity" or "effort".
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    single: bool
+    quantity: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether it holds positions, so that an episode starts with those where its joints stand."""
+        return self.quantity == QUANTITIES[0]
+
+    def at_start(self, positions: Mapping[str, float]) -> float | tuple[float, ...]:
+        """What it holds when an episode starts: where the joints stand, or zeros."""
+        values = tuple(positions[joint] if self.holds else 0.0 for joint in self.joints)
+        return values[0] if self.single else values
+
+
+def load(
+    names: Sequence[str], parameters: Mapping[str, Any], hardware: RobotHardware
+) -> tuple[ControllerManager, Loaded]:
+    """Makes a manager that has loaded these controllers.
+
+    Raises:
+        ControlError: if one isn't described, or can't be made.
+    """
+    manager = ControllerManager(hardware)
+    return manager, {name: _load_one(manager, name, parameters) for name in names}
+
+
+def _load_one(manager: ControllerManager, name: str, parameters: Mapping[str, Any]) -> Controller:
+    if name not in parameters:
+        raise ControlError(
+            f"there is no controller '{name}' among its parameters{did_you_mean(name, parameters)}"
+        )
+    described = parameters[name]
+    kind = described.get("type") if isinstance(described, Mapping) else None
+    if not kind:
+        raise ControlError(f"controller '{name}': its parameters have no type")
+    if isinstance(kind, str) and kind not in manager.types:
+        own = find_type(kind)  # as the simulator finds a user's
+        if own is None:
+            near = did_you_mean(kind, manager.types)
+            raise ControlError(f"controller '{name}': there is no type '{kind}'{near}")
+        manager.types[kind] = own
+    return manager.load(name, described)
+
+
+def ports(
+    commanded: Sequence[str] | None, parameters: Mapping[str, Any], loaded: Loaded
+) -> list[CommandPort]:
+    """What takes the commands of a task.
+
+    Args:
+        commanded: the controllers, in order; None: all that take numbers.
+        parameters: of all controllers.
+        loaded: those that run.
+
+    Raises:
+        ControlError: if one doesn't run, or takes no numbers.
+    """
+    if commanded is None:
+        return [_port(each, parameters) for each in loaded.values() if _takes_numbers(each)]
+    for name in commanded:
+        if name not in loaded:
+            raise ControlError(
+                f"'{name}' is commanded, but not among the controllers that run{did_you_mean(name, loaded)}"
+            )
+        if not _takes_numbers(loaded[name]):
+            raise ControlError(
+                f"controller '{name}' ({loaded[name].type_name}) takes no numbers; tasks command "
+                "controllers of single joints, or of groups"
+            )
+    return [_port(loaded[name], parameters) for name in commanded]
+
+
+def _takes_numbers(controller: Controller) -> bool:
+    return [each.kind in KINDS for each in controller.inputs] == [True]
+
+
+def _port(controller: Controller, parameters: Mapping[str, Any]) -> CommandPort:
+    described = parameters[controller.name]
+    listed = described.get("joints") or [described.get("joint")]
+    joints = tuple(listed) if set(listed) == set(controller.claimed) else controller.claimed
+    names = (controller.type_name.rpartition("/")[2], controller.interface)
+    known = [each for name in names for each in QUANTITIES if each.capitalize() in name]
+    # A type that says nothing of it, of a user's own, takes what its joints take.
+    quantity = "position" if "position" in known else (known or QUANTITIES[2:])[0]
+    return CommandPort(controller.name, joints, controller.inputs[0].kind == KINDS[0], quantity)
+
+
+def faults(
+    run: Sequence[str],
+    commanded: Sequence[str] | None,
+    parameters: Mapping[str, Any],
+    hardware: RobotHardware,
+    movable: Sequence[str],
+) -> Iterator[str]:
+    """What is wrong with them, one line each.
+
+    Args:
+        run: those that are to run.
+        commanded: those that a task is to command; None: all that take numbers.
+        parameters: of all controllers.
+        hardware: the robot's.
+        movable: its joints that move, those without a transmission, too.
+    """
+    manager = ControllerManager(hardware)
+    loaded: Loaded = {}
+    for name in dict.fromkeys(run):
+        strangers = list(_strangers(name, parameters.get(name), hardware, movable))
+        yield from strangers
+        try:
+            if not strangers:
+                loaded[name] = _load_one(manager, name, parameters)
+        except ControlError as error:
+            yield str(error)
+        if list(run).count(name) > 1:
+            yield f"the controllers to run name '{name}' twice"
+    if len(loaded) < len(run):
+        return
+    try:
+        ports(commanded, parameters, loaded)
+        manager.switch(loaded, [], STRICT)
+    except ControlError as error:
+        yield str(error)
+
+
+def _strangers(
+    name: str, described: Any, hardware: RobotHardware, movable: Sequence[str]
+) -> Iterator[str]:
+    """What a controller calls joints, and is none that it can have."""
+    if not isinstance(described, Mapping):
+        return
+    listed = described.get("joints", described.get("joint", []))
+    for joint in [listed] if isinstance(listed, str) else listed:
+        if joint in hardware.joints:
+            continue
+        if joint in movable:
+            yield f"controller '{name}': joint '{joint}' has no <transmission> in the URDF"
+        else:
+            near = did_you_mean(str(joint), movable) or f"; there are {', '.join(movable)}"
+            yield f"controller '{name}': there is no joint '{joint}'{near}"

@@ -1,0 +1,126 @@
+"""Where a robot's links are and how they move, computed from its joints alone."""
+
+from collections.abc import Mapping
+
+from bullet_gazebo.physics.dynamics import link_poses
+from bullet_gazebo.physics.pose import (
+    Pose,
+    Vector,
+    conjugate,
+    multiply,
+    scale,
+    subtract,
+)
+from bullet_gazebo.state import SCOPE, did_you_mean
+from robot_envs.errors import RobotEnvError
+from robot_envs.robot import Robot
+from robot_envs.world_state import JointState, LinkQuery, Motion, StateQuery, link_keys
+
+INSTANT = 1e-5  # [s] either way, over which poses are differentiated
+AT_REST = Motion(Pose())  # the world
+_WORLD = ("", "world")
+
+
+class LinkView:
+    """Tells the links that a query names, of a robot that is fixed to the world where its description says.
+
+    Poses are those of the engine, by forward kinematics; twists are their derivatives.
+
+    Args:
+        robot: the robot.
+        query: what is wanted beside the joints.
+
+    Raises:
+        RobotEnvError: if the query names what joints don't tell.
+    """
+
+    def __init__(self, robot: Robot, query: StateQuery) -> None:
+        self._links = robot.links
+        self._root = robot.pose.compose(robot.links.root_pose)
+        _check(robot, query)
+        try:
+            keys = link_keys(query)
+        except ValueError as error:
+            raise RobotEnvError(str(error)) from error
+        places = [_of_link(robot, each.link) for each in query.links]
+        frames = [_of_frame(robot, each) for each in query.links]
+        self._wanted = list(zip(keys, places, frames, strict=True))
+
+    def __call__(self, joints: Mapping[str, JointState]) -> dict[str, Motion]:
+        """The links, each in the frame asked for, by the names of the query.
+
+        Args:
+            joints: at least those that the links hang on.
+        """
+        if not self._wanted:
+            return {}
+        now, before, after = (self._poses(joints, time) for time in (0.0, -INSTANT, INSTANT))
+
+        def motion(place: tuple[str, Pose]) -> Motion:
+            link, offset = place
+            poses = [each[link].compose(offset) for each in (now, before, after)]
+            return Motion(poses[0], _twist(poses[1], poses[2]))
+
+        found = {}
+        for key, place, frame in self._wanted:
+            found[key] = motion(place).seen_from(AT_REST if frame is None else motion(frame))
+        return found
+
+    def _poses(self, joints: Mapping[str, JointState], time: float) -> dict[str, Pose]:
+        """Of all links, so long from now on [s]."""
+        positions = {name: each.position + time * each.velocity for name, each in joints.items()}
+        return link_poses(self._links, self._root, positions)
+
+
+def _twist(before: Pose, after: Pose) -> tuple[Vector, Vector]:
+    """Linear and angular velocity in the world, between two poses 2 * INSTANT apart."""
+    rate = 0.5 / INSTANT
+    linear = scale(subtract(after.position, before.position), rate)
+    x, y, z, w = multiply(after.orientation, conjugate(before.orientation))
+    return linear, scale((x, y, z), 2.0 * rate if w >= 0.0 else -2.0 * rate)
+
+
+def _check(robot: Robot, query: StateQuery) -> None:
+    unknown = {
+        "contacts": query.contacts_of or query.all_contacts,
+        "models": query.models or query.all_models,
+    }
+    for what, asked in unknown.items():
+        if asked:
+            raise RobotEnvError(
+                f"the task asks for {what}, which nobody tells of a robot that isn't simulated"
+            )
+    if query.links and not robot.links.fixed_base:
+        raise RobotEnvError(
+            f"the task asks for links, and '{robot.model}' isn't fixed to the world: its joints don't tell "
+            "where it is"
+        )
+
+
+def _of_frame(robot: Robot, query: LinkQuery) -> tuple[str, Pose] | None:
+    return None if query.frame in _WORLD else _of_link(robot, query.frame)
+
+
+def _of_link(robot: Robot, name: str) -> tuple[str, Pose]:
+    """A link that joints move, and where in it the one of that name is.
+
+    Raises:
+        RobotEnvError: if there is none, or it hangs on a joint that nobody tells.
+    """
+    model, _, plain = name.rpartition(SCOPE)
+    links = robot.links
+    if model not in ("", robot.model) or not (plain in links.links or plain in links.lumped):
+        near = did_you_mean(plain, [*links.links, *links.lumped])
+        raise RobotEnvError(f"the robot '{robot.model}' has no link '{name}'{near}")
+    whole, place = links.lumped.get(plain, (plain, Pose()))
+    parents = {joint.child: joint for joint in links.joints.values()}
+    link = whole
+    while link in parents:
+        joint = parents[link]
+        if joint.movable and joint.name not in robot.joints:
+            raise RobotEnvError(
+                f"the link '{name}' hangs on the joint '{joint.name}', which has no transmission: "
+                "nobody tells where it is"
+            )
+        link = joint.parent
+    return whole, place

@@ -1,0 +1,219 @@
+"""A task and a policy in control of a robot, step by step, within its limits; without ROS or a clock."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bullet_gazebo.control.joint import JointLimits
+from robot_envs.checks import action_reader, observation_reader, with_goals
+from robot_envs.controllers import CommandPort
+from robot_envs.deployment.kinematics import LinkView
+from robot_envs.errors import RobotEnvError
+from robot_envs.robot import Robot
+from robot_envs.scene import Scene
+from robot_envs.task import GoalTask, Task
+from robot_envs.world_state import Command, JointState, WorldState
+
+
+class Limited(NamedTuple):
+    """A command within its limits."""
+
+    command: Command
+    beyond: tuple[str, ...]  # joints whose command was beyond the URDF's bounds
+
+
+class CommandLimits:
+    """Keeps the commands of a controller within what the URDF says of its joints.
+
+    | command | stays within |
+    |---|---|
+    | position | `lower` and `upper`, and the soft ones; and goes from one to the next at `velocity` at most |
+    | velocity | `velocity` either way |
+    | effort | `effort` either way |
+
+    Args:
+        robot: has the limits.
+        port: of the controller.
+        way: how far a position may go from one command to the next, as a share of what the joint's
+            velocity limit allows meanwhile; infinity: as far as it likes.
+        period: from one command to the next [s].
+    """
+
+    def __init__(self, robot: Robot, port: CommandPort, way: float, period: float) -> None:
+        self._port = port
+        limits = [robot.limits[joint] for joint in port.joints]
+        self._bounds = [_bounds(each, port.quantity) for each in limits]
+        moves = port.quantity == "position"
+        self._ways = [
+            each.velocity * way * period if moves and each.velocity else math.inf for each in limits
+        ]
+
+    def __call__(self, command: Command, held: Command) -> Limited:
+        """The nearest one that is allowed after the one that is held."""
+        beyond, numbers = [], []
+        wanted, before = self._numbers(command), self._numbers(held)
+        for joint, value, start, (lower, upper), way in zip(
+            self._port.joints, wanted, before, self._bounds, self._ways, strict=True
+        ):
+            bounded = min(max(value, lower), upper)
+            if bounded != value:
+                beyond.append(joint)
+            numbers.append(min(max(bounded, start - way), start + way))
+        return Limited(numbers[0] if self._port.single else tuple(numbers), tuple(beyond))
+
+    def _numbers(self, command: Command) -> list[float]:
+        return [command] if self._port.single else list(command)  # type: ignore[list-item, arg-type]
+
+    def stop(self, joints: Mapping[str, JointState]) -> Command:
+        """What has the joints stop: positions where they are, or no velocity, or no effort."""
+        return self._port.at_start({name: each.position for name, each in joints.items()})
+
+
+def _bounds(limits: JointLimits, quantity: str) -> tuple[float, float]:
+    if quantity != "position":
+        most = limits.velocity if quantity == "velocity" else limits.effort
+        return (-math.inf, math.inf) if most is None else (-most, most)
+    soft = limits.soft
+    lower = [each for each in (limits.lower, soft.lower if soft else None) if each is not None]
+    upper = [each for each in (limits.upper, soft.upper if soft else None) if each is not None]
+    return max(lower, default=-math.inf), min(upper, default=math.inf)
+
+
+Joints = Mapping[str, JointState]
+Say = Callable[[str], None]
+
+
+class Pilot:
+    """Has a policy do a task, as in an environment, with what the robot's joints tell.
+
+    The task's methods are called as an environment calls them, its reward, too, so that what a task keeps
+    for itself is as in the training. Where joints begin is where they are: what `initial_state` says
+    of them isn't done.
+
+    Args:
+        robot: the robot.
+        task: what the policy has learned.
+        act: the policy: the action for an observation.
+        period: from one step to the next [s].
+        seed: of what the task draws at the beginning, such as a goal.
+        goal: of a `GoalTask`; None: it draws one.
+        way: see `CommandLimits`.
+        say: is told of commands beyond their limits, once for each controller.
+
+    Raises:
+        RobotEnvError: if something is wrong in the robot's description, or the task asks for what can't be
+            known.
+        ValueError: if the goal is none.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        act: Callable[[Any], Any],
+        period: float,
+        seed: int = 0,
+        goal: Any = None,
+        way: float = 1.0,
+        say: Say = print,
+    ) -> None:
+        self._scene, self._task, self._act, self._say = Scene([robot]), task, act, say
+        if not robot.ports:
+            raise RobotEnvError(f"the robot '{robot.model}' has no controller that takes commands")
+        self._links = LinkView(robot, task.query)
+        self._limits = {port.name: CommandLimits(robot, port, way, period) for port in robot.ports}
+        self._read_action = action_reader(task.action_space())
+        self._read = observation_reader(task.observation_space(), type(task).__name__)
+        self._generator = np.random.default_rng(seed)
+        self._told: set[str] = set()
+        self._held: dict[str, Command] = {}
+        self._action: Any = None  # None: no step yet
+        self._goal: np.ndarray | None = None  # that was given
+        if goal is not None:
+            self.aim(goal)
+
+    def begin(self, joints: Joints) -> None:
+        """Begins: commands go on from where the joints are.
+
+        Raises:
+            ValueError: if the task draws a goal that is none.
+        """
+        self._task.initial_state(self._generator)
+        self._action = None
+        self.go_on(joints)
+        task = self._task
+        if isinstance(task, GoalTask):
+            drawn = task.goal(self._generator, self._state(0.0, joints))
+            task.desired = _goal_of(task, drawn if self._goal is None else self._goal)
+
+    def aim(self, goal: Any) -> None:
+        """Gives a `GoalTask` a goal, for good.
+
+        Raises:
+            ValueError: if it is none, or the task has none.
+        """
+        task = self._task
+        if not isinstance(task, GoalTask):
+            raise ValueError(f"{type(task).__name__} has no goal; only a GoalTask does")
+        task.desired = self._goal = _goal_of(task, goal)
+
+    def go_on(self, joints: Joints) -> None:
+        """Has commands go on from where the joints are, after they were stopped."""
+        self._held = {name: limits.stop(joints) for name, limits in self._limits.items()}
+
+    def _state(self, time: float, joints: Joints) -> WorldState:
+        return WorldState(time, joints, dict(self._held), self._links(joints))
+
+    def step(self, time: float, joints: Joints) -> dict[str, Command] | None:
+        """One step.
+
+        Args:
+            time: since the beginning [s].
+            joints: where they are.
+
+        Returns:
+            Commands by controller, those that are to be sent; None where the task's episode would be over.
+
+        Raises:
+            ValueError: if the policy or the task gives what can't be used.
+        """
+        task, state = self._task, self._state(time, joints)
+        over = task.is_terminal(state)
+        if self._action is not None:
+            task.reward(state, self._action)
+        if over:
+            self._action = None
+            return None
+        self._action = self._read_action(self._act(self._observation(state)))
+        return self._limited(self._scene.commands(task.apply(self._action, state)))
+
+    def _limited(self, commands: Mapping[str, Command]) -> dict[str, Command]:
+        found = {}
+        for name, wanted in commands.items():
+            command, beyond = self._limits[name](wanted, self._held[name])
+            if beyond and name not in self._told:
+                self._told.add(name)
+                self._say(
+                    f"{name} is commanded beyond the limits of {', '.join(beyond)}: it is kept within"
+                )
+            found[name] = self._held[name] = command
+        return found
+
+    def _observation(self, state: WorldState) -> Any:
+        seen, task = self._read(self._task.observe(state)), self._task
+        return with_goals(task, seen, state) if isinstance(task, GoalTask) else seen
+
+    def stop(self, joints: Joints) -> dict[str, Command]:
+        """Commands that have all joints stop where they are."""
+        self.go_on(joints)
+        return dict(self._held)
+
+
+def _goal_of(task: GoalTask, goal: Any) -> np.ndarray:
+    space = task.goals()
+    found = np.asarray(goal, space.dtype)
+    if not space.contains(found):
+        raise ValueError(f"the goal {found} isn't one of {type(task).__name__}'s goals: {space}")
+    return found

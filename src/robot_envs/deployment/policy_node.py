@@ -1,0 +1,328 @@
+"""A policy that moves a robot over ROS, simulated or real: joint states in, commands out."""
+
+import math
+import os
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import rosgraph
+import rospy
+from sensor_msgs.msg import JointState as JointStateMsg
+from std_msgs.msg import Float64, Float64MultiArray
+
+from robot_envs.backends.ros import node
+from robot_envs.backends.ros.bringup import full_name
+from robot_envs.backends.ros.gazebo import lockstep_hint
+from robot_envs.deployment.pilot import Pilot
+from robot_envs.errors import RobotEnvError
+from robot_envs.robot import Robot
+from robot_envs.task import GoalTask, Task
+from robot_envs.world_state import Command, JointState
+
+
+class JointListener:
+    """Keeps the newest state of each joint, and when it has come.
+
+    A state without velocities, or with numbers that aren't finite, doesn't count; nor does one with the stamp
+    of the one before, or an older one: a driver that repeats itself tells nothing new.
+
+    Args:
+        topic: of the joint states.
+        model: of the robot: joints may be called model::joint.
+        joints: those that are wanted.
+    """
+
+    def __init__(self, topic: str, model: str, joints: Sequence[str]) -> None:
+        self._names = {f"{model}::{name}": name for name in joints} | {
+            name: name for name in joints
+        }
+        self._joints = tuple(joints)
+        self._lock = threading.Lock()
+        self._known: dict[str, tuple[JointState, rospy.Time, float]] = {}  # with stamp and arrival
+        self._subscriber = rospy.Subscriber(
+            topic, JointStateMsg, self._receive, queue_size=10, tcp_nodelay=True
+        )
+
+    @property
+    def topic(self) -> str:
+        """Of the joint states, its full name."""
+        return str(self._subscriber.resolved_name)
+
+    def _receive(self, message: JointStateMsg) -> None:
+        stamp, now, zero = message.header.stamp, rospy.get_time(), rospy.Time()
+        efforts = message.effort or [0.0] * len(message.name)
+        # joint_state_publisher's messages are all zero and carry no velocities.
+        numbers = zip(message.name, message.position, message.velocity, efforts, strict=False)
+        with self._lock:
+            for full, *values in numbers:
+                name = self._names.get(full)
+                if name is None or not all(map(math.isfinite, values)):
+                    continue
+                if name in self._known and zero != stamp <= self._known[name][1]:
+                    continue
+                self._known[name] = JointState(*values), stamp, now
+
+    def missing(self) -> list[str]:
+        """The joints of which nothing is known yet."""
+        with self._lock:
+            return [name for name in self._joints if name not in self._known]
+
+    def look(self) -> tuple[dict[str, JointState], float]:
+        """The joints, none of which is missing, and when the oldest of their states came [s of ROS time]."""
+        with self._lock:
+            known = {name: self._known[name] for name in self._joints}
+        oldest = min(arrival for _, _, arrival in known.values())
+        return {name: state for name, (state, _, _) in known.items()}, oldest
+
+    def forget(self) -> None:
+        """Has everything be told anew, as after time went back."""
+        with self._lock:
+            self._known.clear()
+
+    def close(self) -> None:
+        """Leaves the topic."""
+        self._subscriber.unregister()
+
+
+LATE_PERIODS, LATE_AT_LEAST = 5, 0.1  # control periods, and [s]
+POLL = 0.05  # [s] of wall time between two looks at what else might end a wait
+PATIENCE = 2.0  # [s] of wall time, until it is said what is missing
+LAST_WORDS = 1.0  # [s] of wall time, for each of the last commands to be sent
+
+
+def late_by_default(period: float) -> float:
+    """After how long without a joint state [s] the robot is stopped, for a control period [s]."""
+    return max(LATE_PERIODS * period, LATE_AT_LEAST)
+
+
+class PolicyNode:
+    """Runs a policy on a robot, from the moment on in which its joint states come and its controllers listen.
+
+    Each control period of ROS time it hands the newest joint states to task and policy, and publishes what
+    these command. Where the joint states are late, or the task's episode would be over, it commands a stop
+    instead, each period (see `CommandLimits.stop`), and goes on once they come, or it wouldn't. At the end
+    it stops the robot: when it is told to, by `rosnode kill`, too, and when policy or task fail.
+
+    A task with goals takes others from the topic `~goal` (std_msgs/Float64MultiArray).
+
+    Args:
+        robot: the robot; nothing of it is started, spawned or set.
+        task: what the policy has learned.
+        act: the policy: the action for an observation.
+        period: of control [s].
+        late: after how long without a joint state the robot is stopped [s]; None: `late_by_default`.
+        seed: see `Pilot`.
+        goal: see `Pilot`.
+        way: see `CommandLimits`.
+
+    Raises:
+        RobotEnvError: see `Pilot`.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        act: Callable[[Any], Any],
+        period: float,
+        late: float | None = None,
+        seed: int = 0,
+        goal: Any = None,
+        way: float = 1.0,
+    ) -> None:
+        self._period, self._late = period, late_by_default(period) if late is None else late
+        try:
+            self._pilot = Pilot(robot, task, act, period, seed, goal, way, rospy.logwarn)
+        except ValueError as error:
+            raise RobotEnvError(str(error)) from error
+        self._wanted: Any = None  # a goal that has come
+        self._told = ""  # why the robot stands still
+        self._last: Mapping[str, JointState] | None = None  # joints; None: nothing was commanded
+        self._is_told_to_end: Callable[[], bool] = rospy.is_shutdown
+        self._is_killed, self._ended = threading.Event(), threading.Event()
+        self._joints = JointListener(full_name(robot, "joint_states"), robot.model, robot.joints)
+        self._topics = {
+            port.name: rospy.Publisher(
+                f"{full_name(robot, port.name)}/command",
+                Float64 if port.single else Float64MultiArray,
+                queue_size=1,
+            )
+            for port in robot.ports
+        }
+        if isinstance(task, GoalTask):
+            rospy.Subscriber("~goal", Float64MultiArray, self._take_goal, queue_size=1)
+
+    def _take_goal(self, message: Float64MultiArray) -> None:
+        self._wanted = message.data
+
+    def run(self, is_told_to_end: Callable[[], bool]) -> None:
+        """Runs until it is told to end, or the node is shut down.
+
+        Args:
+            is_told_to_end: is asked again and again. A signal's handler must not publish: it may have
+                interrupted a command that is being published.
+
+        Raises:
+            RobotEnvError: if policy or task give what can't be used; the robot was stopped.
+        """
+        self._is_told_to_end = is_told_to_end
+        rospy.on_shutdown(self._end_in_time)
+        try:
+            self._follow()
+        except ValueError as error:
+            raise RobotEnvError(f"the robot is stopped: {error}") from error
+        finally:
+            self._end()
+            self._ended.set()
+
+    def _end_in_time(self) -> None:
+        """By `rosnode kill`: what is published afterwards isn't sent any more."""
+        self._is_killed.set()
+        self._ended.wait(3.0 * LAST_WORDS)
+
+    def _is_over(self) -> bool:
+        return self._is_told_to_end() or self._is_killed.is_set() or rospy.is_shutdown()
+
+    def _follow(self) -> None:
+        began = before = self._begin()
+        while not self._is_over():
+            now = rospy.get_time()
+            if now < before:  # a simulation was reset
+                self._joints.forget()
+                began = before = self._begin()
+                continue
+            self._step(now, now - began)
+            before = now
+            periods = math.floor((now - began) / self._period + 1e-6)
+            self._sleep_until(began + self._period * (periods + 1))
+
+    def _begin(self) -> float:
+        """Waits until all joints are known and somebody listens to each command; returns when [s]."""
+        beginning = time.monotonic()
+        while (missing := self._missing()) and not self._is_over():
+            if time.monotonic() - beginning > PATIENCE:
+                self._tell(f"waiting for {missing}", lockstep_hint)
+            rospy.rostime.wallsleep(POLL)
+        if not missing:
+            self._tell("")
+            self._last = self._joints.look()[0]
+            self._pilot.begin(self._last)
+            rospy.loginfo("the policy moves the robot")
+        return rospy.get_time()
+
+    def _missing(self) -> str:
+        joints = self._joints.missing()
+        missing = [f"the state of {', '.join(joints)} on {self._joints.topic}"] if joints else []
+        deaf = [each for each in self._topics.values() if each.get_num_connections() == 0]
+        missing += [f"somebody who listens on {each.resolved_name}" for each in deaf]
+        return ", and ".join(missing)
+
+    def _sleep_until(self, due: float) -> None:
+        """Until then [s of ROS time], or time has gone back, or it is to end: time may stand still."""
+        clock, seen, since = rospy.rostime.get_rostime_cond(), rospy.get_time(), time.monotonic()
+        while seen <= (now := rospy.get_time()) < due and not self._is_over():
+            if rospy.rostime.is_wallclock():
+                rospy.rostime.wallsleep(min(due - now, POLL))
+                continue
+            if now > seen:
+                seen, since = now, time.monotonic()
+            elif time.monotonic() - since > PATIENCE:
+                self._tell("the time on /clock stands still", lockstep_hint)
+            with clock:
+                clock.wait(POLL)
+
+    def _step(self, now: float, passed: float) -> None:
+        self._last, arrival = self._joints.look()
+        if now - arrival > self._late:
+            topic = self._joints.topic
+            self._tell(f"no joint state on {topic} for {self._late:g} s: the robot is stopped")
+            self._publish(self._pilot.stop(self._last))
+            return
+        self._aim_if_told()
+        commands = self._pilot.step(passed, self._last)
+        if commands is None:
+            self._tell("an episode would be over here: the robot is stopped")
+            commands = self._pilot.stop(self._last)
+        else:
+            self._tell("")
+        self._publish(commands)
+
+    def _aim_if_told(self) -> None:
+        goal, self._wanted = self._wanted, None
+        if goal is None:
+            return
+        try:
+            self._pilot.aim(goal)
+            rospy.loginfo(f"the goal is {list(goal)}")
+        except ValueError as error:
+            rospy.logwarn(f"{error}; it keeps the one it has")
+
+    def _tell(self, reason: str, hint: Callable[[], str] = str) -> None:
+        """Says once why the robot stands still, with a hint, and once that it doesn't any more."""
+        if reason != self._told:
+            (rospy.logwarn if reason else rospy.loginfo)(f"{reason}{hint()}" or "going on")
+        self._told = reason
+
+    def _publish(self, commands: Mapping[str, Command]) -> None:
+        for name, command in commands.items():
+            topic = self._topics[name]
+            single = topic.data_class is Float64
+            topic.publish(Float64(command) if single else Float64MultiArray(data=list(command)))  # type: ignore[arg-type]
+
+    def _end(self) -> None:
+        """Stops the robot, if it was moved."""
+        if self._last is None:
+            return
+        newest = self._last if self._joints.missing() else self._joints.look()[0]
+        commands = self._pilot.stop(newest)
+        # The first may still wait behind a command from before; then the second is sent after it.
+        for _ in range(2):
+            sent = self._sent()
+            self._publish(commands)
+            self._wait_until_sent(sent)
+        rospy.loginfo("the robot is stopped")
+
+    def _sent(self) -> dict[tuple[str, int], int]:
+        """How many messages each listener was sent, by topic and connection."""
+        return {
+            (name, connection.id): connection.stat_num_msg
+            for name, topic in self._topics.items()
+            for connection in topic.impl.connections
+        }
+
+    def _wait_until_sent(self, before: Mapping[tuple[str, int], int]) -> None:
+        """rospy sends in threads of its own, and forgets what they haven't sent when the node ends."""
+        deadline = time.monotonic() + LAST_WORDS
+        while time.monotonic() < deadline:
+            now = self._sent()
+            if all(now[each] > count for each, count in before.items() if each in now):
+                return
+            rospy.rostime.wallsleep(0.002)
+
+
+def run_node(
+    name: str, argv: list[str], make: Callable[[], PolicyNode], is_told_to_end: Callable[[], bool]
+) -> None:
+    """Makes this process a node, and runs it.
+
+    Args:
+        name: the node's, with namespace.
+        argv: the process's arguments, with roslaunch's remappings.
+        make: makes what it is to run.
+        is_told_to_end: see `PolicyNode.run`.
+
+    Raises:
+        RobotEnvError: if there is no master, or a node of that name; and see `PolicyNode`.
+    """
+    if not node.master_is_up():
+        raise RobotEnvError(
+            f"there is no ROS master at {rosgraph.get_master_uri()}: start the robot's"
+        )
+    node.refuse_twin(name)
+    rospy.init_node(os.path.basename(name), argv=["", *argv], disable_signals=True)
+    try:
+        make().run(is_told_to_end)
+    finally:
+        rospy.signal_shutdown("the policy has ended")

@@ -1,0 +1,191 @@
+"""A robot's files: finding them, and reading URDF (expanding xacro) and YAML."""
+
+import contextlib
+import importlib.util
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from bullet_gazebo.physics.files.reading import Resources
+from bullet_gazebo.state import did_you_mean
+from files.content import FileError, read_file
+from files.expansion import CannotExpand, expand
+from files.yaml_text import load_documents
+from robot_envs.errors import RobotEnvError
+
+Source = str | Path
+"""A file, as a path or as "package://PACKAGE/PLACE"; or, for what begins with "<", the text itself."""
+
+PACKAGE = "package://"
+TREE = Path(__file__).resolve().parents[2]  # the source tree
+SHARE = Path(__file__).resolve().parent / "share"  # in a wheel (setup.py)
+
+
+def own_file(package: str, place: str) -> Path:
+    """A file of this package, or of one of its companions, found without a running ROS.
+
+    It lies in the source tree around this module; in a wheel beside this module; in a catkin workspace
+    that it was installed in, where rospkg finds the package.
+
+    Args:
+        package: the package's name.
+        place: the file's path in it.
+
+    Raises:
+        RobotEnvError: if it is in none of them.
+    """
+    source = TREE if package == "cartpole" else TREE / "companions" / package
+    for folder in (source, SHARE / package):
+        if (folder / place).is_file():
+            return folder / place
+    found = _rospkg_path(package)
+    if found is None:
+        raise RobotEnvError(
+            f"package '{package}' is neither beside {TREE} nor on ROS_PACKAGE_PATH; "
+            "source the workspace that it is installed in"
+        )
+    return found / place
+
+
+def resources() -> Resources:
+    """Where the meshes and models lie that a file names by package://."""
+
+    def package(name: str) -> str:
+        found = _rospkg_path(name)
+        if found is None:
+            raise LookupError(name)
+        return str(found)
+
+    return Resources(package=package)
+
+
+def is_text(source: Source) -> bool:
+    """Whether it is the text itself."""
+    return isinstance(source, str) and source.lstrip().startswith("<")
+
+
+def locate(source: Source) -> Path:
+    """The path of a file.
+
+    Raises:
+        RobotEnvError: if its package isn't found, or it is none that names a file; what isn't there is
+            told when it is read.
+    """
+    if not isinstance(source, (str, Path)) or not str(source).strip():
+        raise RobotEnvError(
+            f'a file is a path or "package://PACKAGE/PLACE", or its text; not {source!r}'
+        )
+    text = str(source)
+    if not text.startswith(PACKAGE):
+        return Path(text).expanduser()
+    package, _, place = text.removeprefix(PACKAGE).partition("/")
+    found = _rospkg_path(package)
+    if found is not None:
+        return found / place
+    with contextlib.suppress(RobotEnvError):
+        return own_file(package, place)
+    raise RobotEnvError(
+        f"{text}: there is no package '{package}' on ROS_PACKAGE_PATH; ./ws --with FOLDER puts those of a "
+        "folder there, and sourcing a workspace does"
+    )
+
+
+def read_text(source: Source) -> str:
+    """What a file says, or the text itself.
+
+    Raises:
+        RobotEnvError: if it can't be read.
+    """
+    if is_text(source):
+        return str(source)
+    return _read(locate(source)).decode(errors="surrogateescape")
+
+
+def _read(path: Path) -> bytes:
+    need_file(path)
+    try:
+        return read_file(path)
+    except FileError as error:
+        raise RobotEnvError(f"{path}: {error}") from error
+
+
+def need_file(path: Path) -> None:
+    """Makes sure that there is one.
+
+    Raises:
+        RobotEnvError: if there isn't, naming the nearest one of its folder.
+    """
+    if path.is_dir():
+        raise RobotEnvError(f"{path} is a folder, and no file")
+    if path.exists():
+        return
+    folder = path.parent
+    if not folder.is_dir():
+        raise RobotEnvError(f"there is no file {path}: there is no folder {folder}")
+    near = did_you_mean(path.name, (each.name for each in folder.iterdir() if each.is_file()))
+    raise RobotEnvError(f"there is no file {path}{near}")
+
+
+def read_urdf(source: Source, arguments: Mapping[str, str]) -> str:
+    """The URDF in a file, which may be a xacro file whatever its name, or the text itself.
+
+    Args:
+        source: the file or the text; a text isn't expanded.
+        arguments: of xacro.
+
+    Raises:
+        RobotEnvError: if it can't be read or expanded.
+    """
+    if is_text(source):
+        return str(source)
+    path = locate(source)
+    need_file(path)
+    return _expanded(path, tuple(sorted(arguments.items())))
+
+
+@lru_cache(maxsize=32)
+def _expanded(path: Path, arguments: tuple[tuple[str, str], ...]) -> str:
+    try:
+        return expand(path, {name: str(value) for name, value in arguments})
+    except CannotExpand as error:
+        raise RobotEnvError(f"can't read {error}") from error
+
+
+def read_parameters(source: Source) -> dict[str, Any]:
+    """What a YAML file of parameters says, or such a text, which has several lines.
+
+    Raises:
+        RobotEnvError: if it can't be read.
+    """
+    if isinstance(source, str) and "\n" in source:
+        return _parameters(source.encode(), "the controllers' text")
+    return _parameters_of(locate(source))
+
+
+@lru_cache(maxsize=32)
+def _parameters_of(path: Path) -> dict[str, Any]:
+    return _parameters(_read(path), str(path))
+
+
+def _parameters(data: bytes, told: str) -> dict[str, Any]:
+    try:
+        documents = load_documents(data)
+    except FileError as error:
+        raise RobotEnvError(f"{told}: {error}") from error
+    content = documents[0] if len(documents) == 1 else None
+    if not isinstance(content, dict):
+        raise RobotEnvError(f"{told}: that is no YAML of parameters, name: value")
+    return content
+
+
+def _rospkg_path(package: str) -> Path | None:
+    """A package's folder as rospkg finds it; None if it doesn't, or isn't installed."""
+    if not importlib.util.find_spec("rospkg"):
+        return None
+    import rospkg
+
+    try:
+        return Path(rospkg.RosPack().get_path(package))
+    except rospkg.ResourceNotFound:
+        return None

@@ -1,0 +1,297 @@
+"""Imperfect sensors (noise, encoders, delay) and actuators (delay, limits, lag)."""
+
+import math
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from bullet_gazebo.state import did_you_mean
+from robot_envs.world_state import Joints, JointState, WorldState
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a finite number, also one of NumPy's; True and False are none."""
+    if isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except (TypeError, ValueError, OverflowError):
+        return False
+
+
+def by_name(
+    option: str, given: Any, names: Sequence[str], kind: str, which: str = ""
+) -> dict[str, Any]:
+    """What is given for each of `names`, unchecked; without those that a mapping leaves out.
+
+    Args:
+        option: whose, for the error text.
+        given: one for all, or a mapping by name.
+        names: that there are.
+        kind: what has them: "joint", "controller".
+        which: which of them: "that moves".
+
+    Raises:
+        ValueError: for a name that isn't there, with the nearest one.
+    """
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(names, given)
+    for name in given:
+        if name not in names:
+            hint = did_you_mean(str(name), names) or f"; there are {', '.join(names) or 'none'}"
+            raise ValueError(f"{option}: there is no {kind} {name!r}{which and ' '}{which}{hint}")
+    return dict(given)
+
+
+def at_least_zero(option: str, given: Any) -> float:
+    """A number that may be 0.
+
+    Raises:
+        ValueError: for anything else.
+    """
+    if not is_number(given) or given < 0.0:
+        raise ValueError(f"{option} must be a number >= 0, not {given!r}")
+    return float(given)
+
+
+def steps(option: str, given: Any, most: int) -> int:
+    """A number of control steps.
+
+    Raises:
+        ValueError: for anything else.
+    """
+    if not is_number(given) or not 0 <= given <= most or given != int(given):
+        raise ValueError(
+            f"{option} must be a number of control steps from 0 to {most}, not {given!r}"
+        )
+    return int(given)
+
+
+Noise = float | tuple[float, float] | Mapping[str, Any]
+MOST_DELAY: Final = 1000  # [control steps]
+LEAST_STEP: Final = 1e-9  # [rad, m]; of an encoder
+
+
+class Encoder(NamedTuple):
+    """How a joint is measured.
+
+    Args:
+        noise: standard deviation of a position [rad, m].
+        rate_noise: standard deviation of a velocity [rad/s, m/s].
+        step: between two positions that the encoder can tell [rad, m]; 0: it tells them all.
+    """
+
+    noise: float = 0.0
+    rate_noise: float = 0.0
+    step: float = 0.0
+
+    def rounded(self, position: float) -> float:
+        """The position that it tells."""
+        return round(position / self.step) * self.step if self.step else position
+
+
+class Sensor:
+    """Measures the joints. What else a state tells is as it was, and as late, but for the commands.
+
+    A joint with an `encoder_step` has a velocity that its driver takes from two positions: their difference
+    over the control period. It is a multiple of step / period, and its only noise is that of the positions.
+
+    Args:
+        joints: their names.
+        period: of control [s].
+        noise: standard deviation of the normal noise on positions and velocities [m, m/s, rad, rad/s]: a
+            number, or a pair (position, velocity), for all joints, or by joint. It is drawn for all of
+            them, first for those of a mapping, in its order. Noise of a joint with steps comes before they
+            are taken.
+        delay: how many control steps old a measurement is. Before there are any so old, it is the one of
+            the episode's start.
+        encoder_step: between two positions that are told [rad, m]: one for all joints, or by joint; 0: none.
+
+    Raises:
+        ValueError: for a number that makes no sense, or a joint that isn't there.
+    """
+
+    def __init__(
+        self,
+        joints: Sequence[str],
+        period: float,
+        noise: Noise = 0.0,
+        delay: int = 0,
+        encoder_step: float | Mapping[str, float] = 0.0,
+    ) -> None:
+        self._period = period
+        found = by_name("sensor_noise", noise, joints, "joint")
+        sizes = {name: _pair("sensor_noise", size) for name, size in found.items()}
+        found = by_name("encoder_step", encoder_step, joints, "joint")
+        notches = {name: _step(size) for name, size in found.items()}
+        self._encoders = {
+            name: Encoder(*sizes.get(name, (0.0, 0.0)), notches.get(name, 0.0))
+            for name in dict.fromkeys([*sizes, *joints])
+        }
+        self._is_noisy = any(map(any, sizes.values()))
+        self._distorts = self._is_noisy or any(notches.values())
+        self._seen: deque[WorldState] = deque(maxlen=steps("sensor_delay", delay, MOST_DELAY) + 1)
+        self._before: dict[str, float] = {}  # positions of joints with steps
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the truth is measured, at once."""
+        return not self._distorts and self._seen.maxlen == 1
+
+    def begin(self, state: WorldState, rng: np.random.Generator) -> WorldState:
+        """Returns the first measurement of an episode that starts in `state`."""
+        self._seen.clear()
+        self._before.clear()
+        return self.measure(state, rng)
+
+    def measure(self, state: WorldState, rng: np.random.Generator) -> WorldState:
+        """Returns the measurement that arrives when the world is in `state`."""
+        self._seen.append(self._distorted(state, rng) if self._distorts else state)
+        return self._seen[0]._replace(commands=state.commands)
+
+    def _distorted(self, state: WorldState, rng: np.random.Generator) -> WorldState:
+        count = 2 * len(self._encoders) if self._is_noisy else 0
+        errors = iter(rng.standard_normal(count).tolist())
+        joints = Joints(state.joints)
+        for name, encoder in self._encoders.items():
+            error, rate_error = (next(errors), next(errors)) if count else (0.0, 0.0)
+            position, velocity, effort = joints[name]
+            position += encoder.noise * error
+            if encoder.step:
+                position, velocity = self._told(name, encoder, position, velocity)
+            else:
+                velocity += encoder.rate_noise * rate_error
+            joints[name] = JointState(position, velocity, effort)
+        return state._replace(joints=joints)
+
+    def _told(
+        self, name: str, encoder: Encoder, position: float, velocity: float
+    ) -> tuple[float, float]:
+        """What an encoder tells; before an episode a joint has moved as it does at its start."""
+        told = encoder.rounded(position)
+        before = self._before.get(name)
+        if before is None:
+            before = encoder.rounded(position - velocity * self._period)
+        self._before[name] = told
+        return told, (told - before) / self._period
+
+
+def _pair(option: str, given: Any) -> tuple[float, float]:
+    """Standard deviations of position and velocity."""
+    numbers = [given, given] if is_number(given) else np.ravel(given).tolist()
+    if len(numbers) != 2:
+        raise ValueError(f"{option} is a number or a pair (position, velocity), not {given!r}")
+    position, velocity = (at_least_zero(option, each) for each in numbers)
+    return position, velocity
+
+
+def _step(given: Any) -> float:
+    size = at_least_zero("encoder_step", given)
+    if 0.0 < size < LEAST_STEP:
+        raise ValueError(f"encoder_step must be 0 or at least {LEAST_STEP:g}, not {given!r}")
+    return size
+
+
+Commands = dict[str, Any]
+"""By controller: a number, or for a group a tuple of them [m, rad, m/s, rad/s, N, N m]."""
+Rule = Callable[[float, float, float], float]
+"""What becomes of a number: of how much there is of it, what is wanted, and what was there before."""
+Rules = dict[str, tuple[Rule, float]]
+
+
+class Actuator:
+    """Between a task's commands and the controllers: first the delay, then the limit, then the lag.
+
+    Commands are numbers here, not angles: a set-point that jumps from pi to -pi passes 0.
+
+    Args:
+        holds: by controller, whether it takes positions; others take velocities or efforts.
+        period: of control [s].
+        delay: how many control steps pass before a command arrives. Until the first one does, controllers
+            hold what they held at the episode's start.
+        limit: one for all, or by controller. Efforts [N, N m] and velocities [m/s, rad/s] are cut at it,
+            either way; positions follow no faster than that [m/s, rad/s].
+        lag: time constant of a first-order lag [s]: one for all, or by controller; 0: none. For a control
+            period a controller gets what the lag comes to at its end: 1 - exp(-t / lag) of a step.
+
+    Raises:
+        ValueError: for a number that makes no sense, or a controller that isn't there.
+    """
+
+    def __init__(
+        self,
+        holds: Mapping[str, bool],
+        period: float,
+        delay: int = 0,
+        limit: float | Mapping[str, float] | None = None,
+        lag: float | Mapping[str, float] = 0.0,
+    ) -> None:
+        names = list(holds)
+        self._delay = steps("action_delay", delay, MOST_DELAY)
+        given = {} if limit is None else by_name("actuator_limit", limit, names, "controller")
+        most = {name: at_least_zero("actuator_limit", each) for name, each in given.items()}
+        self._limits: Rules = {
+            name: (_follow, each * period) if holds[name] else (_cut, each)
+            for name, each in most.items()
+        }
+        given = by_name("actuator_lag", lag, names, "controller")
+        lags = {name: at_least_zero("actuator_lag", each) for name, each in given.items()}
+        self._lags: Rules = {
+            name: (_lag, -math.expm1(-period / each)) for name, each in lags.items() if each > 0.0
+        }
+        self._sent: deque[Commands] = deque(maxlen=self._delay + 1)
+        self._limited: Commands = {}
+        self._reached: Commands = {}
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether commands arrive as they are, at once."""
+        return not (self._delay or self._limits or self._lags)
+
+    def begin(self, held: Mapping[str, Any]) -> None:
+        """Starts an episode.
+
+        Args:
+            held: what the controllers hold, all of them.
+        """
+        self._sent.clear()
+        self._sent.extend([dict(held)] * self._delay)
+        self._limited, self._reached = dict(held), dict(held)
+
+    def __call__(self, commands: Mapping[str, Any]) -> Commands:
+        """What arrives at the controllers in a control period.
+
+        Args:
+            commands: what is sent to all of them: the last one, where there is no new one.
+        """
+        self._sent.append(dict(commands))
+        arriving = self._sent[0]
+        self._limited = _ruled(self._limits, arriving, self._limited)
+        self._reached = _ruled(self._lags, self._limited, self._reached)
+        return self._reached
+
+
+def _cut(most: float, wanted: float, _: float) -> float:
+    return max(-most, min(most, wanted))
+
+
+def _follow(way: float, wanted: float, before: float) -> float:
+    return wanted if abs(wanted - before) <= way else before + math.copysign(way, wanted - before)
+
+
+def _lag(share: float, wanted: float, before: float) -> float:
+    return before + share * (wanted - before)
+
+
+def _ruled(rules: Rules, wanted: Commands, before: Commands) -> Commands:
+    """Commands by the controllers' rules, number by number."""
+    found = dict(wanted)
+    for name, (rule, size) in rules.items():
+        to, at = wanted[name], before[name]
+        if isinstance(to, tuple):
+            found[name] = tuple(rule(size, *each) for each in zip(to, at, strict=True))
+        else:
+            found[name] = rule(size, to, at)
+    return found

@@ -1,0 +1,20 @@
+"""examples/plot_policy.py draws policies of every kind."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from support.training import workbench_runs
+
+SCRIPT = Path(__file__).resolve().parents[3] / "examples/plot_policy.py"
+
+
+@pytest.mark.parametrize("env_id", ["CartPole-v1", "cartpole/SwingUp-v0"])
+def test_it_draws_the_plane(tmp_path: Path, env_id: str) -> None:
+    run = workbench_runs.policy_gradient(tmp_path / "run", "reinforce", env_id=env_id)
+    out = tmp_path / "policy.png"
+    subprocess.run([sys.executable, str(SCRIPT), str(run), str(out)], check=True)
+    with Image.open(out) as picture:
+        assert picture.format == "PNG"

@@ -1,0 +1,201 @@
+"""Learning curves say what happened: looked up in the lines that the axes hold."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from rl_workbench.plotting import (
+    Panel,
+    SeedCurve,
+    as_png,
+    evaluation_curves,
+    learning_curve,
+    mean_over_seeds,
+    moving_average,
+    seed_curves,
+    training_curves,
+)
+
+
+def seed(positions: list[float], values: list[float], complete: bool = True) -> SeedCurve:
+    return SeedCurve(np.array(positions, float), np.array(values, float), complete)
+
+
+def panel(curves: dict[str, list[SeedCurve]], title: str = "Some-v0", line: float | None = None):
+    return Panel(title, curves, line)
+
+
+def lines(axes: Axes, kind: str) -> list[Line2D]:
+    return [each for each in axes.lines if each.get_gid() == kind]
+
+
+def the_mean(axes: Axes) -> Line2D:
+    (found,) = lines(axes, "mean")
+    return found
+
+
+def at(line: Line2D, position: float) -> float:
+    return float(np.interp(position, line.get_xdata(), line.get_ydata()))
+
+
+def test_moving_average() -> None:
+    values = [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert moving_average(values, 3) == pytest.approx([1.0, 1.5, 2.0, 3.0, 4.0])
+    assert moving_average([], 3).shape == (0,)
+
+
+@pytest.mark.parametrize("count", [1, 300])
+def test_one_training_has_two_axes_and_can_be_written_as_png(tmp_path: Path, count: int) -> None:
+    lengths = np.random.default_rng(0).integers(1, 3000, count).tolist()
+    figure = learning_curve(lengths, [length / 2 for length in lengths], "title")
+    upper, lower = figure.axes
+    assert [line.get_ydata().tolist() for line in upper.lines] == [
+        lengths,
+        moving_average(lengths).tolist(),
+    ]
+    assert lower.lines[0].get_ydata().tolist() == [length / 2 for length in lengths]
+    with (tmp_path / "curve.png").open("wb") as file:
+        as_png(figure)(file)
+    assert (tmp_path / "curve.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+# Means over seeds.
+
+
+def test_a_seed_that_has_ended_keeps_its_last_value_in_the_mean() -> None:
+    solved, slow = seed([100, 200], [100, 500]), seed([100, 1000], [100, 100])
+    positions, mean, _, _ = mean_over_seeds([solved, slow])
+    assert (positions[0], positions[-1]) == (100, 1000)
+    assert np.interp([200, 600, 1000], positions, mean) == pytest.approx([300, 300, 300])
+
+
+def test_ten_solved_seeds_look_like_ten_solved_seeds() -> None:
+    """One of them takes long: without the others' last values the mean would fall with it."""
+    ends = [1000.0 * (index + 2) for index in range(10)]
+    curves = [seed([1000.0, end - 500.0, end], [20.0, 100.0, 500.0]) for end in ends]
+    (axes,) = evaluation_curves([panel({"dqn": curves})]).axes
+    mean = the_mean(axes).get_ydata()
+    assert mean[-1] == 500.0 and not np.isnan(mean).any()
+    assert (np.diff(mean) >= 0.0).all()
+
+
+def test_the_mean_begins_where_every_seed_has_a_value() -> None:
+    positions, mean, _, _ = mean_over_seeds([seed([10, 20], [1, 1]), seed([15, 30], [3, 3])])
+    assert positions[0] == 15 and mean == pytest.approx(np.full(len(mean), 2.0))
+
+
+def test_where_one_seed_ends_before_another_has_begun() -> None:
+    positions, mean, _, _ = mean_over_seeds([seed([10], [1]), seed([15], [3])])
+    assert positions.tolist() == [15] and mean.tolist() == [2]
+
+
+def test_few_points_are_met_exactly_and_many_are_thinned() -> None:
+    few = [seed([100, 200, 900], [1, 5, 2]), seed([100, 300], [1, 9])]
+    positions, mean, _, _ = mean_over_seeds(few)
+    assert positions.tolist() == [100, 200, 300, 900] and mean[2] == np.mean([5 - 3 / 7, 9])
+    many = [seed(np.arange(5000.0).tolist(), np.arange(5000.0).tolist())] * 2
+    positions, mean, _, _ = mean_over_seeds(many)
+    assert len(positions) < 500 and mean == pytest.approx(positions)
+
+
+def test_the_band_lies_around_the_mean_and_one_seed_has_none() -> None:
+    curves = [seed([1, 2], [value, 2 * value]) for value in (1.0, 2.0, 6.0)]
+    _, mean, low, high = mean_over_seeds(curves)
+    assert (low < mean).all() and (mean < high).all()
+    (axes,) = seed_curves([panel({"dqn": curves[:1]})]).axes
+    assert not axes.collections and not lines(axes, "seed"), "the thick line is the seed itself"
+
+
+def test_every_seed_is_drawn_thinly() -> None:
+    curves = [seed([1, 2, 3], [value, value, value + 1]) for value in (1.0, 2.0, 6.0)]
+    (axes,) = evaluation_curves([panel({"dqn": curves})]).axes
+    drawn = lines(axes, "seed")
+    assert [line.get_ydata().tolist() for line in drawn] == [
+        each.values.tolist() for each in curves
+    ]
+    assert all(line.get_linewidth() < the_mean(axes).get_linewidth() for line in drawn)
+
+
+def test_where_seeds_ended_is_marked_and_whether_they_were_complete() -> None:
+    curves = [seed([1, 5], [0, 7]), seed([1, 9], [0, 3], complete=False), seed([1, 4], [0, 8])]
+    (axes,) = evaluation_curves([panel({"dqn": curves})]).axes
+    (ended,), (stopped,) = lines(axes, "ended"), lines(axes, "stopped")
+    assert ended.get_marker() != stopped.get_marker()
+    assert ended.get_xydata().tolist() == [[5, 7], [4, 8]]
+    assert stopped.get_xydata().tolist() == [[9, 3]]
+
+
+def test_of_episodes_the_moving_average_is_drawn() -> None:
+    curves = [seed([1, 2, 3], [0, 3, 3]), seed([1, 2, 3], [6, 3, 0])]
+    (axes,) = seed_curves([panel({"dqn": curves})]).axes
+    assert [line.get_ydata().tolist() for line in lines(axes, "seed")] == [[0, 1.5, 2], [6, 4.5, 3]]
+    assert the_mean(axes).get_ydata().tolist() == [3, 3, 2.5]
+
+
+# Panels.
+
+
+def test_each_environment_has_axes_and_a_line_of_its_own() -> None:
+    cart, car = seed([1, 2], [10, 400]), seed([1, 2], [-200, -110])
+    panels = [
+        panel({"dqn": [cart]}, "CartPole-v1", 475.0),
+        panel({"dqn": [car], "ppo": [car]}, "MountainCar-v0", -110.0),
+    ]
+    for figure in (seed_curves(panels), training_curves(panels, "episode")):
+        first, second = figure.axes
+        assert [axes.get_title() for axes in figure.axes] == ["CartPole-v1", "MountainCar-v0"]
+        for axes, line in ((first, 475.0), (second, -110.0)):
+            (drawn,) = lines(axes, "threshold")
+            assert set(drawn.get_ydata()) == {line}
+        assert first.get_ylim()[0] > -100.0
+        names = {line.get_label(): line.get_color() for line in second.lines}
+        same = {line.get_label(): line.get_color() for line in first.lines}
+        dqn = next(name for name in same if name.startswith("dqn"))
+        assert names[dqn] == same[dqn], "one group, one colour, in every panel"
+
+
+def test_groups_can_be_told_apart() -> None:
+    curves = {f"group {index}": [seed([1, 2], [index, index])] * 2 for index in range(12)}
+    (axes,) = seed_curves([panel(curves, line=3.0)]).axes
+    drawn = lines(axes, "mean")
+    assert len({(line.get_color(), line.get_linestyle()) for line in drawn}) == 12
+    (line,) = lines(axes, "threshold")
+    assert line.get_color() not in [each.get_color() for each in drawn]
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert len(set(names)) == 13 and "group 3 (2 seeds)" in names
+
+
+def test_a_variant_is_held_against_the_first_of_its_own_environment() -> None:
+    low, high = seed([1, 2], [0, 1]), seed([1, 2], [0, 2])
+    panels = [
+        panel({"tuned": [low]}, "A-v0"),
+        panel({"mse": [high]}, "A-v0"),
+        panel({"other": [high]}, "B-v0"),
+    ]
+    figure = evaluation_curves(panels)
+    first, second, third = (axes for axes in figure.axes if axes.axison)
+    assert not lines(first, "reference") and not lines(third, "reference")
+    (reference,) = lines(second, "reference")
+    assert at(reference, 2) == 1 and at(the_mean(second), 2) == 2
+    assert [axes.get_title() for axes in (first, third)] == [
+        "tuned (1 seed), A-v0",
+        "other (1 seed), B-v0",
+    ]
+
+
+def test_panels_of_one_environment_share_their_axis_and_of_several_do_not() -> None:
+    low, high = seed([1, 2], [0, 1]), seed([1, 2], [0, 500])
+    same = evaluation_curves([panel({"a": [low]}, "A-v0"), panel({"b": [high]}, "A-v0")])
+    assert same.axes[0].get_ylim() == same.axes[1].get_ylim()
+    others = evaluation_curves([panel({"a": [low]}, "A-v0"), panel({"b": [high]}, "B-v0")])
+    assert others.axes[0].get_ylim()[1] < 10 < others.axes[1].get_ylim()[1]
+
+
+def test_training_curves_show_episodes_unless_there_are_too_many_runs() -> None:
+    few = {f"seed {index}": [seed([1, 2], [0, 1])] for index in range(3)}
+    many = {f"seed {index}": [seed([1, 2], [0, 1])] for index in range(20)}
+    assert len(lines(training_curves([panel(few)], "episode").axes[0], "episodes")) == 3
+    assert not lines(training_curves([panel(many)], "episode").axes[0], "episodes")

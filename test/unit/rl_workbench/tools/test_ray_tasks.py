@@ -1,0 +1,165 @@
+"""`--ray` with a real cluster of two nodes on this machine; workers, nodes and the driver are killed."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from support.training.ray_nodes import QUIET, RayCluster, title, wait_until
+
+from rl_workbench.tools.jobs import JobStatus, read_jobs
+
+pytestmark = [pytest.mark.extras("ray"), pytest.mark.slow, pytest.mark.xdist_group("ray")]
+
+# Long enough to be killed in the middle, on any machine; a checkpoint every few milliseconds.
+PARAMS = ["total_timesteps=5000", "learning_starts=50", "batch_size=8", "hidden_sizes=8",
+          "eval_frequency=1000", "eval_episodes=1", "confirm_episodes=1",
+          "checkpoint_frequency=100"]  # fmt: skip
+
+
+def benchmark(out: Path, *flags: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "rl_workbench", "benchmark", f"--out={out}", "--seeds=2",
+               "--episodes=2", *flags, "--params", *PARAMS]  # fmt: skip
+    return subprocess.Popen(
+        command,
+        env={**os.environ, **QUIET},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def finished(process: subprocess.Popen[str], code: int = 0) -> str:
+    said, _ = process.communicate()
+    assert process.returncode == code, said
+    return said
+
+
+def state(out: Path, seed: int) -> JobStatus:
+    """Of a job; as if it waited, before there is a list of them."""
+    if not (out / "jobs.json").exists():
+        return JobStatus("", "", "waiting", 0, 0, "", 0, 0.0, "")
+    return read_jobs(out)[seed]
+
+
+def is_half_done(out: Path, seed: int) -> bool:
+    found = state(out, seed)
+    assert found.state != "failed", found
+    return found.state == "running" and found.step >= 300
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Iterator[bytes]:
+    """Of a benchmark that nobody disturbs, without Ray."""
+    out = tmp_path_factory.mktemp("undisturbed")
+    finished(benchmark(out, "--jobs=2"))
+    return (out / "results.md").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[RayCluster]:
+    """Two nodes, each with room for a job."""
+    cluster = RayCluster()
+    try:
+        cluster.add()
+        yield cluster
+    finally:
+        cluster.close()
+
+
+def trainings(out: Path) -> list[int]:
+    """The processes that train into a folder."""
+    every = [int(each.name) for each in Path("/proc").iterdir() if each.name.isdigit()]
+    return [
+        pid for pid in every if f"--run-dir={out}" in title(pid) or f"--resume={out}" in title(pid)
+    ]
+
+
+def test_what_is_killed_changes_no_byte_of_the_table(
+    cluster: RayCluster, table: bytes, tmp_path: Path
+) -> None:
+    """A worker, then a whole node."""
+    driver = benchmark(tmp_path, f"--ray={cluster.address}")
+    try:
+        wait_until(lambda: is_half_done(tmp_path, 0), "a training")
+        wait_until(cluster.nodes[0].workers, "a job on the first node")
+        os.kill(cluster.nodes[0].workers()[0], signal.SIGKILL)
+        wait_until(cluster.nodes[1].workers, "a job on the second node")
+        cluster.nodes[1].kill()
+        said = finished(driver)
+    finally:
+        driver.kill()
+    assert "2 nodes of a Ray cluster with 2 cores" in said
+    assert "(raylet)" not in said, "Ray's own words are pages"
+    assert (tmp_path / "results.md").read_bytes() == table
+    assert max(state(tmp_path, seed).attempts for seed in range(2)) > 1
+
+
+def test_a_benchmark_whose_own_process_is_killed_or_stopped_goes_on(
+    cluster: RayCluster, table: bytes, tmp_path: Path
+) -> None:
+    flag = f"--ray={cluster.address}"
+    driver = benchmark(tmp_path, flag)
+    try:
+        wait_until(lambda: is_half_done(tmp_path, 0), "a training")
+        second = finished(benchmark(tmp_path, flag), 1)
+        assert second == f"rl-workbench: another benchmark is running in {tmp_path}\n"
+    finally:
+        driver.kill()
+    wait_until(lambda: not trainings(tmp_path), "the end of its trainings")
+
+    driver = benchmark(tmp_path, flag)
+    try:
+        wait_until(lambda: trainings(tmp_path), "a training")  # of this driver, that has joined
+        driver.send_signal(signal.SIGINT)
+        said = finished(driver, 130)
+    finally:
+        driver.kill()
+    assert "interrupted; the same command goes on" in said
+    wait_until(lambda: not trainings(tmp_path), "the end of its trainings")
+    assert {state(tmp_path, seed).state for seed in range(2)} <= {"stopped", "waiting", "done"}
+
+    finished(benchmark(tmp_path, flag))
+    assert (tmp_path / "results.md").read_bytes() == table
+    assert [state(tmp_path, seed).state for seed in range(2)] == ["done", "done"]
+
+
+def test_a_node_that_does_not_see_the_folder_is_one_line(
+    cluster: RayCluster, tmp_path: Path, monkeypatch
+) -> None:
+    (tmp_path / "a").mkdir()
+    program = (
+        "from rl_workbench.tools import ray_tasks\n"
+        "from rl_workbench.cli import main\n"
+        "ray_tasks.TOKEN = '.another'\n"  # the nodes look for the real one
+        "import sys; sys.exit(main(sys.argv[1:]))"
+    )
+    command = [sys.executable, "-c", program, "benchmark", f"--ray={cluster.address}", "--seeds=1",
+               f"--out={tmp_path / 'a'}"]  # fmt: skip
+    driver = subprocess.Popen(
+        command, env={**os.environ, **QUIET}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )  # fmt: skip
+    assert f"doesn't see {tmp_path / 'a'}: --out has to be a folder that all" in finished(driver, 1)
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("127.0.0.1:1", "no Ray cluster answers at 127.0.0.1:1: Connection refused"),
+        ("nowhere", "--ray is the HOST:PORT of a cluster's head"),
+        ("http://a:1", "--ray is the HOST:PORT of a cluster's head"),
+        ("127.0.0.1:70000", "no Ray cluster answers"),
+    ],
+)
+def test_where_no_cluster_is(tmp_path: Path, address: str, words: str) -> None:
+    assert words in finished(benchmark(tmp_path, f"--ray={address}"), 1)
+
+
+def test_a_cluster_of_this_machine_alone(tmp_path: Path, table: bytes) -> None:
+    said = finished(benchmark(tmp_path, "--ray=local"))
+    assert "1 node of a Ray cluster" in said
+    assert (tmp_path / "results.md").read_bytes() == table

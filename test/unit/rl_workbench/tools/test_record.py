@@ -1,0 +1,241 @@
+"""Episodes as films: which frames, how long they last, what stands below them, and several at once."""
+
+import base64
+import re
+from io import BytesIO
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from PIL import Image
+from support.pages import viser_recording
+from support.training import workbench_runs
+
+import cartpole  # noqa: F401 - registers the environments
+from rl_workbench import cli
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools.record import Film, SideBySide, write_video
+from rl_workbench.tools.recording import Frame, PictureView, record_episode, size_options
+
+pytestmark = pytest.mark.usefixtures("signals")
+RATE = 40.0  # [Hz]
+
+
+class Counter(gymnasium.Env):
+    """Its pictures are as bright as the episode is long."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": RATE}
+    observation_space = gymnasium.spaces.Box(0.0, 1.0, (1,))
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (4,))
+
+    def __init__(self, length: int = 20, render_mode: str = "rgb_array") -> None:
+        self.render_mode = render_mode
+        self._length, self._step = length, 0
+
+    def reset(self, *, seed=None, options=None):
+        self._step = 0
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action):
+        self._step += 1
+        return np.zeros(1, np.float32), 0.5, self._step == self._length, False, {}
+
+    def render(self):
+        return np.full((60, 400, 3), 10 * self._step, np.uint8)
+
+
+def film(length: int, title: str = "", stride: float = 1.0, max_steps: int = 0) -> Film:
+    env = Counter(length)
+    frames = record_episode(
+        env,
+        lambda _: np.zeros(4, np.float32),
+        PictureView(env),
+        0,
+        stride=stride,
+        max_steps=max_steps,
+    )
+    return Film(title, list(frames), RATE / stride)
+
+
+@pytest.mark.parametrize(
+    ("stride", "steps"),
+    [
+        (1.0, list(range(9))),
+        (2.0, [0, 2, 4, 6, 8]),
+        (2.5, [0, 3, 5, 8]),
+        (40 / 12, [0, 4, 7, 8]),  # the last one is always there
+    ],
+)
+def test_frames_come_at_the_stride_that_was_asked_for(stride, steps):
+    made = film(8, stride=stride)
+    assert [frame.step for frame in made.frames] == steps
+    assert [int(frame[0, 0, 0]) // 10 for frame in SideBySide([made], captions=False)] == steps
+    assert made.frames[-1].total_reward == 4.0
+
+
+def test_an_episode_is_cut_off_where_one_wants():
+    assert film(8, max_steps=3).frames[-1].step == 3
+
+
+def test_episodes_side_by_side_wait_for_the_longest():
+    sheets = SideBySide([film(2), film(5)], captions=False)
+    assert len(sheets) == 6
+    assert [frame[0, 0, 0] for frame in sheets] == [0, 10, 20, 20, 20, 20]
+    assert [frame[0, 400, 0] for frame in sheets] == [0, 10, 20, 30, 40, 50]
+
+
+def test_captions_stand_below_the_picture_and_change_with_it():
+    first, *_, last = SideBySide([film(3, title="best")], captions=True)
+    high, *_ = SideBySide([film(3)], captions=False)
+    assert first.shape[1:] == high.shape[1:] and first.shape[0] > high.shape[0]
+    lines = [frame[high.shape[0] :] for frame in (first, last)]
+    assert all((line < 128).any() for line in lines) and (lines[0] != lines[1]).any()
+    assert all((line[:, -1] == 255).all() for line in lines)  # it fits in
+
+
+@pytest.mark.parametrize(
+    ("action", "text"),
+    [(np.int64(1), "1"), (np.array([0.5, -0.25], np.float32), "+0.50 -0.25"),
+     (np.zeros(5), "+0.00 +0.00 +0.00 ..."), (np.array([1, 0]), "1 0")],
+)  # fmt: skip
+def test_actions_of_any_kind_are_told(action, text):
+    class Constant(Counter):
+        action_space = gymnasium.spaces.Discrete(2)
+
+    env = Constant(2)
+    *_, last = record_episode(env, lambda _: action, PictureView(env), 0)
+    assert last.caption("best") == f"best   step 2   return 1.0   action {text}"
+    assert Frame(0, b"", 0.0, "").caption() == "step 0   return 0.0"
+
+
+def test_a_gifs_frames_last_as_long_as_they_should_on_average(tmp_path: Path):
+    path = tmp_path / "a.gif"
+    frames = [np.full((8, 8, 3), 2 * step, np.uint8) for step in range(90)]
+    write_video(path, frames, 30.0)
+    with Image.open(path) as video:
+        total = 0
+        for index in range(video.n_frames):
+            video.seek(index)
+            total += video.info["duration"]
+    assert total == 3000  # [ms]
+
+
+def test_sizes_go_to_environments_that_know_them():
+    assert size_options("cartpole/Classic-v0", (64, 48)) == {"width": 64, "height": 48}
+    assert size_options("CartPole-v1", (64, 48)) == {}
+    assert size_options("cartpole/Classic-v0", None) == {}
+
+
+def test_an_environment_that_draws_nothing_is_refused():
+    class Blind(Counter):
+        def render(self):
+            return None
+
+    with pytest.raises(WorkbenchError, match="draws no pictures"):
+        PictureView(Blind()).take()
+
+
+def record(run: Path, out: Path, *words: str) -> int:
+    return cli.main(["record", str(run), "--out", str(out), "--max-steps", "20", *words])
+
+
+def test_best_last_and_random_side_by_side(robot_run: Path, tmp_path: Path, capsys):
+    out = tmp_path / "three.gif"
+    words = ("--checkpoint", "best", "last", "random", "--size", "64x48", "--fps", "10")
+    assert record(robot_run, out, *words) == 0
+    with Image.open(out) as video:
+        assert video.size == (3 * 64, 48 + 8)
+        assert video.info["duration"] == 100
+    told = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("--size", "64"), "must be WIDTHxHEIGHT"),
+        (("--size", "1x1"), "must be WIDTHxHEIGHT"),
+        (("--fps", "0"), "must lie between"),
+        (("--checkpoint", "worst"), "invalid choice"),
+    ],
+)
+def test_flags_that_make_no_sense(robot_run: Path, tmp_path: Path, capsys, words, text):
+    with pytest.raises(SystemExit):
+        record(robot_run, tmp_path / "a.gif", *words)
+    assert text in capsys.readouterr().err
+
+
+def test_a_gif_that_browsers_would_slow_down_is_refused(robot_run: Path, tmp_path: Path, capsys):
+    assert record(robot_run, tmp_path / "a.gif", "--fps", "100") == 1
+    assert "at most 50 frames a second" in capsys.readouterr().err
+
+
+def test_a_page_holds_all_that_it_shows(tmp_path: Path):
+    path = tmp_path / "a.html"
+    frames = [np.full((20, 30, 3), 40 * step, np.uint8) for step in range(5)]
+    write_video(path, frames, 12.5)
+    text = path.read_text()
+    kept = re.findall(r'^"([A-Za-z0-9+/=]+)",$', text, re.MULTILINE)
+    levels = [np.asarray(Image.open(BytesIO(base64.b64decode(each)))).mean() for each in kept]
+    assert levels == pytest.approx([0, 40, 80, 120, 160], abs=3)
+    assert "const rate = 12.5;" in text and 'width="30" height="20"' in text
+    assert "@" not in re.sub(r'"[A-Za-z0-9+/=]+"', "", text) and "http" not in text
+
+
+# In 3-D. That a browser plays the file: test_record_played.py.
+
+
+def record_short(run: Path, out: Path, *words: str) -> int:
+    return cli.main(["record", str(run), "--out", str(out), "--max-steps", "12", *words])
+
+
+def test_a_robots_page_is_in_3d_and_holds_all_that_it_shows(
+    robot_run: Path, tmp_path: Path, capsys
+):
+    out = tmp_path / "a.html"
+    assert record_short(robot_run, out) == 0
+    steps = int(capsys.readouterr().out.split(" steps")[0].split()[-1])
+    text = out.read_text()
+    assert len(text) < 1_000_000
+    assert 'src="http' not in text and 'href="http' not in text
+    found = viser_recording.of_page(text)
+    frames = len({time for time, _ in found.messages})
+    assert frames == pytest.approx(steps / 5, abs=1.1)  # 125 steps a second, 25 frames
+    assert found.duration == pytest.approx(1.0 + (frames - 1) / 25)
+    labels = {when: found.at(when)["/caption0"]["text"] for when in (0.0, found.duration)}
+    assert labels[0.0].startswith("step 0   return 0.0")
+    assert labels[found.duration].startswith(f"step {steps}   return {steps:.1f}   action ")
+    before, after = ([part["wxyz"] for part in found.parts(when)] for when in (0.0, 9e9))
+    assert before != after
+
+
+def test_several_are_seen_beside_each_other(robot_run: Path, tmp_path: Path, capsys):
+    out = tmp_path / "a.html"
+    assert (
+        record_short(robot_run, out, "--checkpoint", "best", "last", "random", "--fps", "10") == 0
+    )
+    told = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in told] == ["best", "last", "random", str(out)]
+    nodes = viser_recording.of_page(out.read_text()).at()
+    captions = [nodes[f"/caption{number}"]["text"] for number in range(3)]
+    assert [each.split()[0] for each in captions] == ["best", "last", "random"]
+
+
+def test_captions_may_be_left_out(robot_run: Path, tmp_path: Path):
+    out = tmp_path / "a.html"
+    assert record_short(robot_run, out, "--no-captions") == 0
+    assert "/caption0" not in viser_recording.of_page(out.read_text()).at()
+
+
+def test_a_size_is_refused_where_it_has_none(robot_run: Path, tmp_path: Path, capsys):
+    assert record_short(robot_run, tmp_path / "a.html", "--size", "64x48") == 1
+    assert "as large as the browser's window" in capsys.readouterr().err
+
+
+def test_what_is_no_robot_of_ours_is_played_as_pictures(tmp_path: Path):
+    folder = tmp_path / "classic"
+    workbench_runs.dqn(folder, env_id="CartPole-v1", total_timesteps=200)
+    out = tmp_path / "a.html"
+    assert record_short(folder, out, "--size", "64x48") == 0
+    assert 'width="64"' in out.read_text()

@@ -1,0 +1,215 @@
+"""Options of a training: where they come from, what wins, what is refused and how."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.training.training_runs import ALL, EXACT
+
+from rl_workbench.agents.settings import DocumentSettings, DQNSettings, ReinforceSettings
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.algorithms import ALGORITHMS, AlgorithmKind, algorithm
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.options import RunOptions, TrainingOptions
+
+DQN, REINFORCE, DOCUMENT = (ALGORITHMS[name] for name in EXACT)
+
+
+@pytest.fixture
+def empty(tmp_path: Path) -> str:
+    """A file that says nothing, so that the defaults show."""
+    return written(tmp_path, "{}\n")
+
+
+def written(tmp_path: Path, text: str) -> str:
+    path = tmp_path / "options.yaml"
+    path.write_text(text)
+    return f"--config={path}"
+
+
+def refusal(kind: AlgorithmKind, *flags: str, **parameters: Any) -> str:
+    with pytest.raises(WorkbenchError) as raised:
+        choose(kind, list(flags), parameters)
+    assert "\n" not in str(raised.value)
+    return str(raised.value)
+
+
+# Where they come from.
+
+
+def test_defaults(empty: str) -> None:
+    run = RunOptions(exp_name="dqn", total_timesteps=50_000, eval_frequency=1000,
+                     confirm_episodes=100, checkpoint_frequency=5000)  # fmt: skip
+    assert choose(DQN, [empty]) == TrainingOptions(DQN, run, DQNSettings())
+    episodic = {"episodes": 600, "eval_frequency": 0, "eval_episodes": 20}
+    assert choose(REINFORCE, [empty]) == TrainingOptions(
+        REINFORCE,
+        RunOptions(exp_name="reinforce", **episodic),
+        ReinforceSettings(normalize_observations=True),
+    )
+    assert choose(DOCUMENT, [empty]) == TrainingOptions(
+        DOCUMENT, RunOptions(exp_name="reinforce-document", **episodic), DocumentSettings()
+    )
+
+
+@pytest.mark.parametrize("kind", [REINFORCE, DOCUMENT])
+def test_steps_without_episodes_mean_until_the_steps(kind: AlgorithmKind, tmp_path: Path) -> None:
+    """Wherever the steps were given, the episodes of what is weaker don't count."""
+
+    def length(text: str, *flags: str, **parameters: Any) -> tuple[int, int]:
+        run = choose(kind, [written(tmp_path, text), *flags], parameters).run
+        return run.total_timesteps, run.episodes
+
+    assert length("{}\n") == (0, 600)
+    assert length("{}\n", "--total-timesteps=5e3") == (5000, 0)
+    assert length("{}\n", "--params", "total_timesteps=5e3") == (5000, 0)
+    assert length("{}\n", total_timesteps=5000) == (5000, 0)
+    assert length("total_timesteps: 5000\n") == (5000, 0)
+    assert length("episodes: 70\n", "--total-timesteps=5e3") == (5000, 0)
+    assert length("episodes: 70\ntotal_timesteps: 5000\n") == (5000, 70)
+    assert length("{}\n", "--total-timesteps=5e3", "--episodes=9") == (5000, 9)
+    assert length("{}\n", "--total-timesteps=0") == (0, 600)
+
+
+def test_episodes_do_not_prolong_what_schedules_depend_on(empty: str) -> None:
+    run = choose(DQN, [empty, "--episodes=9"]).run
+    assert (run.total_timesteps, run.episodes) == (50_000, 9)
+
+
+def test_every_option_of_dqn_is_a_flag(empty: str) -> None:
+    text = """--env-id Acrobot-v1 --seed 3 --total-timesteps 2e4 --learning-rate 0.01
+        --buffer-size 9 --gamma 0.9 --batch-size 8 --target-network-frequency 7 --tau 0.5
+        --start-e 0.9 --end-e 0.1 --exploration-fraction 0.3 --learning-starts 6
+        --train-frequency 5 --gradient-steps 4 --no-double --dueling --hidden-sizes 8,9
+        --exp-name mine --run-dir out --eval-frequency 0 --checkpoint-frequency 2"""
+    _, run, dqn, resume, *_ = choose(DQN, [empty, *text.split()])
+    assert (run.env_id, run.seed, run.exp_name, run.run_dir) == ("Acrobot-v1", 3, "mine", "out")
+    assert (run.eval_frequency, run.checkpoint_frequency, resume) == (0, 2, None)
+    assert run.total_timesteps == 20_000
+    assert dqn == DQNSettings(
+        total_timesteps=20_000, learning_rate=0.01, buffer_size=9, gamma=0.9, batch_size=8,
+        target_network_frequency=7, tau=0.5, start_e=0.9, end_e=0.1, exploration_fraction=0.3,
+        learning_starts=6, train_frequency=5, gradient_steps=4, double=False, dueling=True,
+        hidden_sizes=(8, 9),
+    )  # fmt: skip
+
+
+def test_every_option_of_reinforce_is_a_flag(empty: str) -> None:
+    text = """--gamma 0.9 --gae-lambda 0.8 --policy-learning-rate 0.1 --value-epochs 3
+        --value-learning-rate 0.2 --batch-episodes 4 --policy-hidden 8 --value-hidden 9
+        --entropy-coefficient 0.01 --no-normalize-observations --observation-scale 0.5,2
+        --save-every 7"""
+    assert choose(REINFORCE, [empty, *text.split()]).hyperparameters == ReinforceSettings(
+        gamma=0.9, gae_lambda=0.8, policy_learning_rate=0.1, value_learning_rate=0.2,
+        value_epochs=3, batch_episodes=4, entropy_coefficient=0.01, policy_hidden=8,
+        value_hidden=9, observation_scale=(0.5, 2.0), save_every=7,
+    )  # fmt: skip
+    text = "--gamma 0.9 --policy-learning-rate 0.1 --value-learning-rate 0.2 --random-weights"
+    assert choose(DOCUMENT, [empty, *text.split()]).hyperparameters == DocumentSettings(
+        gamma=0.9, policy_learning_rate=0.1, value_learning_rate=0.2, random_weights=True
+    )
+
+
+def test_file_params_rosparams_flags_in_this_order(tmp_path: Path) -> None:
+    """And all of them over the algorithm's own defaults, which win over the common ones."""
+    section = "{eval_frequency: 1, seed: 1, eval_episodes: 1, keep_checkpoints: 1}"
+    file = written(tmp_path, f"CartPole-v1: {section}")
+    flags = [file, "--params", "seed=2", "eval_episodes=2", "keep-checkpoints=2"]
+    flags += ["--keep-checkpoints=4"]
+    run = choose(DQN, flags, {"eval_episodes": 3, "keep_checkpoints": 3}).run
+    assert (run.eval_frequency, run.seed, run.eval_episodes, run.keep_checkpoints) == (1, 2, 3, 4)
+    assert run.confirm_episodes == 100 != RunOptions(episodes=1).confirm_episodes
+
+
+def test_the_environment_chooses_the_section(tmp_path: Path) -> None:
+    text = """CartPole-v1: {gamma: 0.1}
+Acrobot-v1: {gamma: 0.2}
+reinforce-document CartPole-v1: {gamma: 0.3}
+"""
+    file = written(tmp_path, text)
+    found = [
+        choose(kind, [file, *flags]).hyperparameters.gamma
+        for kind, flags in [(DQN, []), (DQN, ["--env-id=Acrobot-v1"]), (REINFORCE, []),
+                            (DOCUMENT, []), (DOCUMENT, ["--env-id=Acrobot-v1"])]
+    ]  # fmt: skip
+    assert found == [0.1, 0.2, 0.1, 0.3, 0.99]
+    assert choose(DQN, [file], env_id="Acrobot-v1").hyperparameters.gamma == 0.2
+    assert choose(DQN, [file], {"env_id": "Acrobot-v1"}).run.env_id == "Acrobot-v1"
+
+
+def test_a_file_without_sections_counts_everywhere(tmp_path: Path) -> None:
+    file = written(tmp_path, "gamma: 0.5")
+    assert choose(DQN, [file, "--env-id=X-v0"]).hyperparameters.gamma == 0.5
+    assert "has no sections, so no preset 'a' either" in refusal(DQN, file, "--preset=a")
+
+
+def test_parameters_as_roslaunch_has_them(empty: str) -> None:
+    parameters = {"params": "gamma=0.9 n-step=2", "dueling": True, "seed": "4"}
+    _, run, dqn, *_ = choose(DQN, [empty], parameters)
+    assert (dqn.gamma, dqn.n_step, dqn.dueling, run.seed) == (0.9, 2, True, 4)
+    nothing = {"seed": "", "resume": "", "config": "", "env_id": "", "dueling": False, "tau": ""}
+    assert choose(DQN, [empty], nothing) == choose(DQN, [empty])
+
+
+def test_a_preset_may_name_the_environment_and_a_flag_another() -> None:
+    assert choose(DQN, ["--preset=tutorial"]).run.env_id == "CartPole-v1"
+    _, run, dqn, *_ = choose(DQN, ["--preset=tutorial", "--env-id=Acrobot-v1"])
+    assert run.env_id == "Acrobot-v1" and dqn.target_network_frequency == 10
+    assert "unknown preset 'tutoral'; did you mean tutorial" in refusal(DQN, "--preset=tutoral")
+
+
+# What is refused.
+
+
+@pytest.mark.parametrize(
+    ("kind", "flags", "words"),
+    [
+        (DQN, ["--gamma", "x"], "must be a number, not 'x'"),
+        (DQN, ["--batch-size", "1.5"], "must be a whole number, not '1.5'"),
+        (DQN, ["--hidden-sizes", "a"], "must be whole numbers, as in 128,128"),
+        (DQN, ["--loss", "l1"], "invalid choice: 'l1'"),
+        (DQN, ["--params"], "expected at least one argument"),
+        (DQN, ["--gama", "1"], "unknown flag '--gama'; did you mean --gamma?"),
+        (DQN, ["--hidden"], "unknown flag '--hidden'"),  # nothing is abbreviated
+        (DQN, ["--save-every=3"], "unknown flag '--save-every'"),  # of another algorithm
+        (DQN, ["surplus"], "unknown flag 'surplus'"),
+        (REINFORCE, ["--episods=5"], "unknown flag '--episods'; did you mean --episodes?"),
+        (REINFORCE, ["--episodes", "many"], "must be a whole number, not 'many'"),
+        (REINFORCE, ["--preset=tutorial"], "unknown flag '--preset'"),  # its file has none
+        (DOCUMENT, ["--batch-episodes=2"], "unknown flag '--batch-episodes'"),
+    ],
+)
+def test_wrong_flags_exit_with_2(kind: AlgorithmKind, flags: list[str], words: str, capsys) -> None:
+    with pytest.raises(SystemExit) as stop:
+        choose(kind, flags)
+    assert stop.value.code == 2
+    error = capsys.readouterr().err
+    assert "error:" in error and words in error
+    assert len(error.splitlines()) == 2, "no list of all flags"
+
+
+def test_wrong_names_elsewhere_name_the_nearest(empty: str) -> None:
+    assert "--params: unknown option 'gama'; did you mean gamma" in refusal(
+        DQN, empty, "--params", "gama=1"
+    )
+    assert "parameters: unknown parameter 'gama'; did you mean gamma" in refusal(DQN, empty, gama=1)
+    assert "--params: 'gamma' isn't KEY=VALUE" in refusal(DQN, empty, "--params", "gamma")
+    assert "parameters: double must be true or false, not 'yes'" in refusal(
+        DQN, empty, double="yes"
+    )
+
+
+def test_a_training_has_an_end(empty: str) -> None:
+    assert "a training needs an end" in refusal(REINFORCE, empty, "--episodes=0")
+    assert choose(REINFORCE, [empty, "--episodes=0", "--total-timesteps=9"]).run.episodes == 0
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_help_explains_every_option(name: str, capsys) -> None:
+    with pytest.raises(SystemExit) as stop:
+        choose(algorithm(name), ["--help"], prog="node.py")
+    assert stop.value.code == 0
+    told = capsys.readouterr().out
+    assert algorithm(name).config in told
+    own = {"dqn": "--preset", "ppo": "--clip-range", "sac": "--ent-coef"}.get(name, "--save-every")
+    assert all(flag in told for flag in ("--params", "--resume", "--stop-at-return", own))

@@ -1,0 +1,377 @@
+"""What goes wrong around a training: a clear line each, and nothing that was learned is lost."""
+
+import builtins
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import gymnasium
+import pytest
+import torch
+from support.training.learning_fakes import POLE, SPOILT, Died, Pole, register_with
+from support.training.training_runs import (
+    ALL,
+    EXACT,
+    OTHERS,
+    InterruptAfter,
+    assert_same_run,
+    checkpoint,
+    files,
+    resume,
+    summary,
+    train,
+)
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.starting import Interrupt
+from rl_workbench.training import checkpoints as run_checkpoints
+from rl_workbench.training.history import History, TrainingOutcome
+
+ON_A_ROBOT = {"env_id": POLE, "env_kwargs": {"noise": 0.05}}
+LEARNERS = [*EXACT, OTHERS[0]]  # from single actions
+
+
+def failure(train_it: Callable[[], object]) -> str:
+    """The one line with which a training fails."""
+    with pytest.raises(WorkbenchError) as raised:
+        train_it()
+    assert "\n" not in str(raised.value)
+    return str(raised.value)
+
+
+def fill_disk(monkeypatch: pytest.MonkeyPatch, when: Callable[[], bool]) -> None:
+    """Nothing more goes to the disk while `when` is true."""
+
+    def fsync(descriptor: int) -> None:
+        if when():
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", fsync)
+
+
+# Full disks.
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_disk_that_is_full_from_the_beginning_fails_before_tensorboard(
+    tmp_path: Path, name: str
+) -> None:
+    """TensorBoard writes in a thread of its own, which would end in a traceback."""
+    (tmp_path / "scalars.csv").symlink_to("/dev/full")
+    line = failure(lambda: train(tmp_path, name))
+    assert "No space left on device; stopped after 0 steps" in line
+    assert "is saved" not in line and "--resume" not in line
+    assert not list(tmp_path.glob("events.*"))
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_a_disk_that_takes_no_checkpoint(tmp_path: Path, monkeypatch, name: str) -> None:
+    fill_disk(monkeypatch, lambda: True)
+    line = failure(lambda: train(tmp_path, name))
+    assert f"can't write {tmp_path}" in line and "No space left on device" in line
+    assert "is saved" not in line and "--resume" not in line
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_disk_that_fills_up_keeps_the_checkpoint_before(
+    whole, tmp_path: Path, monkeypatch, name: str
+) -> None:
+    run = tmp_path / "run"
+
+    def is_full() -> bool:
+        return len(list(run.glob("checkpoints/step_*.pt"))) == 3
+
+    with monkeypatch.context() as disk:
+        fill_disk(disk, is_full)
+        line = failure(lambda: train(run, name, keep_checkpoints=0))
+    assert "No space left on device" in line and "is saved" not in line
+    assert f"--resume {run} goes on from the last checkpoint" in line
+    assert 0 < checkpoint(run)["steps"] < summary(whole(name))["steps"]
+    resume(run)
+    assert summary(run)["complete"] and summary(run)["failure"] is None
+    if name in EXACT:
+        assert summary(run)["returns"] == summary(whole(name))["returns"]
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_ctrl_c_on_a_full_disk_tells_that_it_could_not_save(
+    tmp_path: Path, monkeypatch, name: str
+) -> None:
+    interrupt = InterruptAfter(40)
+    fill_disk(monkeypatch, lambda: interrupt.signal is not None)
+    line = failure(lambda: train(tmp_path, name, interrupt))
+    assert "No space left on device" in line and "--resume" in line and "is saved" not in line
+
+
+# No memory.
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_memory_that_ends_in_the_training(whole, tmp_path: Path, monkeypatch, name: str) -> None:
+    def learn(self: History) -> dict:
+        if len(list(run.glob("checkpoints/step_*.pt"))) == 3:
+            raise MemoryError("std::bad_alloc")
+        return keep(self)
+
+    run, keep = tmp_path / "run", History.state_dict
+    with monkeypatch.context() as patched:
+        patched.setattr(History, "state_dict", learn)
+        line = failure(lambda: train(run, name, keep_checkpoints=0))
+    assert "there is no memory left; stopped after" in line and "is saved" not in line
+    assert f"--resume {run} goes on from the last checkpoint" in line
+    resume(run)
+    assert summary(run)["complete"]
+    assert summary(run)["returns"] == summary(whole(name))["returns"]
+
+
+def test_memory_that_ends_in_the_picture(tmp_path: Path, monkeypatch) -> None:
+    def write(*_: object) -> None:
+        raise MemoryError("std::bad_alloc")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(TrainingOutcome, "write", write)
+        assert "there is no memory left" in failure(lambda: train(tmp_path, "dqn"))
+    resume(tmp_path)
+    assert summary(tmp_path)["complete"]
+
+
+# Numbers that are none.
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+@pytest.mark.parametrize("what", ["observation", "reward"])
+def test_a_number_that_is_none_ends_it_and_is_not_learned_from(
+    tmp_path: Path, name: str, what: str
+) -> None:
+    options = {"env_id": SPOILT, "env_kwargs": {what: -1e39}, "eval_frequency": 0}
+    line = failure(lambda: train(tmp_path, name, **options))
+    assert f"the {what} of {SPOILT} isn't finite in float32" in line
+    assert "what was learned is saved in" in line and "--resume" in line
+    names = {"last.pt", "failure.pt"} & files(tmp_path)
+    assert names == ({"last.pt", "failure.pt"} if name == "dqn" else {"last.pt"})
+    for each in names:
+        assert all_finite(run_checkpoints.read(tmp_path / each))
+    assert summary(tmp_path)["failure"] and not summary(tmp_path)["complete"]
+
+
+def all_finite(content: object) -> bool:
+    if isinstance(content, dict):
+        return all(all_finite(each) for each in content.values())
+    if isinstance(content, list | tuple):
+        return all(all_finite(each) for each in content)
+    return not isinstance(content, torch.Tensor) or bool(content.isfinite().all())
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_one_in_an_evaluation_ends_it_too(tmp_path: Path, name: str) -> None:
+    options = {"env_id": SPOILT, "env_kwargs": None, "eval_env_kwargs": {"observation": 1e39}}
+    line = failure(lambda: train(tmp_path, name, **options, eval_episodes=9, eval_frequency=28))
+    assert "the observation of" in line and "what was learned is saved" in line
+    steps = 64 if name == "ppo" else 28  # between two rollouts
+    assert f"stopped after {steps} steps, " in line and "--resume" in line
+    assert checkpoint(tmp_path, "failure.pt" if name == "dqn" else "last.pt")["steps"] == steps
+    assert not (tmp_path / "best.pt").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [("dqn", {"loss": "mse"}, "the loss is inf"),
+     ("reinforce", {"batch_episodes": 1}, "loss is"),
+     ("reinforce-document", {}, "loss is inf"),
+     pytest.param("ppo", {"normalize_advantage": "false"}, "losses/loss is (inf|nan)",
+                  marks=pytest.mark.extras("stable_baselines3"))],
+)  # fmt: skip
+def test_a_loss_that_is_no_number_leaves_the_networks(
+    tmp_path: Path, name: str, options: dict, words: str
+) -> None:
+    huge = {"env_id": SPOILT, "env_kwargs": {"reward": 3e38}, "eval_frequency": 0}
+    with pytest.raises(WorkbenchError, match=f"({words}).*--resume"):
+        train(tmp_path, name, **huge, **options)
+    for path in {tmp_path / "last.pt", tmp_path / "failure.pt"} & set(tmp_path.iterdir()):
+        content = run_checkpoints.read(path)
+        networks = {key: content[key] for key in ("q_net", "agent", "policy") if key in content}
+        assert networks and all_finite(networks)
+
+
+# Simulators that die.
+
+
+def dying(monkeypatch: pytest.MonkeyPatch, after: int) -> None:
+    monkeypatch.setitem(gymnasium.registry[POLE].kwargs, "dies_after", after)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_a_simulator_that_dies_costs_nothing_that_was_saved(
+    tmp_path: Path, monkeypatch, name: str
+) -> None:
+    options = ON_A_ROBOT | {"eval_frequency": 0, "checkpoint_frequency": 70 * (name == "dqn")}
+    whole = train(tmp_path / "whole", name, **options)
+    with monkeypatch.context() as patched:
+        dying(patched, 100)
+        line = failure(lambda: train(tmp_path / "run", name, **options))
+    assert f"the simulator has ended; stopped after {summary(tmp_path / 'run')['steps']} " in line
+    assert f"what was learned is saved in {tmp_path / 'run'}; --resume" in line
+    result = summary(tmp_path / "run")
+    assert result["failure"] == "the connection broke; the simulator has ended"
+    if name == "dqn":
+        assert checkpoint(tmp_path / "run")["steps"] == 70
+        assert checkpoint(tmp_path / "run", "failure.pt")["steps"] == result["steps"] == 100
+    else:  # all but the episode under way
+        assert checkpoint(tmp_path / "run")["steps"] == result["steps"] == sum(result["lengths"])
+        assert 0 < result["steps"] <= 100
+    assert_same_run(whole, resume(tmp_path / "run"))
+
+
+@pytest.mark.extras("stable_baselines3")
+def test_one_under_stable_baselines(tmp_path: Path, monkeypatch) -> None:
+    """In the midst of a rollout, which is taken back."""
+    options = ON_A_ROBOT | {"eval_frequency": 0, "checkpoint_frequency": 0}
+    whole = train(tmp_path / "whole", "ppo", **options)
+    with monkeypatch.context() as patched:
+        dying(patched, 100)
+        line = failure(lambda: train(tmp_path / "run", "ppo", **options))
+    assert "the simulator has ended; stopped after 64 steps" in line and "--resume" in line
+    assert_same_run(whole, resume(tmp_path / "run"))
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_a_simulator_that_dies_in_the_first_episode(tmp_path: Path, monkeypatch, name: str) -> None:
+    dying(monkeypatch, 2)
+    line = failure(lambda: train(tmp_path, name, **ON_A_ROBOT))
+    assert "stopped after" in line and "0 episodes" in line and "--resume" in line
+    assert {"last.pt", "summary.json", "config.json"} <= files(tmp_path)
+    assert "learning_curve.png" not in files(tmp_path)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_one_that_is_dead_from_the_start(tmp_path: Path, monkeypatch, name: str) -> None:
+    """Neither a new training nor one that is gone on with; that one keeps what it has."""
+
+    def dead(*arguments: object, **options: object) -> None:
+        raise Died("the simulator has ended")
+
+    run = train(tmp_path / "run", name, InterruptAfter(90), **ON_A_ROBOT)
+    before = {each: (run / each).read_bytes() for each in files(run) if each.endswith("t")}
+    monkeypatch.setattr(Pole, "reset", dead)
+    assert "the simulator has ended; stopped after 0" in failure(
+        lambda: train(tmp_path / "new", name, **ON_A_ROBOT)
+    )
+    returns = summary(run)["returns"]
+    line = failure(lambda: resume(run))
+    assert f"the simulator has ended; stopped after {summary(run)['steps']} " in line
+    assert "--resume" in line and summary(run)["returns"] == returns != []
+    assert before == {each: (run / each).read_bytes() for each in before}
+
+
+def test_a_simulator_that_dies_of_the_same_ctrl_c_is_no_failure(
+    tmp_path: Path, monkeypatch
+) -> None:
+    def step(env: Pole, action: int) -> tuple:
+        interrupt.signal = 2
+        raise Died("the simulator has ended")
+
+    interrupt = Interrupt()
+    monkeypatch.setattr(Pole, "step", step)
+    assert summary(train(tmp_path, "dqn", interrupt, **ON_A_ROBOT))["interrupted"]
+
+
+@pytest.mark.parametrize("after", [None, 100])
+@pytest.mark.parametrize("name", LEARNERS)
+def test_every_environment_is_closed_once(
+    tmp_path: Path, monkeypatch, name: str, after: int | None
+) -> None:
+    closed: list[Pole] = []
+    monkeypatch.setattr(Pole, "close", lambda env: closed.append(env))  # noqa: PLW0108 - binds
+    if after is None:
+        train(tmp_path, name, **ON_A_ROBOT)
+    else:
+        dying(monkeypatch, after)
+        failure(lambda: train(tmp_path, name, **ON_A_ROBOT, eval_frequency=0))
+    assert len(closed) == len({id(env) for env in closed}) == 2
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_a_refused_checkpoint_leaves_no_environment_open(
+    tmp_path: Path, monkeypatch, name: str
+) -> None:
+    run = train(tmp_path, name, InterruptAfter(90), **ON_A_ROBOT)
+    content = torch.load(run / "last.pt", weights_only=True)
+    for path in run.rglob("*.pt"):
+        path.unlink()
+    torch.save(content | {"history": "text"}, run / "last.pt")
+    closed: list[Pole] = []
+    monkeypatch.setattr(Pole, "close", lambda env: closed.append(env))  # noqa: PLW0108 - binds
+    assert "the checkpoint holds another history" in failure(lambda: resume(run))
+    assert len(closed) == len({id(env) for env in closed}) == 2
+
+
+# A user's environment with a mistake in it.
+
+
+class Mistaken(Pole):
+    """Its 120th step in a process has a mistake.
+
+    Args:
+        where: "step", "reset" or "close".
+        error: to be raised.
+    """
+
+    steps = 0
+
+    def __init__(self, where: str = "step", error: str = "ZeroDivisionError") -> None:
+        super().__init__(0.05)
+        self._where, self._error = where, error
+
+    def _fail(self, method: str) -> None:
+        if method == self._where and Mistaken.steps >= 120:
+            raise getattr(builtins, self._error)("of\nmine")  # the place
+
+    def step(self, action):
+        Mistaken.steps += 1
+        self._fail("step")
+        return super().step(action)
+
+    def reset(self, *, seed=None, options=None):
+        self._fail("reset")
+        return super().reset(seed=seed, options=options)
+
+    def close(self):
+        self._fail("close")
+
+
+PLACE = next(
+    number
+    for number, line in enumerate(Path(__file__).read_text().splitlines(), 1)
+    if line.endswith("# the place")
+)
+ERRORS = ["ZeroDivisionError", "ConnectionResetError", "SystemExit", "KeyError"]
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+@pytest.mark.parametrize(
+    ("where", "error"), [*(("step", error) for error in ERRORS), ("reset", "TypeError")]
+)
+def test_a_mistake_in_an_environment_is_one_line_with_its_place(
+    tmp_path: Path, monkeypatch, name: str, where: str, error: str
+) -> None:
+    monkeypatch.setattr(Mistaken, "steps", 0)
+    env_id = register_with(monkeypatch, Mistaken)
+    options = {"env_id": env_id, "env_kwargs": {"where": where, "error": error}}
+    line = failure(lambda: train(tmp_path, name, **options, eval_frequency=0))
+    assert f"{env_id} failed in {where}(): {error}: " in line
+    assert re.search(r"of( |\\n)mine", line) and f" ({__file__}:{PLACE}); " in line
+    assert f"; the traceback is in {tmp_path / 'failure.txt'}; stopped after" in line
+    assert "what was learned is saved in" in line and "--resume" in line
+    text = (tmp_path / "failure.txt").read_text()
+    assert text.startswith("Traceback") and "self._fail(" in text and error in text
+    assert checkpoint(tmp_path)["steps"] <= summary(tmp_path)["steps"]
+    assert f"{error}: " in summary(tmp_path)["failure"]
+
+
+def test_one_that_cannot_be_closed_has_learned_all_the_same(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(Mistaken, "steps", 0)
+    options = {"env_id": register_with(monkeypatch, Mistaken), "env_kwargs": {"where": "close"}}
+    line = failure(lambda: train(tmp_path, "dqn", **options))
+    assert "failed in close(): ZeroDivisionError: of mine" in line
+    assert summary(tmp_path)["complete"] and (tmp_path / "best.pt").exists()

@@ -1,0 +1,129 @@
+"""Gymnasium's environments by id: what they become, and what is refused in one line."""
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+from support.training.learning_fakes import POLE, SPOILT, Died
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.environments import (
+    discrete_actions,
+    make_environment,
+    shares_robot,
+)
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -1e39])
+@pytest.mark.parametrize("what", ["observation", "reward"])
+def test_what_is_no_number_is_refused(what: str, number: float) -> None:
+    env = make_environment(SPOILT, {what: number})
+    env.reset(seed=0)
+    for _ in range(29):
+        env.step(0)
+    words = f"the {what} of {SPOILT} isn't finite in float32: .*(nan|inf|-1.?e[+]39)"
+    with pytest.raises(WorkbenchError, match=words):
+        env.step(0)
+
+
+def test_an_environment_that_fails_as_gymnasiums_do_is_one_line(monkeypatch) -> None:
+    env = make_environment(POLE, {"dies_after": 1})
+    env.reset(seed=0)
+    env.step(0)
+    with pytest.raises(WorkbenchError, match="^the connection broke; the simulator has ended$"):
+        env.step(0)
+
+    def dead(**arguments: object) -> None:
+        raise Died("no simulator")
+
+    monkeypatch.setattr(env.unwrapped, "reset", dead)
+    with pytest.raises(WorkbenchError, match="^no simulator$"):
+        env.reset()
+
+
+@pytest.mark.extras("Box2D")
+@pytest.mark.parametrize(
+    ("env_id", "options", "words"),
+    [("LunarLander-v3", {"gravity": 5}, "must be between -12 and 0"),
+     ("FrozenLake-v1", {"map_name": "none"}, "'none'"),
+     ("CartPole-v1", {"wheels": 4}, "unexpected keyword")],
+)  # fmt: skip
+def test_options_that_an_environment_refuses(env_id: str, options: dict, words: str) -> None:
+    with pytest.raises(WorkbenchError, match=f"can't make {env_id}: .*{words}") as raised:
+        make_environment(env_id, options)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("env_id", "words"),
+    [
+        ("CartPol-v1", "unknown environment 'CartPol-v1'; did you mean CartPole-v1?"),
+        ("CartPole-v7", "did you mean CartPole-v1?"),
+        ("zzz", "^unknown environment 'zzz'; one of your own is named with its module"),
+        (
+            "my_module:Env-v0",
+            "can't make my_module:Env-v0: there is no module 'my_module'; .*--with FO",
+        ),
+    ],
+)
+def test_an_environment_that_is_none(env_id: str, words: str) -> None:
+    with pytest.raises(WorkbenchError, match=words):
+        make_environment(env_id)
+
+
+def test_one_whose_package_is_missing(monkeypatch) -> None:
+    def missing(*arguments: object, **options: object) -> None:
+        raise gymnasium.error.DependencyNotInstalled("MuJoCo is not installed")
+
+    monkeypatch.setattr(gymnasium, "make", missing)
+    with pytest.raises(
+        WorkbenchError, match="Ant-v5 needs more packages .*/ws extras may install them.: MuJoCo"
+    ):
+        make_environment("Ant-v5")
+
+
+def test_other_observations_are_flattened() -> None:
+    """FrozenLake observes one number of 16."""
+    env = make_environment("FrozenLake-v1")
+    assert isinstance(env.unwrapped.observation_space, gymnasium.spaces.Discrete)
+    assert env.observation_space.shape == (16,)
+    assert np.asarray(env.reset(seed=0)[0]).tolist() == [1] + [0] * 15
+
+
+def test_what_cannot_be_flattened_is_refused(monkeypatch) -> None:
+    texts = gymnasium.spaces.Text(5)
+    monkeypatch.setattr(gymnasium.registry[POLE].entry_point, "observation_space", texts)
+    with pytest.raises(WorkbenchError, match=f"{POLE} observes Text.*only vectors of numbers"):
+        make_environment(POLE)
+
+
+@pytest.mark.parametrize(
+    ("space", "words"),
+    [(gymnasium.spaces.Box(-1, 1, (1,)), r"has Box\(.*ppo, a2c, sac, td3 or ddpg: these fit it"),
+     (gymnasium.spaces.MultiDiscrete([2, 2]), "has MultiDiscrete.*ppo or a2c: these fit it"),
+     (gymnasium.spaces.Discrete(2, start=1), "ppo or a2c: these fit it")],
+)  # fmt: skip
+def test_actions_that_are_no_choice_of_single_ones(monkeypatch, space, words: str) -> None:
+    env = make_environment(POLE)
+    assert discrete_actions(env, POLE, "DQN") == 2
+    monkeypatch.setattr(gymnasium.registry[POLE].entry_point, "action_space", space)
+    with pytest.raises(WorkbenchError, match=rf"DQN needs .*Discrete\(n\); .*{words}"):
+        discrete_actions(make_environment(POLE), POLE, "DQN")
+
+
+def test_whether_there_is_one_robot(monkeypatch) -> None:
+    env = make_environment(POLE)
+    assert not shares_robot(env)
+    monkeypatch.setattr(env.unwrapped, "shares_robot", True, raising=False)
+    assert shares_robot(env)
+    wrapped = gymnasium.wrappers.TransformReward(gymnasium.wrappers.TimeLimit(env, 5), abs)
+    assert shares_robot(wrapped), "however it is wrapped"
+
+
+def test_a_wrapper_may_say_that_there_is_one_robot() -> None:
+    class Connected(gymnasium.Wrapper):
+        shares_robot = True
+
+    env = Connected(gymnasium.make(POLE))
+    assert shares_robot(gymnasium.wrappers.TimeLimit(env, 5))

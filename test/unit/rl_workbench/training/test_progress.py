@@ -1,0 +1,96 @@
+"""What the user sees while training: lines in a pipe, a bar on a terminal."""
+
+import io
+import os
+import time
+
+import pytest
+
+from rl_workbench.training.progress import Progress, tell
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def shown(stream: io.StringIO, episodes: int, total: int, note: str = "") -> str:
+    """What a training of so many episodes shows; the i-th has length i and return i / 2."""
+    bar = Progress(total, "episode", 0, stream)
+    returns: list[float] = []
+    for length in range(episodes):
+        returns.append(length / 2)
+        bar.episode_done(returns, length, "99 steps/s", note)
+    bar.close()
+    return stream.getvalue()
+
+
+def test_without_a_terminal_a_line_every_20_episodes() -> None:
+    assert shown(io.StringIO(), 45, 45).splitlines() == [
+        "Episode   20 | Reward:  10 | Avg(20):    4.8 | 99 steps/s",
+        "Episode   40 | Reward:  20 | Avg(20):   14.8 | 99 steps/s",
+    ]
+
+
+def test_what_an_algorithm_says_of_itself_takes_the_speeds_place() -> None:
+    """As in the DQN document, whose line ends in epsilon."""
+    line = "Episode   20 | Reward:  10 | Avg(20):    4.8 | ε: 0.905\n"
+    assert shown(io.StringIO(), 25, 45, "ε: 0.905") == line
+
+
+def test_on_a_terminal_a_bar_over_episodes() -> None:
+    told = shown(Terminal(), 5, 5, "ε: 0.905")
+    assert "5/5" in told and "return 2, length 4, ε 0.905, 99 steps/s" in told
+
+
+def test_lines_stand_above_the_bar() -> None:
+    told = shown(Terminal(), 20, 30)
+    assert "Episode   20 | Reward" in told and "20/30" in told
+
+
+def test_or_over_steps_which_ends_where_the_training_has_ended() -> None:
+    stream, deadline = Terminal(), time.monotonic() + 60
+    bar = Progress(100, "step", 50, stream)
+    assert "50/100" in stream.getvalue(), "one that is gone on with begins where it was"
+    while "70/100" not in stream.getvalue():  # it isn't drawn at every step
+        bar.step_done(70)
+        assert time.monotonic() < deadline
+    bar.step_done(100)
+    bar.close()
+    assert "100/100" in stream.getvalue()
+
+
+def test_episodes_do_not_move_a_bar_over_steps() -> None:
+    stream = Terminal()
+    bar = Progress(100, "step", 0, stream)
+    bar.episode_done([1.0] * 20, 7, "9 steps/s", "")
+    bar.close()
+    assert "0/100" in stream.getvalue() and "20/100" not in stream.getvalue()
+
+
+def test_a_pipe_that_is_gone_costs_no_training() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    pipe = os.fdopen(writer, "w")
+    tell("nobody listens", pipe)
+    with pytest.raises(BrokenPipeError):  # it was gone indeed
+        pipe.close()
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_a_sign_that_the_output_cannot_write_costs_no_training(terminal: bool) -> None:
+    """Paths hold any bytes, and LC_ALL=C or PYTHONIOENCODING make any output ASCII."""
+    raw = io.BytesIO()
+    stream = io.TextIOWrapper(raw, encoding="ascii", errors="strict", write_through=True)
+    stream.isatty = lambda: terminal  # type: ignore[method-assign]
+    bar = Progress(5, "episode", 0, stream)
+    bar.say("runs/\u00fc\udcff: going on")
+    bar.close()
+    tell("runs/\u4e16\udcff", stream)
+    assert rb"runs/\xfc\udcff: going on" in raw.getvalue()
+    assert raw.getvalue().endswith(rb"runs/\u4e16\udcff" + b"\n")
+
+
+def test_bytes_of_a_path_that_are_no_text(capsys) -> None:
+    tell("runs/\udcff")
+    assert capsys.readouterr().out == "runs/\\udcff\n"

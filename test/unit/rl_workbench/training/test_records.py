@@ -1,0 +1,79 @@
+"""Options on record: they come back, and what a resumed training may change of them."""
+
+import json
+from pathlib import Path
+
+import pytest
+from support.training.training_runs import ALL, EXACT, flags, resume, small, summary, train
+
+from rl_workbench.errors import WorkbenchError
+from rl_workbench.training.algorithms import ALGORITHMS, algorithm
+from rl_workbench.training.command_line import choose
+from rl_workbench.training.options import EXTENDING, recorded_options
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_record_comes_back(name: str) -> None:
+    """Also by way of JSON, which knows no tuples."""
+    options = small(name, env_kwargs={"a": 1, "b": [1, {"c": None}]}, stop_at_return=5)
+    content = options.record()
+    assert recorded_options(content, "here") == options
+    assert recorded_options(json.loads(json.dumps(content)), "here") == options
+
+
+def test_a_record_of_something_else() -> None:
+    content = small("dqn").record()
+    with pytest.raises(WorkbenchError, match="here: unknown option 'wheels'"):
+        recorded_options(content | {"hyperparameters": {"wheels": 4}}, "here")
+    with pytest.raises(WorkbenchError, match="unknown algorithm 'pg'"):
+        recorded_options(content | {"algorithm": "pg"}, "here")
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return train(tmp_path_factory.mktemp("done"), "reinforce", episodes=3)
+
+
+def test_what_may_be_extended(done: Path) -> None:
+    given = {"total_timesteps": 900, "episodes": 5, "stop_at_length": 450.0,
+             "stop_at_return": 475.0, "device": "cpu"}  # fmt: skip
+    assert set(given) == set(EXTENDING)
+    options = choose(ALGORITHMS["reinforce"], [f"--resume={done}", *flags(given)])
+    assert options.resume == done
+    assert {name: getattr(options.run, name) for name in given} == given
+    before = small("reinforce", episodes=3)
+    assert options.hyperparameters == before.hyperparameters
+    assert options.run.eval_frequency == before.run.eval_frequency
+    parameters = {"resume": str(done), "episodes": 5}
+    assert choose(ALGORITHMS["reinforce"], [], parameters).run.episodes == 5
+
+
+@pytest.mark.parametrize(
+    ("flag", "given"),
+    [("--seed", ["--seed=1"]), ("--gamma", ["--gamma=0.5"]), ("--config", ["--config=x"]),
+     ("--seed", ["--params", "seed=1"]), ("--env-id", ["--env-id=A-v0"]),
+     ("--eval-frequency", ["--eval-frequency=3"]), ("--run-dir", ["--run-dir=x"])],
+)  # fmt: skip
+@pytest.mark.parametrize("name", EXACT)
+def test_what_may_not(done: Path, name: str, flag: str, given: list[str]) -> None:
+    with pytest.raises(WorkbenchError) as raised:
+        choose(algorithm(name), [f"--resume={done}", *given])
+    others = "--total-timesteps, --episodes, --stop-at-length, --stop-at-return, --device"
+    assert f"--resume allows no {flag}, only {others}" in str(raised.value)
+
+
+def test_a_training_by_another_algorithm(done: Path) -> None:
+    with pytest.raises(WorkbenchError, match="is of a training by reinforce, not by dqn"):
+        choose(ALGORITHMS["dqn"], [f"--resume={done}"])
+
+
+def test_no_run_folder(tmp_path: Path) -> None:
+    for folder in (tmp_path, tmp_path / "none"):
+        with pytest.raises(WorkbenchError, match=r"is no run folder: .*config.json: No such file"):
+            choose(ALGORITHMS["dqn"], [f"--resume={folder}"])
+
+
+def test_a_resumed_training_remembers_its_new_length(tmp_path: Path) -> None:
+    run = train(tmp_path, "reinforce", episodes=3)
+    assert summary(resume(run, episodes=5))["episodes"] == 5
+    assert summary(resume(run))["episodes"] == 5

@@ -1,0 +1,199 @@
+"""Interrupted anywhere and resumed: a training ends with the bits with which it would have ended."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from support.training.learning_fakes import Dicing, OnlyOne, register_with
+from support.training.training_runs import (
+    EXACT,
+    InterruptAfter,
+    assert_no_doubles,
+    assert_same,
+    assert_same_run,
+    checkpoint,
+    record,
+    resume,
+    rows,
+    small,
+    summary,
+    train,
+)
+
+from rl_workbench.training import checkpoints as run_checkpoints
+from rl_workbench.training.checked import CheckedEnvironment
+from rl_workbench.training.checkpoints import Checkpoints
+
+pytestmark = pytest.mark.slow
+
+
+class Killed(Exception):
+    """Nobody catches it, as nobody catches kill -9."""
+
+
+# Ctrl-C.
+
+
+@pytest.mark.parametrize("share", [0.0, 0.004, 0.06, 0.22, 0.41, 0.6, 0.79, 0.97])
+@pytest.mark.parametrize("name", EXACT)
+def test_ctrl_c_anywhere_and_resumed_is_the_same_training(
+    whole, times, tmp_path: Path, name: str, share: float
+) -> None:
+    interrupt = InterruptAfter(1 + round(share * times(name)))
+    run = train(tmp_path / "run", name, interrupt)
+    assert interrupt.exit_code == 130
+    assert summary(run)["interrupted"]
+    assert_same_run(whole(name), resume(run))
+    assert_no_doubles(run)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_interrupted_again_and_again(whole, times, tmp_path: Path, name: str) -> None:
+    run = train(tmp_path / "run", name, InterruptAfter(40))
+    for share in (0.05, 0.0, 0.15, 0.3, 0.01):
+        resume(run, InterruptAfter(2 + round(share * times(name))))
+        assert summary(run)["interrupted"]
+    assert_same_run(whole(name), resume(run))
+    assert_no_doubles(run)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_ctrl_c_in_an_evaluation(whole, tmp_path: Path, name: str) -> None:
+    class InEvaluation(InterruptAfter):
+        def requested(self) -> bool:
+            names, frame = set(), sys._getframe(1)
+            while frame:
+                names.add(frame.f_code.co_name)
+                frame = frame.f_back
+            return super().requested() if "run_greedily" in names else self.signal is not None
+
+    run = train(tmp_path / "run", name, InEvaluation(25))
+    assert summary(run)["interrupted"]
+    assert_same_run(whole(name), resume(run))
+
+
+@pytest.mark.parametrize("kind", [Dicing, OnlyOne])
+@pytest.mark.parametrize("name", EXACT[1:])
+def test_whatever_generator_an_environment_draws_from_comes_back(
+    tmp_path: Path, monkeypatch, name: str, kind: type
+) -> None:
+    options = {"env_id": register_with(monkeypatch, kind), "env_kwargs": None}
+    whole = train(tmp_path / "whole", name, **options)
+    for asked in (37, 60):
+        run = train(tmp_path / str(asked), name, InterruptAfter(asked), **options)
+        assert_same_run(whole, resume(run))
+
+
+# Complete ones, and how to prolong them.
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_resuming_a_complete_training_changes_nothing(whole, tmp_path: Path, name: str) -> None:
+    run = Path(shutil.copytree(whole(name), tmp_path / "run"))
+    assert_same_run(whole(name), resume(run))
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_a_complete_training_prolonged_is_a_longer_one(tmp_path: Path, name: str) -> None:
+    unit = "total_timesteps" if name == "dqn" else "episodes"
+    longer, constant = {unit: small(name).record()["run"][unit]}, {}
+    if name == "dqn":
+        constant = {"lr_schedule": "constant", "exploration_fraction": 0}
+    whole = train(tmp_path / "whole", name, **constant)
+    shorter = {unit: longer[unit] // 2}
+    run = train(tmp_path / "run", name, **constant, **shorter)
+    began = record(run)["began"]
+    resume(run, InterruptAfter(40), **longer)
+    assert not summary(run)["complete"]
+    resume(run)
+    assert summary(run)["complete"] and record(run)["run"][unit] == longer[unit]
+    assert record(run)["began"] == began
+    assert rows(run) == rows(whole)
+    mine, other = checkpoint(run), checkpoint(whole)
+    assert_same(mine, other)
+
+
+def test_a_training_by_episodes_prolonged_by_steps(tmp_path: Path) -> None:
+    run = train(tmp_path, "reinforce", episodes=3, eval_frequency=0)
+    before = summary(run)["steps"]
+    after = summary(resume(run, total_timesteps=before + 100))
+    assert after["complete"] and after["steps"] >= before + 100 and after["episodes"] > 3
+
+
+def test_an_evaluation_that_a_checkpoint_knows_of_is_not_held_again(tmp_path: Path) -> None:
+    options = {"checkpoint_frequency": 50, "keep_checkpoints": 0, "total_timesteps": 200}
+    whole, run = (train(tmp_path / name, "dqn", **options) for name in ("whole", "run"))
+    for path in (run / "last.pt", run / "checkpoints/step_000000200.pt"):
+        path.unlink()  # killed after the one of step 150, which was evaluated
+    assert checkpoint(run, "checkpoints/step_000000150.pt")["history"]["evaluations"]
+    assert_same_run(whole, resume(run))
+    assert_no_doubles(run)
+
+
+# Killed.
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_there_is_something_to_resume_from_the_first_moment_on(
+    whole, tmp_path: Path, monkeypatch, name: str
+) -> None:
+    def killed(*arguments: object) -> None:
+        raise Killed
+
+    with monkeypatch.context() as patched:
+        patched.setattr(CheckedEnvironment, "step", killed)
+        with pytest.raises(Killed):
+            train(tmp_path / "run", name)
+    assert checkpoint(tmp_path / "run")["steps"] == 0
+    assert_same_run(whole(name), resume(tmp_path / "run"))
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_killed_between_the_names_of_a_best_checkpoint(
+    whole, tmp_path: Path, monkeypatch, name: str
+) -> None:
+    """Resumed, the training comes to the same best checkpoint."""
+    give_name, save, bests = run_checkpoints.give_name, Checkpoints.save, [False]
+
+    def saved(writer: Checkpoints, step: int, content: dict, best: bool = False) -> None:
+        bests.append(best)
+        save(writer, step, content, best)
+
+    def killed(path: Path, to: Path) -> None:
+        give_name(path, to)
+        if bests[-1]:
+            raise Killed
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Checkpoints, "save", saved)
+        patched.setattr(run_checkpoints, "give_name", killed)
+        with pytest.raises(Killed):
+            train(tmp_path / "run", name)
+    assert_same_run(whole(name), resume(tmp_path / "run"))
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_killed_before_its_first_checkpoint_it_begins_anew(
+    whole, tmp_path: Path, capsys, name: str
+) -> None:
+    run = train(tmp_path / "run", name, InterruptAfter(2))
+    (run / "last.pt").unlink()
+    for path in (run / "checkpoints").iterdir():
+        path.rename(path.with_name(f".{path.name}.a1b2c3"))  # half written
+    resume(run)
+    assert "has no checkpoint yet; beginning anew" in capsys.readouterr().out
+    assert_same_run(whole(name), run)
+    assert_no_doubles(run)
+    assert not list((run / "checkpoints").glob(".*"))
+
+
+def test_half_written_files_of_a_killed_training_are_removed(stopped: Path) -> None:
+    left = [stopped / "checkpoints" / ".step_000000070.pt.a1b2c3", stopped / ".config.json.d4e5f6",
+            stopped / ".last.pt.new", stopped / ".policy_network.pth.abc"]  # fmt: skip
+    for path in left:
+        path.write_bytes(b"half")
+    mine = stopped / ".notes"
+    mine.write_text("mine")
+    resume(stopped)
+    assert not any(path.exists() for path in left) and mine.exists()
