@@ -334,7 +334,7 @@ def _leave_positions(mesh: Element) -> None:
     sources = [e for e in mesh if e.tag == "source" and e.get("id") == name][:1]
     if not sources:
         raise DescriptionError(f"the source '{shown(name)}' of its positions is missing")
-    # NumPy stops at what is no number, without an error.
+    # NumPy silently stops at anything else.
     if NO_NUMBER.search(sources[0].findtext("float_array", "")):
         raise DescriptionError(f"source '{shown(name)}' holds something that isn't a number")
     lists = [each for each in mesh if each.tag in FACES]
