@@ -7,12 +7,12 @@ import genpy
 import rospy
 from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldRequest, AdvanceWorldResponse
 
+from bullet_gazebo.ros.common.mailboxes import Mailboxes
+from bullet_gazebo.ros.common.messages import to_time
+from bullet_gazebo.ros.common.node_process import seed_random_numbers
+from bullet_gazebo.ros.common.publishing import Thinner
+from bullet_gazebo.ros.common.rospy_topics import deliver
 from bullet_gazebo.ros.services.stepping.step_requests import MAX_TICKS
-from bullet_gazebo.ros.wire.conversions import to_time
-from bullet_gazebo.ros.wire.mailboxes import Mailboxes
-from bullet_gazebo.ros.wire.rospy_patches.topics import deliver
-from bullet_gazebo.ros.wire.seeding import seed_random_numbers
-from bullet_gazebo.ros.wire.thinning import Thinner
 from bullet_gazebo.simulator import Simulator
 
 SLICE = 500  # ticks between which other services get their turn
@@ -96,11 +96,11 @@ class AdvanceService:
         """Returns how many ticks have passed; after each slice services that wait get their turn."""
         sim, mailboxes = self._sim, self._mailboxes
 
-        def has_post() -> bool:
-            return any(postman.has_messages() for postman in sim.outboxes)
+        def has_messages() -> bool:
+            return any(outbox.has_messages() for outbox in sim.outboxes)
 
         def ends_slice() -> bool:
-            return mailboxes.has_awaited or has_post()
+            return mailboxes.has_awaited or has_messages()
 
         passed = 0
         while True:
@@ -111,8 +111,8 @@ class AdvanceService:
                     with self._watchdog:
                         passed += sim.advance(min(SLICE, left), ends_slice)
                 goes_on = passed < ticks and not sim.paused
-                postmen = [each for each in sim.outboxes if each.has_messages()]
-            for postman in postmen:
-                postman.deliver()
+                outboxes = [each for each in sim.outboxes if each.has_messages()]
+            for outbox in outboxes:
+                outbox.deliver()
             if not goes_on or mailboxes.has_awaited:
                 return passed
