@@ -27,8 +27,8 @@ from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryCo
 from bullet_gazebo.control.trajectory_goals import (
     ABORTED,
     SUCCEEDED,
+    GoalOutcome,
     GoalRequest,
-    Outcome,
     Tolerance,
     Trajectory,
     TrajectoryPoint,
@@ -103,7 +103,7 @@ class TrajectoryAction:
         self._controller = controller
         self._news = threading.Condition()
         self._feedback: tuple[ServerGoalHandle, TrajectorySample] | None = None  # the newest one
-        self._outcomes: list[tuple[ServerGoalHandle, Outcome]] = []
+        self._outcomes: list[tuple[ServerGoalHandle, GoalOutcome]] = []
         self._closing = False
         self._status_due = 0.0  # [s]
         self._name = rospy.names.ns_join(namespace, "follow_joint_trajectory")
@@ -130,7 +130,7 @@ class TrajectoryAction:
             self._feedback = (handle, sample)
             self._news.notify()
 
-    def note_outcome(self, handle: ServerGoalHandle, outcome: Outcome) -> None:
+    def note_outcome(self, handle: ServerGoalHandle, outcome: GoalOutcome) -> None:
         """Keeps a goal's result, to be published soon."""
         with self._news:
             self._outcomes.append((handle, outcome))
@@ -206,11 +206,11 @@ class GoalListener:
     def feedback(self, sample: TrajectorySample) -> None:
         self._action.note_feedback(self._handle, sample)
 
-    def finished(self, outcome: Outcome) -> None:
+    def finished(self, outcome: GoalOutcome) -> None:
         self._action.note_outcome(self._handle, outcome)
 
 
-def _settle(handle: ServerGoalHandle, outcome: Outcome) -> None:
+def _settle(handle: ServerGoalHandle, outcome: GoalOutcome) -> None:
     result = FollowJointTrajectoryResult(outcome.code, outcome.text)
     if outcome.kind == SUCCEEDED:
         handle.set_succeeded(result, outcome.text)

@@ -28,7 +28,7 @@ from gazebo_msgs.srv import (
     SetModelConfigurationResponse,
 )
 
-from bullet_gazebo.applied_forces import AppliedEffort, AppliedWrench, Interval, in_world
+from bullet_gazebo.applied_forces import ActingTime, AppliedEffort, AppliedWrench, in_world
 from bullet_gazebo.physics.properties import JointProperties, PropertyError, set_joint_properties
 from bullet_gazebo.ros.common.messages import bad_number, to_vector
 from bullet_gazebo.simulator import Simulator
@@ -170,9 +170,9 @@ class ForceServices:
             self._sim.applied.add_wrench(AppliedWrench(*found, wrench, interval))
         return ApplyBodyWrenchResponse(True, "")
 
-    def _interval(self, start: genpy.Time, duration: genpy.Duration) -> Interval:
+    def _interval(self, start: genpy.Time, duration: genpy.Duration) -> ActingTime:
         """A start in the past means now."""
-        return Interval(max(start.to_nsec(), self._sim.now), duration.to_nsec())
+        return ActingTime(max(start.to_nsec(), self._sim.now), duration.to_nsec())
 
     def _clear_efforts(self, request: JointRequestRequest) -> JointRequestResponse:
         with self._sim.lock:
