@@ -138,7 +138,7 @@ class TrajectoryAction:
 
     def _pursue(self, handle: ServerGoalHandle) -> None:
         request = _to_request(handle.get_goal())
-        goal = GoalListener(self, handle)
+        goal = ActionGoal(self, handle)
         try:
             with self._sim.lock:
                 warning = self._controller.pursue(handle.get_goal_id().id, request, goal)
@@ -196,7 +196,7 @@ class TrajectoryAction:
         return self._closing or bool(news and not self._sim.post_goes_with_steps)
 
 
-class GoalListener:
+class ActionGoal:
     """Takes the controller's news of one goal within a control tick, and passes them on."""
 
     def __init__(self, action: TrajectoryAction, handle: ServerGoalHandle) -> None:
