@@ -17,14 +17,14 @@ NANOSECONDS = 1_000_000_000
 IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()
 
 
-class Postman(Protocol):
-    """Tells clients something that a tick has brought up, outside of it."""
+class DeferredPublisher(Protocol):
+    """Publishes what a tick has produced, outside of the tick."""
 
-    def has_post(self) -> bool:
-        """Whether there is something to tell; the caller holds the lock."""
+    def has_messages(self) -> bool:
+        """Returns whether there are messages; the caller holds the lock."""
 
     def deliver(self) -> None:
-        """Tells it; the caller doesn't hold the lock."""
+        """Publishes them; the caller doesn't hold the lock."""
 
 
 class NotInLockstep(RuntimeError):
@@ -59,9 +59,9 @@ class Simulator:
         self.applied = AppliedForces()
         # Called with `now` before each physics step.
         self.listeners: list[Callable[[int], None]] = []
-        # What tells clients something after the ticks, and whether somebody who steps calls them.
-        self.postmen: list[Postman] = []
-        self.post_goes_with_steps = False
+        # They publish after ticks, by themselves or, for a client that steps, with its calls.
+        self.deferred_publishers: list[DeferredPublisher] = []
+        self.messages_go_with_steps = False
         self._period = round(world.time_step * NANOSECONDS)
         self._paused = False
         self._flowing = threading.Event()  # set while time runs by itself
