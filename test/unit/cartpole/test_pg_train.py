@@ -89,13 +89,13 @@ def test_parameters_and_flags_over_them() -> None:
         (["--backend=bullet", "--realtime"], "not with --backend bullet"),
         (
             ["--num-envs=2", "--realtime"],
-            "--realtime is of the robot of one simulator: num_envs is 1",
+            "--realtime is for a single simulator: num_envs must be 1",
         ),
         (
             ["--num-envs=2", "--rviz"],
-            "--rviz is of the robot of one simulator: num_envs must be 1, not 2",
+            "--rviz is for a single simulator: num_envs must be 1, not 2",
         ),
-        (["--num-envs=2", "--algo=reinforce-document"], "learns in one environment: num_envs is 1"),
+        (["--num-envs=2", "--algo=reinforce-document"], "learns in one environment: num_envs must be 1"),
         (["--num-envs=0"], "num_envs must be between 1 and 1024, not 0"),
         (["--episods=5"], "unknown flag '--episods'; did you mean --episodes?"),
         (["--gamma=1.5"], "gamma must be between 0 and 1"),
@@ -116,7 +116,7 @@ def test_wrong_parameters_too(capsys) -> None:
 def test_what_is_the_robots_alone(capsys, given: str) -> None:
     flag = given.partition("=")[0]
     line = refused(capsys, "--env-id=X-v0", given)
-    assert f"{flag} is of the robot: not with --env-id X-v0" in line
+    assert f"{flag} is for the cart-pole: not with --env-id X-v0" in line
 
 
 def test_every_training_may_be_shown() -> None:
