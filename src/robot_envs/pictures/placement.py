@@ -11,7 +11,7 @@ from bullet_gazebo.physics.description import DescriptionError, Joint, ModelDesc
 from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.pose import Pose, Vector, subtract
 from bullet_gazebo.pictures.camera import Camera, overview
-from bullet_gazebo.pictures.solids import box_around, moved, solid_of, visible_shapes
+from bullet_gazebo.pictures.visuals import box_around, moved, solid_of, visible_shapes
 from robot_envs.backends.world_files import object_model, world_models
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene

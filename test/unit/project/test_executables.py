@@ -11,13 +11,13 @@ import pytest
 pytestmark = pytest.mark.slow
 
 BOUND = 60.0  # [s]
-MAIN = "import sys; from bullet_gazebo.ros.{} import main; sys.exit(main())"
-PROGRAMS = {  # module: arguments, exit code after Ctrl-C
-    "clients.controller_manager.spawner": (["a_controller"], 0),
-    "clients.controller_manager.unspawner": (["a_controller"], 0),
-    "clients.spawn_model": (["-urdf", "-file", "/dev/null", "-model", "m", "-b"], 1),
-    "clients.gzclient": ([], 0),
-    "node.gazebo": ([], 130),
+MAIN = "import sys; from bullet_gazebo.ros.{} import {} as main; sys.exit(main())"
+PROGRAMS = {  # module and function: arguments, exit code after Ctrl-C
+    "clients.spawner main": (["a_controller"], 0),
+    "clients.spawner unspawner_main": (["a_controller"], 0),
+    "clients.spawn_model main": (["-urdf", "-file", "/dev/null", "-model", "m", "-b"], 1),
+    "clients.gzclient main": ([], 0),
+    "node.gzserver main_with_window": ([], 130),
 }
 
 
@@ -34,7 +34,7 @@ def start(tmp_path):
             "ROS_LOG_DIR": str(tmp_path),
         }
         program = subprocess.Popen(
-            [sys.executable, "-c", MAIN.format(name), *arguments],
+            [sys.executable, "-c", MAIN.format(*name.split()), *arguments],
             env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
         programs.append(program)
@@ -46,8 +46,10 @@ def start(tmp_path):
         program.communicate()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [*((name, signal.SIGINT) for name in PROGRAMS), ("node.gazebo", signal.SIGTERM)],
+)
 def test_a_signal_in_the_middle_of_a_registration_ends_it(start, name, number):
     with socket.create_server(("127.0.0.1", 0)) as mute_master:
         mute_master.settimeout(BOUND)
@@ -59,7 +61,7 @@ def test_a_signal_in_the_middle_of_a_registration_ends_it(start, name, number):
     assert "Traceback" not in output
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", ["clients.controller_manager.spawner", "node.gazebo"])
 def test_without_a_master_it_says_so_until_it_is_interrupted(start, name):
     with socket.socket() as reserved:  # bound, and nobody listens: connections are refused
         reserved.bind(("127.0.0.1", 0))

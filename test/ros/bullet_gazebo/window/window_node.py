@@ -16,10 +16,10 @@ from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, c
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.pictures.camera import Camera
-from bullet_gazebo.pictures.scene import Scene
-from bullet_gazebo.pictures.solids import visible_shapes
-from bullet_gazebo.ros.clients.window.opened import CAMERA, LOOK_AT
-from bullet_gazebo.ros.wire.conversions import from_pose_msg
+from bullet_gazebo.pictures.renderer import Renderer
+from bullet_gazebo.pictures.visuals import visible_shapes
+from bullet_gazebo.ros.common.messages import from_pose_msg
+from bullet_gazebo.ros.window.window import CAMERA, LOOK_AT
 
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>
@@ -85,16 +85,6 @@ class WindowTest(WindowCase):
         self.page.click("Do these steps")
         wait_for(lambda: round(self.world().sim_time, 6) == 0.101, "hundred steps")
         self.page.wait_for_text("0.101 s")
-
-    def test_reset_world_puts_models_back_and_lets_time_go_on(self):
-        self.spawn("ball", BALL, z=0.6)
-        self.page.click("World")
-        self.page.click("Do these steps")
-        wait_for(lambda: round(self.world().sim_time, 6) == 0.1, "hundred steps")
-        self.assertLess(self.height("ball"), 0.56)
-        self.page.click("Reset world")
-        wait_for(lambda: self.height("ball") == 0.6, "ball where it was")
-        self.assertEqual(round(self.world().sim_time, 6), 0.1)
 
     def test_speed_is_chosen_and_shown(self):
         self.set_speed(1.0)
@@ -207,7 +197,7 @@ class WindowTest(WindowCase):
             name: from_pose_msg(link(f"cartpole::{name}", "world").link_state.pose)
             for name in ("stand", "cart", "pole")
         }
-        scene = Scene()
+        scene = Renderer()
         self.addCleanup(scene.close)
         scene.add("cartpole", visible_shapes(model))
         scene.place("cartpole", poses)
@@ -218,15 +208,6 @@ class WindowTest(WindowCase):
         wait_for(
             lambda: np.abs(boxes(self.screenshot()) - wanted).max() <= FEW, f"picture with {wanted}"
         )
-
-    def test_what_somebody_else_does_is_shown(self):
-        self.page.click("World")
-        self.unpause()
-        self.page.wait_for_text("real-time factor")
-        self.page.wait_for_text("Pause")
-        self.pause()
-        self.page.wait_for_text("paused")
-        self.page.wait_for_text("Go on")
 
 
 def page_camera():
