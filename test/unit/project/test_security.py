@@ -22,7 +22,7 @@ DANGEROUS = {
     "marshal.load", "marshal.loads", "shelve.open", "joblib.load", "cloudpickle.load", "dill.load",
 }  # fmt: skip
 # The launcher runs the script that its user names, as `python3 script.py` does.
-RUNS_A_SCRIPT = {("src/lockstep_runner/script/running.py", name) for name in ("compile", "exec")}
+RUNS_A_SCRIPT = {("src/lockstep_runner/script.py", name) for name in ("compile", "exec")}
 MODEL = '<sdf version="1.6"><model name="m">{}</model></sdf>'
 INCLUDE = "<include><uri>{}</uri></include>"
 MESH = """<link name="l"><collision name="c"><geometry><mesh><uri>{}</uri></mesh></geometry></collision>
