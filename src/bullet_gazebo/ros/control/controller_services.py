@@ -26,10 +26,10 @@ from controller_manager_msgs.srv import (
     UnloadControllerRequest,
 )
 
+from bullet_gazebo.control.controllers import find_type
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.errors import ControlError, faults
 from bullet_gazebo.control.manager import ControllerInfo, ControllerManager
-from bullet_gazebo.control.user_types import find_type
 from bullet_gazebo.ros.common.publishing import Thinner
 from bullet_gazebo.ros.control.controller_topics import ControllerTopics
 from bullet_gazebo.simulator import Simulator

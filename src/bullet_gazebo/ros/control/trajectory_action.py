@@ -111,13 +111,13 @@ class TrajectoryAction:
             self._name, FollowJointTrajectoryAction, self._pursue, self._cancel, self._clock
         )
         self._server.start()
-        sim.postmen.append(self)
+        sim.outboxes.append(self)
         self._thread = threading.Thread(target=self._deliver, name=self._name, daemon=True)
         self._thread.start()
 
     def shutdown(self) -> None:
         """Publishes the last results, and closes the action; the controller was stopped before."""
-        self._sim.postmen.remove(self)
+        self._sim.outboxes.remove(self)
         with self._news:
             self._closing = True
             self._news.notify()
@@ -155,7 +155,7 @@ class TrajectoryAction:
         with self._sim.lock:
             self._controller.cancel(handle.get_goal_id().id)
 
-    def has_post(self) -> bool:
+    def has_messages(self) -> bool:
         """Returns whether there is something to publish; called within a tick."""
         return bool(self._feedback or self._outcomes) or self._status_is_due()
 
@@ -184,16 +184,16 @@ class TrajectoryAction:
             with self._news:
                 self._news.wait_for(self._has_news, STATUS_PERIOD)
                 closing = self._closing
-            if closing or not self._sim.post_goes_with_steps:
+            if closing or not self._sim.deliver_with_steps:
                 self.deliver()
 
     def _clock(self) -> float:
         """Returns the time [s] for the status."""
-        return self._sim.sim_time if self._sim.post_goes_with_steps else time.monotonic()
+        return self._sim.sim_time if self._sim.deliver_with_steps else time.monotonic()
 
     def _has_news(self) -> bool:
         news = self._feedback or self._outcomes
-        return self._closing or bool(news and not self._sim.post_goes_with_steps)
+        return self._closing or bool(news and not self._sim.deliver_with_steps)
 
 
 class GoalListener:
