@@ -7,6 +7,8 @@ shorten a command go behind those of the page, where they win.
 
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
@@ -64,6 +66,10 @@ def shortened(line: str) -> list[str]:
 
 
 def run_line(line: str, mark: str) -> None:
+    if line.startswith("./ws python3 examples/"):
+        script, *arguments = shlex.split(line)[2:]
+        subprocess.run([sys.executable, ROOT / script, *arguments], check=True)
+        return
     if line == "./ws extras":  # a test installs nothing; `ws test` has done so
         return
     script, *arguments = shortened(line)
@@ -88,7 +94,6 @@ def test_every_command_of_the_tutorial_works(tmp_path: Path, monkeypatch) -> Non
 
 def test_both_languages_have_the_same_commands() -> None:
     mine, other = blocks(ENGLISH), blocks(CHINESE)
-    assert len(mine) > 15
     code = [re.sub(r" *#.*", "", block.text) for block in mine if block.language != "text"]
     assert code == [re.sub(r" *#.*", "", each.text) for each in other if each.language != "text"]
     assert [block[:2] for block in mine] == [block[:2] for block in other]

@@ -11,10 +11,10 @@ import rospy
 from controller_manager_msgs import srv
 from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
 
+from bullet_gazebo.control.controllers import find_type
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.errors import ControlError, faults
 from bullet_gazebo.control.manager import ControllerInfo, ControllerManager
-from bullet_gazebo.control.user_types import find_type
 from bullet_gazebo.ros.common.publishing import Thinner
 from bullet_gazebo.ros.control.controller_topics import ControllerTopics
 from bullet_gazebo.simulator import Simulator

@@ -99,13 +99,13 @@ class TrajectoryAction:
             self._name, msg.FollowJointTrajectoryAction, self._pursue, self._cancel, self._clock
         )
         self._server.start()
-        sim.deferred_publishers.append(self)
+        sim.outboxes.append(self)
         self._thread = threading.Thread(target=self._deliver, name=self._name, daemon=True)
         self._thread.start()
 
     def shutdown(self) -> None:
         """Publishes the last results, and closes the action; the controller was stopped before."""
-        self._sim.deferred_publishers.remove(self)
+        self._sim.outboxes.remove(self)
         with self._news:
             self._closing = True
             self._news.notify()
@@ -172,16 +172,16 @@ class TrajectoryAction:
             with self._news:
                 self._news.wait_for(self._has_news, STATUS_PERIOD)
                 closing = self._closing
-            if closing or not self._sim.messages_go_with_steps:
+            if closing or not self._sim.deliver_with_steps:
                 self.deliver()
 
     def _clock(self) -> float:
         """Returns the time [s] for the status."""
-        return self._sim.sim_time if self._sim.messages_go_with_steps else time.monotonic()
+        return self._sim.sim_time if self._sim.deliver_with_steps else time.monotonic()
 
     def _has_news(self) -> bool:
         news = self._feedback or self._outcomes
-        return self._closing or bool(news and not self._sim.messages_go_with_steps)
+        return self._closing or bool(news and not self._sim.deliver_with_steps)
 
 
 class ActionGoal:

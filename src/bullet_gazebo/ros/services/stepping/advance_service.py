@@ -57,7 +57,7 @@ class AdvanceService:
                 request.node, request.subscriptions, request.publications
             )
         with self._one_at_a_time:
-            self._sim.messages_go_with_steps = True
+            self._sim.deliver_with_steps = True
             if request.reseed:
                 seed_random_numbers(request.seed, tell=False)
             faults = self._deliver(request)
@@ -97,7 +97,7 @@ class AdvanceService:
         sim, mailboxes = self._sim, self._mailboxes
 
         def has_messages() -> bool:
-            return any(publisher.has_messages() for publisher in sim.deferred_publishers)
+            return any(outbox.has_messages() for outbox in sim.outboxes)
 
         def ends_slice() -> bool:
             return mailboxes.has_awaited or has_messages()
@@ -111,8 +111,8 @@ class AdvanceService:
                     with self._watchdog:
                         passed += sim.advance(min(SLICE, left), ends_slice)
                 goes_on = passed < ticks and not sim.paused
-                publishers = [each for each in sim.deferred_publishers if each.has_messages()]
-            for publisher in publishers:
-                publisher.deliver()
+                outboxes = [each for each in sim.outboxes if each.has_messages()]
+            for outbox in outboxes:
+                outbox.deliver()
             if not goes_on or mailboxes.has_awaited:
                 return passed
