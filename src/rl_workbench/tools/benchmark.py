@@ -213,7 +213,7 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
         raise WorkbenchError(
             f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}"
         )
-    rest = dict(options)
+    rest = {key: value for key, value in options.items() if value is not None}
     kind = str(rest.pop("algo", "dqn"))
     if kind not in ALGORITHMS:
         raise WorkbenchError(f"{origin}: algo is one of {', '.join(ALGORITHMS)}, not {kind!r}")
@@ -221,7 +221,6 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
     if taken:
         raise WorkbenchError(f"{origin}: the benchmark sets {taken[0]} itself")
     if not algorithm(kind).package:  # others are asked in `check_package`
-        rest = {key: value for key, value in rest.items() if value is not None}
         known_options(algorithm(kind)).read(_without_special(kind, rest), f"{origin}: {name}")
     return Variant(name, kind, rest)
 
@@ -261,7 +260,7 @@ def _text(value: Any) -> str:
         return f"[{','.join(map(str, value))}]"
     if isinstance(value, dict):
         return ",".join(f"{key}={each}" for key, each in value.items())
-    return "null" if value is None else str(value)
+    return str(value)
 
 
 def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, where: str) -> None:
