@@ -184,33 +184,15 @@ def joined(address: str) -> Iterator[Any]:
     need("ray", "Ray", "--ray")
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # sends nothing home
     with contextlib.ExitStack() as stack:
-        options: dict[str, Any] = {}
-        if address == LOCAL:
-            where = None if len(tempfile.gettempdir()) < SOCKET_PATH else "/tmp"
-            scratch = tempfile.TemporaryDirectory(
-                prefix="ray_", dir=where, ignore_cleanup_errors=True
-            )
-            options = {
-                "num_cpus": len(os.sched_getaffinity(0)),
-                "object_store_memory": OBJECT_STORE,
-                "include_dashboard": False,
-                "_temp_dir": stack.enter_context(scratch),
-            }
-            if "ray" not in sys.modules:  # nobody else on this machine may use it
-                os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
-        elif address != "auto":
+        options = _local_cluster(stack) if address == LOCAL else {}
+        if address not in (LOCAL, "auto"):
             _check_address(address)
         import ray
 
         before = {number: signal.getsignal(number) for number in SIGNALS}
         try:
-            ray.init(
-                address,
-                log_to_driver=False,
-                logging_level=logging.ERROR,
-                configure_logging=False,
-                **options,
-            )
+            ray.init(address, log_to_driver=False, logging_level=logging.ERROR,
+                     configure_logging=False, **options)  # fmt: skip
         except Exception as error:
             ray.shutdown()
             text = " ".join(str(error).split())
@@ -220,6 +202,20 @@ def joined(address: str) -> Iterator[Any]:
                 signal.signal(number, handler)
         stack.callback(ray.shutdown)
         yield ray
+
+
+def _local_cluster(stack: contextlib.ExitStack) -> dict[str, Any]:
+    """Options for a cluster on this machine, which nobody else can use; its files go with the stack."""
+    if "ray" not in sys.modules:  # which reads these when it is imported
+        os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
+    where = None if len(tempfile.gettempdir()) < SOCKET_PATH else "/tmp"
+    folder = tempfile.TemporaryDirectory(prefix="ray_", dir=where, ignore_cleanup_errors=True)
+    return {
+        "num_cpus": len(os.sched_getaffinity(0)),
+        "object_store_memory": OBJECT_STORE,
+        "include_dashboard": False,
+        "_temp_dir": stack.enter_context(folder),
+    }
 
 
 def _check_address(address: str) -> None:

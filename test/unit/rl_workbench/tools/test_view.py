@@ -17,7 +17,7 @@ import cartpole  # noqa: F401 - registers its environments
 from rl_workbench import cli
 from rl_workbench.tools import recording
 from rl_workbench.tools.policies import TEST_SEED, episode_steps, load_learned
-from rl_workbench.tools.recording import EpisodeRecorder, Frame, RecordedEpisode
+from rl_workbench.tools.recording import EpisodeFrame, EpisodeRecorder, RecordedEpisode
 from rl_workbench.tools.run_page import LINGER, Playback
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training.folder import held
@@ -69,7 +69,7 @@ def make_recorder(server, monkeypatch):
 
     yield make
     for each in made:
-        each.close(BOUND)
+        each.close()
 
 
 def begun(episode: RecordedEpisode) -> RecordedEpisode:
@@ -301,7 +301,7 @@ class Shelf:
 
     def play(self, which: str, seed: int) -> RecordedEpisode:
         self.played.append((which, seed))
-        frames = [Frame(index, index, float(index), "1") for index in range(self.length + 1)]
+        frames = [EpisodeFrame(index, index, float(index), "1") for index in range(self.length + 1)]
         return RecordedEpisode(which, seed, frames, which, rate=10.0, is_over=True)
 
     def newest(self, which: str) -> tuple[int, ...]:
