@@ -126,14 +126,6 @@ def test_a_robot_is_recorded_by_where_its_links_are(robot, make_recorder, server
     recorder.view.show(episode.frames[3].seen)
 
 
-def test_random_actions_are_those_of_their_seed(run, make_recorder) -> None:
-    recorder = make_recorder(run)
-    first, again, other = (whole(recorder.play("random", seed)) for seed in (4, 4, 5))
-    actions = [[each.action for each in episode.frames] for episode in (first, again, other)]
-    assert actions[0] == actions[1] != actions[2]
-    assert not first.note
-
-
 def test_another_wish_ends_the_episode_before(run, make_recorder, monkeypatch) -> None:
     monkeypatch.setattr(recording, "MAX_STEPS", 10**9)
     monkeypatch.setattr(recording, "MAX_BYTES", 2**60)
@@ -380,10 +372,3 @@ def test_what_is_no_run_is_one_line(tmp_path, run, capsys) -> None:
         port = held.getsockname()[1]
         assert f"port {port}: Address already in use" in refused(capsys, str(run), f"--port={port}")
     assert "choose others with --host, --port" in refused(capsys, str(run), "--host=192.0.2.1")
-
-
-def test_without_a_display_enjoy_names_the_page(run, capsys, monkeypatch) -> None:
-    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
-        monkeypatch.delenv(name, raising=False)
-    assert cli.main(["enjoy", str(run)], "workbench.py") == 1
-    assert "--gui shows a page in the browser" in capsys.readouterr().err
