@@ -1,6 +1,12 @@
-"""Writes a catkin package for a robot of the user's: scripts/new_robot.py, and nobody else imports it.
+"""Writes a catkin package for a robot of the user's; only scripts/new_robot.py uses it.
 
-`cli` reads the command line, `names` checks the package's name, `urdf_files` copies the URDF with what it
-includes, `survey` says what it is made of, `gains` what moves its joints, `ground` how high it stands,
-`contents` what the package says, and `template/` is how it says so. Knows no robot by name.
+`cli` reads the command line, `urdf_files` copies the URDF with what it includes, `survey` finds out what
+it is made of, `contents` fills in the files of `template/`, and `package` puts all of that together. Knows
+no robot by name.
 """
+
+__all__ = ["CannotWrite"]
+
+
+class CannotWrite(Exception):
+    """Why a package can't be written: one line with what is wrong and what to do."""

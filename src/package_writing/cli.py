@@ -1,16 +1,57 @@
 """The command new_robot.py."""
 
 import argparse
+import importlib.util
+import keyword
 import os
+import re
 import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from package_writing import package
-from package_writing.errors import CannotWrite
-from package_writing.names import check_name
+from package_writing import CannotWrite, package
+
+VALID = re.compile(r"[a-z][a-z0-9_]*")
+
+
+def check_name(name: str) -> None:
+    """Raises CannotWrite unless catkin and Python allow a name and it is free; suggests another one."""
+    if VALID.fullmatch(name) and not keyword.iskeyword(name):
+        if _is_taken(name):
+            raise CannotWrite(f"the name '{name}' is taken: {_other(name)}")
+        return
+    why = "is a keyword of Python" if keyword.iskeyword(name) else "has other characters"
+    raise CannotWrite(
+        "a package's name has small letters, digits and _, and begins with a letter; "
+        f"'{name}' {why}: {_other(name)}"
+    )
+
+
+def _other(name: str) -> str:
+    """Suggests a similar name."""
+    words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+    near = re.sub(r"[^a-z0-9]+", "_", words).strip("_") or "robot"
+    tried = (near, f"my_{near}", *(f"my_{near}_{number}" for number in range(2, 10)))
+    free = (
+        each
+        for each in tried
+        if VALID.fullmatch(each) and not keyword.iskeyword(each) and not _is_taken(each)
+    )
+    return f"'{next(free, 'my_robot')}' would do"
+
+
+def _is_taken(name: str) -> bool:
+    """Whether a package or a Python module has the name."""
+    if importlib.util.find_spec(name) is not None:
+        return True
+    if importlib.util.find_spec("rospkg") is None:
+        return False
+    import rospkg
+
+    return name in rospkg.RosPack().list()
+
 
 EXIT_REFUSED = 1
 INTERRUPTED = 130
@@ -37,37 +78,37 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="new_robot.py",
-        description="Writes a catkin package of your own for a robot: URDF, controllers, launch files, a "
-        "task that can be trained at once, a test. Nothing that is there is overwritten.",
+        description="Writes a catkin package for your robot: URDF, controllers, launch files, a task that "
+        "can be trained at once, and a test. Overwrites nothing.",
     )
-    parser.add_argument("name", help="of the package, such as my_arm")
+    parser.add_argument("name", help="name of the package, such as my_arm")
     parser.add_argument(
         "--urdf",
         type=Path,
         metavar="FILE",
-        help="the robot, URDF or xacro; without: a two-link arm",
+        help="the robot's URDF or xacro file (default: a two-link arm)",
     )
     parser.add_argument(
         "arguments", nargs="*", metavar="ARG:=VALUE", help="arguments of the xacro file"
     )
     parser.add_argument(
         "--to", type=Path, metavar="FOLDER",
-        help=f"where the package's folder is made (default: {package.PARENT})",
+        help=f"folder in which the package is created (default: {package.PARENT})",
     )  # fmt: skip
     parser.add_argument(
         "--base", choices=("fixed", "free"),
-        help="of a robot that the file doesn't fix to the world: fix it (an arm), or let it stand or fall",
+        help="fix a robot to the world that its file doesn't fix (an arm), or let it stand or fall",
     )  # fmt: skip
     parser.add_argument(
         "--height",
         type=float,
         metavar="Z",
-        help="where it is spawned [m] (default: 0; with a free base: where it stands on the ground)",
+        help="height at which it is spawned [m] (default: 0; for a free base: where it stands on the ground)",
     )
     parser.add_argument(
         "--interface", choices=package.INTERFACES,
-        help="of the joints, if the file has no transmissions (default: effort; velocity of the continuous "
-        "joints of a free base, which are wheels)",
+        help="hardware interface of the joints, if the file has no transmissions (default: effort; velocity "
+        "for continuous joints of a free base, which are wheels)",
     )  # fmt: skip
     parser.add_argument(
         "--passive", action="append", default=[], metavar="JOINT",
@@ -77,18 +118,18 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _write(args: argparse.Namespace, parent: Path) -> list[str]:
-    """Writes the package beside its place and moves it there once it is whole; returns what is told."""
+    """Writes the package beside its place, and moves it there when complete; returns lines for the user."""
     check_name(args.name)
     folder = parent.absolute() / args.name
     if os.path.lexists(folder):
         raise CannotWrite(
-            f"{folder} is there already; take another name, or another place with --to FOLDER"
+            f"{folder} is there already; choose another name, or another place with --to FOLDER"
         )
     if not parent.is_dir():
         raise CannotWrite(
-            f"there is no folder {parent}; make it, or name another one with --to FOLDER"
+            f"there is no folder {parent}; create it, or choose another one with --to FOLDER"
         )
-    wanted = package.Wanted(
+    request = package.PackageRequest(
         args.name, folder, args.urdf, package.read_arguments(args.arguments), args.base, args.height,
         args.interface, tuple(args.passive),
     )  # fmt: skip
@@ -99,13 +140,13 @@ def _write(args: argparse.Namespace, parent: Path) -> list[str]:
             f"{parent}: {error.strerror}; --to FOLDER names a place where you may write"
         ) from error
     try:
-        told = package.write(wanted, made)
+        lines = package.write(request, made)
         made.chmod(0o777 & ~_umask())
         made.rename(folder)
     except BaseException:
         shutil.rmtree(made, ignore_errors=True)
         raise
-    return told
+    return lines
 
 
 def _umask() -> int:

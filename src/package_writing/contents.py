@@ -1,4 +1,4 @@
-"""What a package says: the template's files with the robot's own names and numbers."""
+"""What a package says: the template's files with the robot's names and numbers, and gains for a start."""
 
 import math
 import string
@@ -6,8 +6,85 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
-from package_writing.gains import Gains, effort_gains, velocity_gains, wheel_gains
+from bullet_gazebo.physics.description import ModelDescription
+from bullet_gazebo.physics.dynamics import (
+    effective_inertias,
+    most_inertias,
+    poses_at_zero,
+)
 from package_writing.survey import EFFORT, POSITION, Motor, Survey
+
+FREQUENCY = (
+    12.0  # [rad/s], at least, of a joint on its p and d with all that it carries stretched out
+)
+HIGHEST = 250.0  # [rad/s], of what a joint moves in itself: steps of 1 ms can't follow more
+MOST = 25.0  # times that, which it may carry
+SAG = 0.1  # [rad, m], at most, by its weight on p alone
+SHARE = 0.05  # of its range, at most as well
+GRAVITY = 9.81  # [m/s²]
+VELOCITY = 5.0  # [1/s], where the output is a velocity
+
+CLAMP = 5.0  # [rad/s], of a wheel: i does no more than p where it is that much too slow
+
+Gains = dict[str, float]
+
+
+def effort_gains(model: ModelDescription) -> dict[str, Gains]:
+    """Gains of position controllers whose output is an effort, by joint.
+
+    p and d make joint and load a critically damped spring, stiff enough for its weight; i, within its clamp,
+    holds the weight against gravity.
+    """
+    carried = most_inertias(model)
+    own = effective_inertias(model, poses_at_zero(model))
+    below = _masses(model)
+    found = {}
+    for name, inertia in carried.items():
+        ratio = min(inertia / own[name], MOST) if own[name] > 0.0 else 1.0
+        moved = own[name] * ratio or inertia
+        weight = GRAVITY * math.sqrt(below[name] * inertia)  # no less than it can weigh [N m, N]
+        joint = model.joints[name]
+        sag = min(SAG, SHARE * (joint.upper - joint.lower)) if joint.bounded else SAG
+        frequency = min(max(FREQUENCY, math.sqrt(weight / sag / moved)), HIGHEST / ratio)
+        p = moved * frequency**2
+        found[name] = _rounded(
+            {"p": p, "i": 2.0 * p, "d": 2.0 * moved * frequency, "i_clamp": weight}
+        )
+    return found
+
+
+def velocity_gains() -> Gains:
+    """Gains of a position controller whose output is a velocity."""
+    return {"p": VELOCITY}
+
+
+def wheel_gains(model: ModelDescription) -> dict[str, Gains]:
+    """Gains of velocity controllers whose output is an effort, by joint.
+
+    p is as stiff as steps of 1 ms allow with the wheel in the air; i works against slopes and friction.
+    """
+    found = {}
+    for name, inertia in effective_inertias(model, poses_at_zero(model)).items():
+        p = HIGHEST * inertia
+        found[name] = _rounded({"p": p, "i": VELOCITY * p, "d": 0.0, "i_clamp": CLAMP * p})
+    return found
+
+
+def _masses(model: ModelDescription) -> dict[str, float]:
+    """The mass that each movable joint carries [kg]."""
+    found = {}
+    for joint in model.movable_joints:
+        links = [joint.child]
+        for name in links:
+            links += [each.child for each in model.joints.values() if each.parent == name]
+        inertias = [model.links[name].inertia for name in links]
+        found[joint.name] = sum(each.mass for each in inertias if each is not None)
+    return found
+
+
+def _rounded(gains: Gains) -> Gains:
+    return {name: float(f"{value:.3g}") for name, value in gains.items()}
+
 
 TEMPLATE = Path(__file__).resolve().parent / "template"
 PARTS = TEMPLATE.with_name("parts")  # of a xacro file that adds what a robot's own lacks
@@ -17,18 +94,18 @@ PERIOD = 0.04  # [s] of an action
 
 
 class Filled(string.Template):
-    """Its sign is none that launch files, xacro or CMake use."""
+    """A template whose delimiter launch files, xacro and CMake don't use."""
 
     delimiter = "%"
 
 
 def fill(folder: Path, package: str, values: Mapping[str, str]) -> None:
-    """Writes the template's files, all but the robot that comes along.
+    """Writes the template's files, except the default robot.
 
     Args:
         folder: of the package.
         package: its name.
-        values: what is filled in, by the names that the template has for it.
+        values: to be filled in, by their names in the template.
     """
     for source in sorted(TEMPLATE.rglob(f"*{FILLED}")):
         place = source.relative_to(TEMPLATE).with_suffix("")
@@ -95,12 +172,12 @@ def ranges_text(survey: Survey) -> str:
 
 
 def _inwards(bound: float, rounded: Callable[[float], int]) -> float:
-    """A bound with three decimals, within the range that it bounds."""
+    """A bound rounded to three decimals, inwards."""
     return rounded(bound * 1000.0) / 1000.0
 
 
 def wheels_text(survey: Survey) -> dict[str, str]:
-    """What a task says of wheels, by the template's names for it; nothing, where there are none."""
+    """The template's values about wheels; empty if there are none."""
     listed = "".join(f'    "{each.joint}",\n' for each in survey.motors if each.wheel)
     where = (
         '        """Where the joints are{}."""\n        return np.array([{} for joint in RANGES])'
@@ -130,7 +207,7 @@ def control_text(package: str, urdf: str, survey: Survey | None, loose: str) -> 
     Args:
         package: its name.
         urdf: the user's file, beside it.
-        survey: of that file; None: there is none yet, and it gets no motors.
+        survey: of that file; None: not known yet, so that it gets no motors.
         loose: the link that has to be fixed to the world, if any.
     """
     parts = []

@@ -1,4 +1,4 @@
-"""One package: what is wanted, how it comes about, and what is told of it."""
+"""Writes one package, and reports what it has."""
 
 import json
 import math
@@ -12,37 +12,35 @@ from pathlib import Path
 import yaml
 
 from bullet_gazebo.physics.files.reading import Resources
-from package_writing import contents
-from package_writing.errors import CannotWrite
-from package_writing.ground import height_told, standing_height
-from package_writing.survey import Survey, look_at, root_link
+from package_writing import CannotWrite, contents
+from package_writing.survey import Survey, height_note, look_at, root_link, standing_height
 from package_writing.urdf_files import Copied, copy_urdf, expanded
 from robot_envs import Robot, RobotEnvError, controllers, files
 
 TREE = Path(__file__).resolve().parents[2]  # the source tree
 IS_CHECKOUT = (TREE / "ws").is_file()
 PARENT = TREE.parent if IS_CHECKOUT else Path()
-"""Where packages are written unless somebody says otherwise: beside the checkout."""
+"""Where packages are written by default: beside the checkout."""
 
 INTERFACES = ("effort", "position", "velocity")
 ARM = contents.TEMPLATE / "urdf/two_link_arm.urdf.xacro"
-NOTES = 3  # that are told
+NOTES = 3  # of a URDF's warnings, that are shown
 OURS = ("cartpole", "controller_manager", "gazebo_ros", "xacro")  # the template depends on them
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What somebody wants.
+class PackageRequest:
+    """What the user asks for.
 
     Args:
         name: of the package.
         folder: where it will be.
         urdf: the robot's file; None: a two-link arm.
         arguments: of xacro.
-        base: "fixed" or "free", of a robot that isn't fixed to the world; None: nothing is said.
-        height: where it is spawned [m]; None: at 0, or where a free base stands on the ground.
-        interface: of its joints, if they have no transmissions; None: of wheels velocity, of others effort.
-        passive: joints that are left without a motor, if none has a transmission.
+        base: "fixed" or "free", for a robot that isn't fixed to the world; None: not given.
+        height: at which it is spawned [m]; None: 0, or where a free base stands on the ground.
+        interface: of its joints, if they have no transmissions; None: velocity for wheels, effort for others.
+        passive: joints that get no motor, if none has a transmission.
     """
 
     name: str
@@ -56,11 +54,7 @@ class Wanted:
 
 
 def read_arguments(texts: Sequence[str]) -> dict[str, str]:
-    """Arguments of xacro, written as there.
-
-    Raises:
-        CannotWrite: if one isn't NAME:=VALUE.
-    """
+    """Parses arguments of xacro; raises CannotWrite if one isn't NAME:=VALUE."""
     found = {}
     for text in texts:
         name, sign, value = text.partition(":=")
@@ -70,44 +64,44 @@ def read_arguments(texts: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def write(wanted: Wanted, made: Path) -> list[str]:
+def write(request: PackageRequest, made: Path) -> list[str]:
     """Writes the package into an empty folder.
 
     Returns:
-        What a user is told.
+        Lines for the user.
 
     Raises:
         CannotWrite: if the robot can't be read, simulated or moved.
     """
-    if wanted.height is not None and not math.isfinite(wanted.height):
-        raise CannotWrite(f"--height is a number of metres, not {wanted.height}")
-    source = wanted.urdf or ARM
-    copied = copy_urdf(source, wanted.arguments, wanted.name, made)
+    if request.height is not None and not math.isfinite(request.height):
+        raise CannotWrite(f"--height is a number of metres, not {request.height}")
+    source = request.urdf or ARM
+    copied = copy_urdf(source, request.arguments, request.name, made)
     _check_packages(copied)
-    resources = _resources(wanted.name, made)
-    interface = f"{wanted.interface.capitalize()}JointInterface" if wanted.interface else None
-    free = wanted.base == "free"
-    loose = _loose_link(wanted, root_link(copied.xml), source)
+    resources = _resources(request.name, made)
+    interface = f"{request.interface.capitalize()}JointInterface" if request.interface else None
+    free = request.base == "free"
+    loose = _loose_link(request, root_link(copied.xml), source)
     urdf, xml = copied.place, copied.xml
-    control = f"{wanted.name}_control.urdf.xacro"
+    control = f"{request.name}_control.urdf.xacro"
 
     def with_more(survey: Survey | None) -> str:
-        text = contents.control_text(wanted.name, copied.place, survey, loose)
+        text = contents.control_text(request.name, copied.place, survey, loose)
         (made / "urdf" / control).write_text(text, encoding="utf-8")
-        return expanded(made / "urdf" / control, wanted.arguments)
+        return expanded(made / "urdf" / control, request.arguments)
 
     if loose:  # a base without mass can't be simulated before it is fixed
         urdf, xml = control, with_more(None)
-    survey = look_at(xml, interface, resources, free=free, passive=wanted.passive)
+    survey = look_at(xml, interface, resources, free=free, passive=request.passive)
     lacks, added = list(_lacks(survey, loose)), survey.added
     if added or not survey.has_plugin:
         urdf, xml = control, with_more(survey)
         survey = look_at(xml, interface, resources, free=free)
     stands = None if survey.model.fixed_base else standing_height(survey.model)
-    if wanted.height is None:
-        wanted = replace(wanted, height=stands or 0.0)
-    values = _values(wanted, survey, urdf, copied)
-    contents.fill(made, wanted.name, values)
+    if request.height is None:
+        request = replace(request, height=stands or 0.0)
+    values = _values(request, survey, urdf, copied)
+    contents.fill(made, request.name, values)
     parameters = yaml.safe_load((made / "config/controllers.yaml").read_text(encoding="utf-8"))
     robot = Robot(
         urdf=xml, controllers=parameters, run=tuple(map(contents.controller, survey.motors))
@@ -117,14 +111,14 @@ def write(wanted: Wanted, made: Path) -> list[str]:
     if wrong:
         raise CannotWrite("; ".join(wrong))
     more = f"urdf/{urdf}, which includes it, adds {' and '.join(lacks)}" if lacks else ""
-    return list(_told(wanted, copied, replace(survey, added=added), more, stands))
+    return list(_report(request, copied, replace(survey, added=added), more, stands))
 
 
-def _loose_link(wanted: Wanted, root: str, source: Path) -> str:
-    """The link that has to be fixed to the world, if any."""
-    if root == "world" or wanted.base == "free":
+def _loose_link(request: PackageRequest, root: str, source: Path) -> str:
+    """The link that has to be fixed to the world; empty: none."""
+    if root == "world" or request.base == "free":
         return ""
-    if wanted.base == "fixed":
+    if request.base == "fixed":
         return root
     raise CannotWrite(
         f"{source}: nothing fixes its link '{root}' to the world: --base fixed does (an arm), --base free "
@@ -153,14 +147,14 @@ def _resources(name: str, folder: Path) -> Resources:
     return Resources(package=lambda each: str(folder) if each == name else others.package(each))
 
 
-def _values(wanted: Wanted, survey: Survey, urdf: str, copied: Copied) -> dict[str, str]:
+def _values(request: PackageRequest, survey: Survey, urdf: str, copied: Copied) -> dict[str, str]:
     needed = [each for each in copied.packages if each not in OURS]
-    pairs = [f"{name}:={value}" for name, value in wanted.arguments.items()]
+    pairs = [f"{name}:={value}" for name, value in request.arguments.items()]
     units = {"rad/s" if each.wheel else "m" if each.linear else "rad" for each in survey.motors}
     namespace = f'\n    namespace="{survey.namespace}",' if survey.namespace else ""
-    arguments = f"\n    arguments={json.dumps(wanted.arguments)}," if pairs else ""
+    arguments = f"\n    arguments={json.dumps(request.arguments)}," if pairs else ""
     return {
-        "name": wanted.name,
+        "name": request.name,
         "urdf": urdf,
         "dependencies": "".join(f"  <exec_depend>{each}</exec_depend>\n" for each in needed),
         "controllers": contents.names_text(survey),
@@ -173,14 +167,14 @@ def _values(wanted: Wanted, survey: Survey, urdf: str, copied: Copied) -> dict[s
         "launch_arguments": "".join(f" {shlex.quote(each)}" for each in pairs),
         "namespace": namespace,
         "ns": survey.namespace,
-        "height": str(wanted.height),
+        "height": str(request.height),
         "period": str(contents.PERIOD),
-        "commands": "\n".join(_commands(wanted, copied)),
+        "commands": "\n".join(_commands(request, copied)),
     }
 
 
 def _lacks(survey: Survey, loose: str) -> Iterator[str]:
-    """What has to be added to the robot's file."""
+    """What the robot's file lacks."""
     if loose:
         yield f"a joint that fixes '{loose}' to the world"
     if survey.added:
@@ -190,10 +184,10 @@ def _lacks(survey: Survey, loose: str) -> Iterator[str]:
         yield "ros_control's plugin"
 
 
-def _told(
-    wanted: Wanted, copied: Copied, survey: Survey, more: str, stands: float | None
+def _report(
+    request: PackageRequest, copied: Copied, survey: Survey, more: str, stands: float | None
 ) -> Iterator[str]:
-    yield f"written: {wanted.folder}"
+    yield f"written: {request.folder}"
     joints = ", ".join(each.joint for each in survey.motors)
     if more:
         yield f"what the file lacks: {more}"
@@ -203,7 +197,7 @@ def _told(
     if wheels:
         yield f"continuous joints of a free base get a velocity controller, as wheels: {', '.join(wheels)}"
     if not survey.model.fixed_base:
-        yield height_told(wanted.height or 0.0, stands)
+        yield height_note(request.height or 0.0, stands)
     if survey.passive:
         yield f"joints that move without a motor, and that tasks don't see: {', '.join(survey.passive)}"
     held = [each.joint for each in survey.motors if not each.limited]
@@ -220,32 +214,32 @@ def _told(
     if len(warnings) > NOTES:
         yield f"note: {len(warnings) - NOTES} more of such"
     yield f"in {TREE}, to go on:" if IS_CHECKOUT else "to go on:"
-    yield from (f"  {each}" for each in _commands(wanted, copied))
+    yield from (f"  {each}" for each in _commands(request, copied))
 
 
-def _commands(wanted: Wanted, copied: Copied) -> list[str]:
-    """Those that a user goes on with, in the checkout."""
+def _commands(request: PackageRequest, copied: Copied) -> list[str]:
+    """Commands for the next steps, run in the checkout."""
     place = (
-        os.path.relpath(wanted.folder, TREE) if wanted.folder.parent == PARENT else wanted.folder
+        os.path.relpath(request.folder, TREE) if request.folder.parent == PARENT else request.folder
     )
     here = shlex.quote(str(place))
     ws = f"./ws {''.join(f'--with {each} ' for each in _others(copied))}--with {here}"
     run = f"{ws} rosrun cartpole workbench.py"
-    runs = f"runs/{wanted.name}"
+    runs = f"runs/{request.name}"
     return [
-        f"{ws} roslaunch {wanted.name} simulation.launch    # look at it; Ctrl-C ends it",
+        f"{ws} roslaunch {request.name} simulation.launch    # look at it; Ctrl-C ends it",
         f"{ws} test {here}",
         "./ws extras true    # once: Stable-Baselines3",
-        f"{run} train --algo ppo --env-id {wanted.name}.environment:{wanted.name}/Reach-v0 "
+        f"{run} train --algo ppo --env-id {request.name}.environment:{request.name}/Reach-v0 "
         f"--config {here}/config/ppo.yaml --run-dir {runs}",
         f"{run} eval {runs} --episodes 20",
-        f"{run} record {runs} --out {wanted.name}.gif",
+        f"{run} record {runs} --out {request.name}.gif",
         f"{run} eval {runs} --episodes 5 --env-kwargs backend=ros    # the same over ROS",
     ]
 
 
 def _others(copied: Copied) -> Iterator[str]:
-    """Folders of ws's that have packages which the robot needs."""
+    """Folders given to ws that have packages which the robot needs."""
     needed = [path.resolve() for each in copied.packages if (path := _package(each)) is not None]
     for folder in filter(None, os.environ.get("CARTPOLE_WITH", "").split(":")):
         if any(path.is_relative_to(Path(folder).resolve()) for path in needed):

@@ -1,20 +1,24 @@
-"""What a URDF is made of, as far as a package for it has to know."""
+"""What a URDF is made of, as far as a package for it has to know, and how high the robot stands."""
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.joint import JointHandle
 from bullet_gazebo.control.transmissions import RobotDescription, read_description
-from bullet_gazebo.physics.description import DescriptionError, ModelDescription
+from bullet_gazebo.physics.description import DescriptionError, ModelDescription, Shape
+from bullet_gazebo.physics.dynamics import poses_at_zero
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
+from bullet_gazebo.physics.pose import Pose, conjugate, rotate
 from bullet_gazebo.state import did_you_mean
 from files.content import FileError
 from files.xml_text import parse
-from package_writing.errors import CannotWrite
+from package_writing import CannotWrite
 
 PLUGIN = "libgazebo_ros_control.so"
 EFFORT, POSITION, VELOCITY = (
@@ -35,17 +39,17 @@ class Motor:
     high: float
     linear: bool
     limited: bool  # whether the URDF's limits of effort and velocity leave it able to move
-    wheel: bool  # it turns without end, of a robot whose base is free: it is told a velocity
+    wheel: bool  # a continuous joint of a robot whose base is free, which gets velocity commands
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What a URDF says."""
+    """What is known of a URDF."""
 
     model: ModelDescription
     motors: tuple[Motor, ...]
-    passive: tuple[str, ...]  # joints that move, with no motor
-    added: bool  # the motors are none of the URDF's: it needs transmissions
+    passive: tuple[str, ...]  # joints that move without a motor
+    added: bool  # whether the motors are missing in the URDF, which needs transmissions
     has_plugin: bool
     namespace: str  # of the plugin
 
@@ -62,11 +66,10 @@ def look_at(
 
     Args:
         xml: the text.
-        interface: of joints that have no transmission, where none has; None: the velocity of wheels, the
-            effort of others.
-        resources: where meshes lie.
-        free: whether a robot that nothing fixes to the world stays so.
-        passive: joints that are left without a motor, where none has a transmission.
+        interface: of the joints, if none has a transmission; None: velocity for wheels, effort for others.
+        resources: finds meshes.
+        free: whether the robot's base stays free.
+        passive: joints that get no motor, if none has a transmission.
 
     Raises:
         CannotWrite: if it can't be read or simulated, or nothing in it can be moved.
@@ -107,11 +110,7 @@ def look_at(
 
 
 def root_link(xml: str) -> str:
-    """The link that all others hang from; that of a robot that is fixed to the world is called so.
-
-    Raises:
-        CannotWrite: if the text is no URDF.
-    """
+    """The root link, "world" for a robot that is fixed to the world; raises CannotWrite if it is no URDF."""
     try:
         robot = parse(xml)
     except FileError as error:
@@ -180,3 +179,43 @@ def _plugins(robot: Element) -> Iterator[Element]:
         for plugin in block.findall("plugin"):
             if plugin.get("filename", "").endswith(PLUGIN):
                 yield plugin
+
+
+def standing_height(model: ModelDescription) -> float | None:
+    """The smallest height at which no collision is below the ground, joints at zero [m, three decimals].
+
+    None: there is no collision.
+    """
+    lows = [
+        _low(shape, pose.compose(shape.pose))
+        for name, pose in poses_at_zero(model).items()
+        for shape in model.links[name].collisions
+    ]
+    if not lows:
+        return None
+    return max(0.0, math.ceil(round(-min(lows) * 1000.0, 6)) / 1000.0)  # 0.1 stays 0.1
+
+
+def height_note(height: float, stands: float | None) -> str:
+    """A line about the height at which a robot is spawned [m], and that at which it stands on the ground."""
+    if stands is None:
+        return "note: it has no <collision>, so that it falls through the ground"
+    spawned = f"spawned at a height of {height:g} m"
+    if height < stands:
+        return f"note: {spawned} its lowest collision lies below the ground; --height {stands:g} is enough"
+    return f"{spawned}; its lowest collision touches the ground at {stands:g} m"
+
+
+def _low(shape: Shape, pose: Pose) -> float:
+    """The height of a shape's lowest point [m]."""
+    up = np.array(rotate(conjugate(pose.orientation), (0.0, 0.0, 1.0)))  # as the shape sees it
+    size = np.array(shape.size)
+    if shape.kind == "sphere":
+        reach = float(size[0])
+    elif shape.kind == "cylinder":
+        reach = float(size[0] * math.hypot(up[0], up[1]) + size[1] / 2.0 * abs(up[2]))
+    elif shape.solid is not None:
+        reach = -float(np.min(np.concatenate(shape.solid.hulls) * size @ up))
+    else:
+        reach = float(np.abs(up) @ size / 2.0)
+    return pose.position[2] - reach

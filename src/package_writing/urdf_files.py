@@ -1,4 +1,4 @@
-"""Copies a URDF or xacro file with what it includes, and with meshes that it names by a relative path."""
+"""Copies a URDF or xacro file with the files it includes, and meshes with relative paths."""
 
 import glob
 import os
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from files.expansion import CannotExpand, expand, included_files
-from package_writing.errors import CannotWrite
+from package_writing import CannotWrite
 from robot_envs.errors import RobotEnvError
 from robot_envs.files import PACKAGE, locate
 
@@ -20,13 +20,13 @@ MESH = re.compile(r"""(<mesh\s[^>]*?filename\s*=\s*)(["'])([^"'$]+)\2""")
 
 @dataclass(frozen=True)
 class Copied:
-    """What became of a file.
+    """A copied file.
 
     Args:
-        place: the file's own, in the folder `urdf` of the package.
+        place: its path in the package's folder `urdf`.
         xml: the copy, expanded.
-        packages: those that it names.
-        outside: files that it includes from elsewhere, and no package's.
+        packages: that it names.
+        outside: files that it includes from outside of any package.
     """
 
     place: str
@@ -36,7 +36,7 @@ class Copied:
 
 
 def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Path) -> Copied:
-    """Copies a file, and what it includes by a relative path, which keeps its place beside it.
+    """Copies a file, and the files it includes by relative paths, which stay the same.
 
     Args:
         path: the URDF or xacro file.
@@ -45,7 +45,7 @@ def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Pa
         folder: its folder.
 
     Raises:
-        CannotWrite: if one of them can't be read, or the copy doesn't say the same.
+        CannotWrite: if one of them can't be read or copied.
     """
     path = path.expanduser().absolute()
     try:
@@ -80,11 +80,7 @@ def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Pa
 
 
 def expanded(path: Path, arguments: Mapping[str, str]) -> str:
-    """The URDF in a file, which may be xacro.
-
-    Raises:
-        CannotWrite: if it can't be read.
-    """
+    """The URDF in a file, expanded if it is xacro; raises CannotWrite if it can't be read."""
     try:
         return expand(path, arguments)
     except CannotExpand as error:
@@ -92,7 +88,7 @@ def expanded(path: Path, arguments: Mapping[str, str]) -> str:
 
 
 def _own(files: list[Path], texts: list[str]) -> list[Path]:
-    """Those that are included by a relative path: the others are found where they are."""
+    """The files that are included by relative paths; others are found where they are."""
     found = {Path(each[2]).name for text in texts for each in FOUND.finditer(text)}
     near = files[0].resolve().parent.parent  # a package's folder, of one that lies in its `urdf`
     own = {
@@ -126,7 +122,7 @@ def _copy(source: Path, target: Path, package: str, folder: Path) -> None:
 
 
 def _mesh(source: Path, name: str) -> Path | None:
-    """A mesh that nobody finds by its name but who looks around its file; None for what isn't there."""
+    """A mesh that is found only relative to the file that names it; None: there is none."""
     if not name.startswith(PACKAGE):
         found = [] if ":" in name else [source.parent / name]
     elif _is_found(name):

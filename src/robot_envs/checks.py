@@ -1,4 +1,4 @@
-"""Checks of what a task defines and returns; each error names the method and what it should be."""
+"""Checks of what a task defines and returns; each error names the method and what it should return."""
 
 import math
 import operator
@@ -13,11 +13,11 @@ from robot_envs.errors import TaskError
 from robot_envs.task import GoalTask, Task
 from robot_envs.world_state import LinkQuery, StateQuery, WorldState
 
-FEW = 64  # numbers that are checked faster one by one
+FEW = 64  # numbers; fewer are checked faster one by one than by NumPy
 
 
 def action_reader(space: gymnasium.Space[Any]) -> Callable[[Any], Any]:
-    """Returns what checks an action; it raises ValueError for what is none of the space."""
+    """Returns a function that converts an action; it raises ValueError for one that isn't in the space."""
     if isinstance(space, gymnasium.spaces.Discrete):
         return _discrete_reader(space)
     if isinstance(space, gymnasium.spaces.Box):
@@ -33,7 +33,7 @@ def action_reader(space: gymnasium.Space[Any]) -> Callable[[Any], Any]:
 
 def _discrete_reader(space: gymnasium.spaces.Discrete) -> Callable[[Any], int]:
     first, end = int(space.start), int(space.start + space.n)
-    told = (
+    expected = (
         f"{first} or {end - 1}" if end - first == 2 else f"a whole number from {first} to {end - 1}"
     )
 
@@ -41,9 +41,9 @@ def _discrete_reader(space: gymnasium.spaces.Discrete) -> Callable[[Any], int]:
         try:
             if first <= (index := operator.index(action)) < end:
                 return index
-        except TypeError:  # a fraction, or none
+        except TypeError:  # no whole number
             pass
-        raise ValueError(f"an action is {told}, not {action!r}")
+        raise ValueError(f"an action is {expected}, not {action!r}")
 
     return read
 
@@ -54,7 +54,7 @@ def _box_reader(space: gymnasium.spaces.Box) -> Callable[[Any], np.ndarray]:
     def read(action: Any) -> np.ndarray:
         try:
             array = np.asarray(action, dtype)
-            if array.shape == shape and ((low <= array) & (array <= high)).all():  # NaN isn't
+            if array.shape == shape and ((low <= array) & (array <= high)).all():  # false for NaN
                 return array
         except (TypeError, ValueError):  # no numbers
             pass
@@ -64,16 +64,16 @@ def _box_reader(space: gymnasium.spaces.Box) -> Callable[[Any], np.ndarray]:
 
 
 def observation_reader(space: gymnasium.Space[Any], task: str) -> Callable[[Any], Any]:
-    """Returns what makes an observation of what a task returns; it raises TaskError where that can't be.
+    """Returns a function that converts what a task observes; it raises TaskError for the wrong shape or type.
 
-    Numbers beyond the space's bounds are let through, as Gymnasium does.
+    Numbers beyond the space's bounds pass, as in Gymnasium.
 
     Args:
         space: of the observations.
-        task: its class, for the error.
+        task: the name of its class, for the error.
     """
     if isinstance(space, gymnasium.spaces.Box):
-        return _numbers_reader(space, task)
+        return _array_reader(space, task)
 
     def read(observed: Any) -> Any:
         if not space.contains(observed):
@@ -83,7 +83,7 @@ def observation_reader(space: gymnasium.Space[Any], task: str) -> Callable[[Any]
     return read
 
 
-def _numbers_reader(space: gymnasium.spaces.Box, task: str) -> Callable[[Any], np.ndarray]:
+def _array_reader(space: gymnasium.spaces.Box, task: str) -> Callable[[Any], np.ndarray]:
     shape, dtype, few = space.shape, space.dtype, len(space.shape) == 1 and space.shape[0] <= FEW
 
     def read(observed: Any) -> np.ndarray:
@@ -97,7 +97,7 @@ def _numbers_reader(space: gymnasium.spaces.Box, task: str) -> Callable[[Any], n
             raise TaskError(
                 f"{task}.observe() returned the shape {array.shape}; its observation_space has {shape}"
             )
-        if few and math.isfinite(sum(array.tolist())):  # which is quicker, for few numbers
+        if few and math.isfinite(sum(array.tolist())):
             return array
         if not np.isfinite(array).all():
             raise TaskError(f"{task}.observe() returned numbers that aren't finite: {array}")
@@ -107,52 +107,33 @@ def _numbers_reader(space: gymnasium.spaces.Box, task: str) -> Callable[[Any], n
 
 
 def check_task(task: Any) -> None:
-    """Makes sure that it is one, and that what it says once fits together.
-
-    Raises:
-        TaskError: if something doesn't.
-    """
+    """Raises TaskError if something is no task, or if its objects or its query can't be used."""
     if isinstance(task, type) and issubclass(task, Task):
         raise TaskError(f"a task is an object, {task.__name__}(...), and not the class")
     if not isinstance(task, Task):
         raise TaskError(f"a task is an object of a class of robot_envs.Task, not {task!r}")
-    name = type(task).__name__
+    name, query = type(task).__name__, task.query
     if not isinstance(task.objects, Iterable):
         raise TaskError(f"{name}.objects lists objects: (Object(...),), not {short(task.objects)}")
-    _check_query(name, task.query)
-
-
-def check_steps(most: Any) -> None:
-    """Makes sure that episodes can be cut off after so many steps; None: never.
-
-    Raises:
-        TaskError: if they can't.
-    """
-    if most is not None and (not isinstance(most, (int, np.integer)) or most < 1):
-        raise TaskError(f"max_steps must be at least 1, and a whole number, not {most!r}")
-
-
-def _check_query(name: str, query: Any) -> None:
     if not isinstance(query, StateQuery):
         raise TaskError(f"{name}.query is a StateQuery(...), not {query!r}")
     for each in query.links:
         if not isinstance(each, LinkQuery):
             raise TaskError(f'{name}.query: links lists LinkQuery("NAME"), not {each!r}')
-    lists: tuple[tuple[str, Any], ...] = (
-        ("models", query.models),
-        ("contacts_of", query.contacts_of),
-    )
-    for what, names in lists:
+    for what in ("models", "contacts_of"):
+        names = getattr(query, what)
         if isinstance(names, str):
             raise TaskError(f"{name}.query: {what} lists names: ({names!r},), and not {names!r}")
 
 
-def made_space(task: Task, method: str) -> gymnasium.Space[Any]:
-    """What a task's method makes, which must be a space.
+def check_steps(most: Any) -> None:
+    """Raises TaskError unless episodes can be truncated after so many steps; None: never."""
+    if most is not None and (not isinstance(most, (int, np.integer)) or most < 1):
+        raise TaskError(f"max_steps must be at least 1, and a whole number, not {most!r}")
 
-    Raises:
-        TaskError: if it is none.
-    """
+
+def made_space(task: Task, method: str) -> gymnasium.Space[Any]:
+    """Calls a method that makes a space; raises TaskError if it doesn't."""
     made = getattr(task, method)()
     if not isinstance(made, gymnasium.Space):
         raise _wrong(task, method, made, "a gymnasium.Space")
@@ -160,11 +141,7 @@ def made_space(task: Task, method: str) -> gymnasium.Space[Any]:
 
 
 def checked_number(task: Task, method: str, given: Any) -> float:
-    """A finite number that a method has returned.
-
-    Raises:
-        TaskError: if it is none.
-    """
+    """A finite number that a method has returned; raises TaskError for anything else."""
     try:
         found = float(given)
     except (TypeError, ValueError):
@@ -175,44 +152,21 @@ def checked_number(task: Task, method: str, given: Any) -> float:
 
 
 def checked_flag(task: Task, method: str, given: Any) -> bool:
-    """A yes or no that a method has returned.
-
-    Raises:
-        TaskError: if it is neither.
-    """
+    """True or False, as a method has returned it; raises TaskError for anything else."""
     if not isinstance(given, (bool, np.bool_)):
         raise _wrong(task, method, given, "True or False")
     return bool(given)
 
 
 def checked_info(task: Task, given: Any) -> dict[str, Any]:
-    """What `info` has returned.
-
-    Raises:
-        TaskError: if it is no dict.
-    """
+    """The dict that `info` has returned; raises TaskError for anything else."""
     if not isinstance(given, dict):
         raise _wrong(task, "info", given, "a dict")
     return given
 
 
-def checked_goal(task: GoalTask, method: str, given: Any, like: np.ndarray) -> np.ndarray:
-    """A goal that a method has returned.
-
-    Raises:
-        TaskError: if it has another shape than the episode's, or isn't finite.
-    """
-    try:
-        found = np.asarray(given, like.dtype)
-    except (TypeError, ValueError):
-        found = np.array(math.nan)
-    if found.shape != like.shape or not math.isfinite(found.sum()):
-        raise _wrong(task, method, given, f"finite numbers of the shape {like.shape}")
-    return found
-
-
 def short(given: Any) -> str:
-    """How Python shows it, in less than a line or two."""
+    """Python's representation in a line or two."""
     return textwrap.shorten(repr(given), 160, placeholder=" ...")
 
 
@@ -223,58 +177,64 @@ def _wrong(task: Task, method: str, given: Any, wanted: str) -> TaskError:
 
 
 def goal_space(task: GoalTask, observations: gymnasium.Space[Any]) -> gymnasium.spaces.Dict:
-    """Of the observations of a goal environment.
-
-    Raises:
-        TaskError: if the task's goals are no Box.
-    """
-    goals = made_space(task, "goals"), made_space(task, "goals")
-    if not isinstance(goals[0], gymnasium.spaces.Box):
-        raise _wrong(task, "goals", goals[0], "a gymnasium.spaces.Box")
+    """The observation space of a goal environment; raises TaskError unless the goals are a Box."""
+    achieved, desired = made_space(task, "goals"), made_space(task, "goals")
+    if not isinstance(achieved, gymnasium.spaces.Box):
+        raise _wrong(task, "goals", achieved, "a gymnasium.spaces.Box")
     return gymnasium.spaces.Dict(
-        {"observation": observations, "achieved_goal": goals[0], "desired_goal": goals[1]}
+        {"observation": observations, "achieved_goal": achieved, "desired_goal": desired}
     )
 
 
-def set_goal(
-    task: GoalTask, state: WorldState, rng: np.random.Generator, wanted: Any = None
-) -> None:
+def set_goal(task: GoalTask, state: WorldState, rng: np.random.Generator, goal: Any = None) -> None:
     """Gives a task the goal of an episode.
 
     Args:
         task: the task.
         state: in which the episode begins.
-        rng: of the environment; a goal is drawn in any case, so that the stream doesn't depend on it.
-        wanted: another one than the task draws; None: that one.
+        rng: of the environment. A goal is always drawn, so that later draws don't depend on `goal`.
+        goal: replaces the one that the task draws; None: doesn't.
 
     Raises:
-        TaskError: if the goal isn't one of the task's.
+        TaskError: if the goal isn't in the task's space of goals.
     """
     drawn = task.goal(rng, state)
-    given, space = drawn if wanted is None else wanted, task.goals()
+    task.desired = checked_goal(task, drawn if goal is None else goal)
+
+
+def checked_goal(task: GoalTask, given: Any) -> np.ndarray:
+    """A goal in the form of the task's space of goals; raises TaskError if it isn't in it."""
+    space = task.goals()
     try:
         goal = np.asarray(given, space.dtype)
     except (TypeError, ValueError):  # no numbers
         goal = np.array(math.nan)
     if not space.contains(goal):
         raise TaskError(f"the goal {given} isn't one of {type(task).__name__}'s goals: {space}")
-    task.desired = goal
+    return goal
 
 
-def with_goals(task: GoalTask, seen: Any, state: WorldState) -> dict[str, Any]:
-    """What an environment of this task observes.
+def with_goals(task: GoalTask, observation: Any, state: WorldState) -> dict[str, Any]:
+    """The observation of a goal environment.
 
     Args:
-        task: whose episode has a goal.
-        seen: what `observe` returned, in the form of its space.
-        state: of which that is.
+        task: with the episode's goal.
+        observation: what `observe` returned, in the form of its space.
+        state: that was observed.
 
     Raises:
-        TaskError: if what the state achieves is no goal.
+        TaskError: if `achieved` returns another shape than the goal's, or numbers that aren't finite.
     """
-    achieved = checked_goal(task, "achieved", task.achieved(state), task.desired)
+    given, desired = task.achieved(state), task.desired
+    try:
+        achieved = np.asarray(given, desired.dtype)
+    except (TypeError, ValueError):
+        achieved = np.array(math.nan)
+    if achieved.shape != desired.shape or not math.isfinite(achieved.sum()):
+        wanted = f"finite numbers of the shape {desired.shape}"
+        raise _wrong(task, "achieved", given, wanted)
     return {
-        "observation": seen,
+        "observation": observation,
         "achieved_goal": achieved,
-        "desired_goal": task.desired.copy(),
+        "desired_goal": desired.copy(),
     }

@@ -16,12 +16,12 @@ Loaded = dict[str, Controller]
 
 
 class CommandPort(NamedTuple):
-    """What takes a controller's commands.
+    """How a controller is commanded.
 
     Args:
         name: of the controller.
-        joints: as many numbers, in this order.
-        single: whether it takes one number, and no list.
+        joints: one number for each, in this order.
+        single: whether it takes one number instead of a list.
         quantity: what the numbers are: "position", "velocity" or "effort".
     """
 
@@ -32,11 +32,11 @@ class CommandPort(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether it holds positions, so that an episode starts with those where its joints stand."""
+        """Whether it holds positions, so that an episode starts with those of its joints."""
         return self.quantity == QUANTITIES[0]
 
     def at_start(self, positions: Mapping[str, float]) -> float | tuple[float, ...]:
-        """What it holds when an episode starts: where the joints stand, or zeros."""
+        """What it holds when an episode starts: the joints' positions, or zeros."""
         values = tuple(positions[joint] if self.holds else 0.0 for joint in self.joints)
         return values[0] if self.single else values
 
@@ -44,11 +44,7 @@ class CommandPort(NamedTuple):
 def load(
     names: Sequence[str], parameters: Mapping[str, Any], hardware: RobotHardware
 ) -> tuple[ControllerManager, Loaded]:
-    """Makes a manager that has loaded these controllers.
-
-    Raises:
-        ControlError: if one isn't described, or can't be made.
-    """
+    """Makes a manager, and loads controllers; raises ControlError if that fails."""
     manager = ControllerManager(hardware)
     return manager, {name: _load_one(manager, name, parameters) for name in names}
 
@@ -63,7 +59,7 @@ def _load_one(manager: ControllerManager, name: str, parameters: Mapping[str, An
     if not kind:
         raise ControlError(f"controller '{name}': its parameters have no type")
     if isinstance(kind, str) and kind not in manager.types:
-        own = find_type(kind)  # as the simulator finds a user's
+        own = find_type(kind)  # a user's, found as the simulator finds it
         if own is None:
             near = did_you_mean(kind, manager.types)
             raise ControlError(f"controller '{name}': there is no type '{kind}'{near}")
@@ -74,12 +70,12 @@ def _load_one(manager: ControllerManager, name: str, parameters: Mapping[str, An
 def ports(
     commanded: Sequence[str] | None, parameters: Mapping[str, Any], loaded: Loaded
 ) -> list[CommandPort]:
-    """What takes the commands of a task.
+    """The ports of the controllers that a task commands.
 
     Args:
-        commanded: the controllers, in order; None: all that take numbers.
+        commanded: their names, in order; None: all that take numbers.
         parameters: of all controllers.
-        loaded: those that run.
+        loaded: the running controllers.
 
     Raises:
         ControlError: if one doesn't run, or takes no numbers.
@@ -109,7 +105,7 @@ def _port(controller: Controller, parameters: Mapping[str, Any]) -> CommandPort:
     joints = tuple(listed) if set(listed) == set(controller.claimed) else controller.claimed
     names = (controller.type_name.rpartition("/")[2], controller.interface)
     known = [each for name in names for each in QUANTITIES if each.capitalize() in name]
-    # A type that says nothing of it, of a user's own, takes what its joints take.
+    # A user's type whose name has no quantity takes that of its interface.
     quantity = "position" if "position" in known else (known or QUANTITIES[2:])[0]
     return CommandPort(controller.name, joints, controller.inputs[0].kind == KINDS[0], quantity)
 
@@ -121,22 +117,22 @@ def faults(
     hardware: RobotHardware,
     movable: Sequence[str],
 ) -> Iterator[str]:
-    """What is wrong with them, one line each.
+    """Lines that say what is wrong with a robot's controllers.
 
     Args:
-        run: those that are to run.
-        commanded: those that a task is to command; None: all that take numbers.
+        run: names of those that should run.
+        commanded: names of those that a task should command; None: all that take numbers.
         parameters: of all controllers.
-        hardware: the robot's.
-        movable: its joints that move, those without a transmission, too.
+        hardware: of the robot.
+        movable: its movable joints, also those without a transmission.
     """
     manager = ControllerManager(hardware)
     loaded: Loaded = {}
     for name in dict.fromkeys(run):
-        strangers = list(_strangers(name, parameters.get(name), hardware, movable))
-        yield from strangers
+        unknown = list(_unknown_joints(name, parameters.get(name), hardware, movable))
+        yield from unknown
         try:
-            if not strangers:
+            if not unknown:
                 loaded[name] = _load_one(manager, name, parameters)
         except ControlError as error:
             yield str(error)
@@ -151,10 +147,10 @@ def faults(
         yield str(error)
 
 
-def _strangers(
+def _unknown_joints(
     name: str, described: Any, hardware: RobotHardware, movable: Sequence[str]
 ) -> Iterator[str]:
-    """What a controller calls joints, and is none that it can have."""
+    """A line for each joint of a controller that it can't have."""
     if not isinstance(described, Mapping):
         return
     listed = described.get("joints", described.get("joint", []))

@@ -1,23 +1,23 @@
-"""Errors whose text is meant for the user: shown as one line, never as a traceback."""
+"""Errors whose text is for the user: commands print it as one line, without a traceback."""
 
 import gymnasium
 
 
 class RobotEnvError(gymnasium.error.Error):
-    """Something the user can mend; the text says what is wrong and what to do."""
+    """Something that the user can fix; the text says what is wrong and what to do."""
 
 
 class TaskError(RobotEnvError, ValueError):
-    """A task has returned what can't be; the text says which method, and what it should be."""
+    """A task's method has returned something impossible; the text says which, and what it should return."""
 
 
 class SimulatorError(RobotEnvError):
-    """The simulator doesn't answer, or answers something that can't be used."""
+    """The simulator refuses a request, doesn't answer, or answers something that can't be used."""
 
 
 class SimulatorFault(SimulatorError):
-    """The simulator has died, or answers what can't be: another one may do better."""
+    """The simulator has died or answers nonsense; another one may do better."""
 
 
 class SimulatorHangs(SimulatorFault):
-    """The simulator is there but doesn't answer in time."""
+    """The simulator lives, but doesn't answer in time."""

@@ -15,7 +15,7 @@ from files.yaml_text import load_documents
 from robot_envs.errors import RobotEnvError
 
 Source = str | Path
-"""A file, as a path or as "package://PACKAGE/PLACE"; or, for what begins with "<", the text itself."""
+"""A file: a path or "package://PACKAGE/PLACE"; or its text, which begins with "<"."""
 
 PACKAGE = "package://"
 TREE = Path(__file__).resolve().parents[2]  # the source tree
@@ -23,17 +23,17 @@ SHARE = Path(__file__).resolve().parent / "share"  # in a wheel (setup.py)
 
 
 def own_file(package: str, place: str) -> Path:
-    """A file of this package, or of one of its companions, found without a running ROS.
+    """Finds a file of this package, or of one of its companions, without a running ROS.
 
-    It lies in the source tree around this module; in a wheel beside this module; in a catkin workspace
-    that it was installed in, where rospkg finds the package.
+    It is in the source tree around this module; in a wheel beside this module; or in a catkin workspace,
+    where rospkg finds the package.
 
     Args:
         package: the package's name.
         place: the file's path in it.
 
     Raises:
-        RobotEnvError: if it is in none of them.
+        RobotEnvError: if it is in none of these.
     """
     source = TREE if package == "cartpole" else TREE / "companions" / package
     for folder in (source, SHARE / package):
@@ -49,7 +49,7 @@ def own_file(package: str, place: str) -> Path:
 
 
 def resources() -> Resources:
-    """Where the meshes and models lie that a file names by package://."""
+    """Finds the meshes and models that a file names by package://."""
 
     def package(name: str) -> str:
         found = _rospkg_path(name)
@@ -61,16 +61,15 @@ def resources() -> Resources:
 
 
 def is_text(source: Source) -> bool:
-    """Whether it is the text itself."""
+    """Whether a source is a text."""
     return isinstance(source, str) and source.lstrip().startswith("<")
 
 
 def locate(source: Source) -> Path:
-    """The path of a file.
+    """The path of a file, which need not exist.
 
     Raises:
-        RobotEnvError: if its package isn't found, or it is none that names a file; what isn't there is
-            told when it is read.
+        RobotEnvError: if its package isn't found, or it names no file.
     """
     if not isinstance(source, (str, Path)) or not str(source).strip():
         raise RobotEnvError(
@@ -92,11 +91,7 @@ def locate(source: Source) -> Path:
 
 
 def read_text(source: Source) -> str:
-    """What a file says, or the text itself.
-
-    Raises:
-        RobotEnvError: if it can't be read.
-    """
+    """The text of a file, or the text itself; raises RobotEnvError if it can't be read."""
     if is_text(source):
         return str(source)
     return _read(locate(source)).decode(errors="surrogateescape")
@@ -111,11 +106,7 @@ def _read(path: Path) -> bytes:
 
 
 def need_file(path: Path) -> None:
-    """Makes sure that there is one.
-
-    Raises:
-        RobotEnvError: if there isn't, naming the nearest one of its folder.
-    """
+    """Raises RobotEnvError if there is no such file, with the nearest name in its folder."""
     if path.is_dir():
         raise RobotEnvError(f"{path} is a folder, and no file")
     if path.exists():
@@ -128,10 +119,10 @@ def need_file(path: Path) -> None:
 
 
 def read_urdf(source: Source, arguments: Mapping[str, str]) -> str:
-    """The URDF in a file, which may be a xacro file whatever its name, or the text itself.
+    """The URDF in a file, which is expanded if it is xacro, or the text itself.
 
     Args:
-        source: the file or the text; a text isn't expanded.
+        source: the file or the text, which isn't expanded.
         arguments: of xacro.
 
     Raises:
@@ -153,11 +144,7 @@ def _expanded(path: Path, arguments: tuple[tuple[str, str], ...]) -> str:
 
 
 def read_parameters(source: Source) -> dict[str, Any]:
-    """What a YAML file of parameters says, or such a text, which has several lines.
-
-    Raises:
-        RobotEnvError: if it can't be read.
-    """
+    """The parameters in a YAML file, or in a text of several lines; raises RobotEnvError if that fails."""
     if isinstance(source, str) and "\n" in source:
         return _parameters(source.encode(), "the controllers' text")
     return _parameters_of(locate(source))
@@ -168,19 +155,19 @@ def _parameters_of(path: Path) -> dict[str, Any]:
     return _parameters(_read(path), str(path))
 
 
-def _parameters(data: bytes, told: str) -> dict[str, Any]:
+def _parameters(data: bytes, name: str) -> dict[str, Any]:
     try:
         documents = load_documents(data)
     except FileError as error:
-        raise RobotEnvError(f"{told}: {error}") from error
+        raise RobotEnvError(f"{name}: {error}") from error
     content = documents[0] if len(documents) == 1 else None
     if not isinstance(content, dict):
-        raise RobotEnvError(f"{told}: that is no YAML of parameters, name: value")
+        raise RobotEnvError(f"{name}: that is no YAML of parameters, name: value")
     return content
 
 
 def _rospkg_path(package: str) -> Path | None:
-    """A package's folder as rospkg finds it; None if it doesn't, or isn't installed."""
+    """A package's folder as rospkg finds it; None if it doesn't, or rospkg isn't installed."""
     if not importlib.util.find_spec("rospkg"):
         return None
     import rospkg

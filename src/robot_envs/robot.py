@@ -1,4 +1,4 @@
-"""What a robot is: its files, the controllers that run, and how it comes into the world."""
+"""What a robot is made of: its files, the controllers that run, and how it is spawned."""
 
 import logging
 import math
@@ -25,35 +25,34 @@ logger = logging.getLogger(__name__)
 CONTROL_PERIOD = 0.01  # [s]
 DRIVES = "libgazebo_ros_control.so"  # the plugin that runs controllers over ROS
 EMPTY = "empty"
-"""The world with a ground plane and nothing else, that of gazebo_ros's empty_world.launch."""
+"""The world with just a ground plane, as in gazebo_ros's empty_world.launch."""
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot, wherever it moves: one description makes it in this process and over ROS.
+    """A robot's description, which is the same in this process and over ROS.
 
-    Making one reads nothing; `check` reads everything, and environments call it.
+    Creating one reads no file; `check`, which environments call, reads all.
 
     Args:
         urdf: a URDF or xacro file: a path, "package://PACKAGE/PLACE", a function that finds it, or the
             text of a URDF.
         controllers: the controllers' parameters as ros_control has them: a YAML file, likewise, or a
-            mapping. What drives and limits joints (`gazebo_ros_control/pid_gains`, `joint_limits`) may
-            stand there, too.
-        run: the controllers that run, in the order in which they are started.
-        commanded: those of them that tasks command; None: all that take numbers.
+            mapping. `gazebo_ros_control/pid_gains` and `joint_limits` may be among them.
+        run: the controllers to run, in the order in which they are started.
+        commanded: the ones that tasks command; None: all that take numbers.
         name: of the model in the world; None: the URDF's own.
         arguments: of xacro, by name.
         pose: where it is spawned, in the world.
         world: a world file: a path, or "package://..."; `EMPTY`: a ground plane; None: nothing else, in
-            this process, and over ROS what gzserver begins with.
+            this process, and over ROS gzserver's default.
         engine: of the physics in this process: "bullet", or "mujoco".
         control_period: simulated time of one action [s]; whole physics steps.
         namespace: of its topics, services and controllers over ROS; each robot of a world with several
             needs its own.
         description: the parameter that holds the URDF over ROS, in the namespace.
         publisher: the controller that publishes its joint states over ROS.
-        rviz: package and name of the launch file that shows it in RViz; None: there is none.
+        rviz: package and name of a launch file that shows it in RViz; None: there is none.
     """
 
     urdf: Source | Callable[[], Source]
@@ -73,29 +72,17 @@ class Robot:
 
     @cached_property
     def xml(self) -> str:
-        """Its URDF, written out as the parameter robot_description has it.
-
-        Raises:
-            RobotEnvError: if the file isn't found, or can't be read.
-        """
+        """Its URDF, expanded, as in the parameter robot_description."""
         return files.read_urdf(_source(self.urdf), self.arguments)
 
     @cached_property
     def model(self) -> str:
-        """Its name in the world.
-
-        Raises:
-            RobotEnvError: if that is the URDF's, which can't be read.
-        """
+        """Its name in the world."""
         return self.name or self.links.name or "robot"
 
     @cached_property
     def links(self) -> ModelDescription:
-        """Its links and joints, as the physics have them.
-
-        Raises:
-            RobotEnvError: if its URDF can't be read, or not be simulated.
-        """
+        """Its links and joints, as the physics sees them."""
         try:
             return parse_urdf(self.xml, resources=files.resources())
         except DescriptionError as error:
@@ -103,11 +90,7 @@ class Robot:
 
     @cached_property
     def parameters(self) -> Mapping[str, Any]:
-        """The parameters below its namespace.
-
-        Raises:
-            RobotEnvError: if the file isn't found, or can't be read.
-        """
+        """The parameters below its namespace."""
         if isinstance(self.controllers, Mapping):
             tree: Mapping[str, Any] = self.controllers
         else:
@@ -117,11 +100,7 @@ class Robot:
 
     @cached_property
     def control(self) -> RobotDescription:
-        """What ros_control reads: transmissions, and the joints with their limits.
-
-        Raises:
-            RobotEnvError: if the URDF can't be read.
-        """
+        """Its transmissions, and the joints with their limits, as ros_control reads them."""
         try:
             return read_description(self.xml).limited_by(self.parameters.get("joint_limits"))
         except ControlError as error:
@@ -129,20 +108,16 @@ class Robot:
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
-        """The joints that a state tells: those with a transmission, in alphabetical order."""
+        """The joints of a state: those with a transmission, in alphabetical order."""
         return tuple(sorted({each.joint for each in self.control.transmissions}))
 
     @property
     def limits(self) -> Mapping[str, JointLimits]:
-        """What limits each joint: its range [rad, m], speed [rad/s, m/s], effort [N m, N]; None: nothing."""
+        """Limits of each joint's position [rad, m], speed [rad/s, m/s], effort [N m, N]; None: no limit."""
         return {name: joint.limits for name, joint in self.control.joints.items()}
 
     def hardware(self) -> RobotHardware:
-        """A new one of its joints as controllers see them.
-
-        Raises:
-            ControlError: if something about its joints is wrong.
-        """
+        """Makes the joints as controllers see them; raises ControlError if something about them is wrong."""
         gains = self.parameters.get("gazebo_ros_control")
         pids = gains.get("pid_gains") if isinstance(gains, Mapping) else None
         description = read_description(self.xml).limited_by(self.parameters.get("joint_limits"))
@@ -153,11 +128,10 @@ class Robot:
         return f" '{self.name}'" if self.name else ""
 
     def check(self) -> None:
-        """Reads all of it.
+        """Reads and checks everything; later calls cost nothing.
 
         Raises:
-            RobotEnvError: if something is wrong; all faults are told, with the nearest name where one
-                isn't known.
+            RobotEnvError: if something is wrong; lists all faults, with the nearest names for unknown ones.
         """
         _ = self._sound
 
@@ -173,7 +147,7 @@ class Robot:
         wrong = unfit_pose(self.pose)
         if wrong:
             yield f"its pose {wrong}"
-        yield from self._faults_of_its_world()
+        yield from self._world_faults()
         given: tuple[tuple[str, Any], ...] = (("run", self.run), ("commanded", self.commanded))
         for what, names in given:
             if isinstance(names, str):
@@ -184,7 +158,7 @@ class Robot:
                 "its URDF has no <transmission>: each joint that is to be commanded or seen needs one"
             )
             return
-        self._warn_of_strangers()
+        self._warn_of_unknown_joints()
         try:
             hardware = self.hardware()
         except ControlError as error:
@@ -195,8 +169,8 @@ class Robot:
                 self.run, self.commanded, self.parameters, hardware, passive
             )
 
-    def _faults_of_its_world(self) -> Iterator[str]:
-        """What is wrong of period, world and namespace; the engine is a backend's name."""
+    def _world_faults(self) -> Iterator[str]:
+        """What is wrong with control period, world and namespace."""
         if not 0.0 < self.control_period < math.inf:
             yield f"control_period must be a time above 0 [s], not {self.control_period}"
         if self.world is not None and self.world != EMPTY and not files.is_text(self.world):
@@ -205,15 +179,19 @@ class Robot:
             except RobotEnvError as error:
                 yield f"its world: {error}"
         for plugin in self.links.plugins:
-            told = (plugin.element.findtext("robotNamespace") or "").strip()
-            if plugin.filename == DRIVES and told and told.strip("/") != self.namespace.strip("/"):
+            namespace = (plugin.element.findtext("robotNamespace") or "").strip()
+            if (
+                plugin.filename == DRIVES
+                and namespace
+                and namespace.strip("/") != self.namespace.strip("/")
+            ):
                 yield (
-                    f"its URDF puts its controllers into the namespace '{told}' (<robotNamespace>), the "
+                    f"its URDF puts its controllers into the namespace '{namespace}' (<robotNamespace>), the "
                     f"description into '/{self.namespace.strip('/')}': give both the same"
                 )
 
-    def _warn_of_strangers(self) -> None:
-        """A file may be for several robots, so that they are no faults."""
+    def _warn_of_unknown_joints(self) -> None:
+        """Warns only: a file of parameters may be for several robots."""
         gains = self.parameters.get("gazebo_ros_control")
         pids = gains.get("pid_gains") if isinstance(gains, Mapping) else None
         for what, named in (
@@ -233,18 +211,14 @@ class Robot:
 
     @cached_property
     def ports(self) -> tuple[CommandPort, ...]:
-        """What takes the commands of a task, in the order of `commanded`.
-
-        Raises:
-            RobotEnvError: if something in the description is wrong.
-        """
+        """The ports of the controllers that tasks command, in the order of `commanded`."""
         self.check()
         loaded = controllers.load(self.run, self.parameters, self.hardware())[1]
         return tuple(controllers.ports(self.commanded, self.parameters, loaded))
 
 
 def unfit_pose(pose: Any) -> str:
-    """Why something is no place for a model; empty: it is one."""
+    """Why a model can't be at a pose; empty if it can."""
     if not isinstance(pose, Pose):
         return f"is a Pose((x, y, z)), not {pose!r}"
     numbers = (*pose.position, *pose.orientation)

@@ -1,4 +1,4 @@
-"""The robots and objects of one world, and what their joints and controllers are called in it."""
+"""The robots and objects of one world, and the names of their joints and controllers in it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,14 +17,14 @@ Placed = dict[str, tuple[float, float]]
 
 
 class Scene:
-    """What is in a world beside what its file brings.
+    """What is in a world beside the models of its file.
 
     Args:
-        robots: one or several; the first one says world, engine and control period.
+        robots: one or several; the first one defines world, engine and control period.
         objects: of the task.
 
     Raises:
-        RobotEnvError: if something in a robot's description is wrong, or names are there twice.
+        RobotEnvError: if something in a robot's description is wrong, or a name is used twice.
     """
 
     def __init__(self, robots: Sequence[Robot], objects: Sequence[Object] = ()) -> None:
@@ -47,21 +47,21 @@ class Scene:
         self.several = len(self.robots) > 1
 
     def joint(self, robot: Robot, name: str) -> str:
-        """What a joint is called in a state."""
+        """The name of a joint in a state."""
         return f"{robot.model}::{name}" if self.several else name
 
     def controller(self, robot: Robot, name: str) -> str:
-        """What a controller is called in commands."""
+        """The name of a controller in commands."""
         return f"/{robot.namespace.strip('/')}/{name}" if self.several else name
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
-        """All that a state tells, robot by robot."""
+        """The joints of a state, robot by robot."""
         return tuple(self.joint(robot, name) for robot in self.robots for name in robot.joints)
 
     @cached_property
     def moved(self) -> dict[str, tuple[Robot, str]]:
-        """All joints that move, those without a transmission, too: they begin an episode anew as well."""
+        """All movable joints, which a reset places; also those without a transmission."""
         return {
             self.joint(robot, each.name): (robot, each.name)
             for robot in self.robots
@@ -70,7 +70,7 @@ class Scene:
 
     @cached_property
     def ports(self) -> dict[str, tuple[Robot, CommandPort]]:
-        """What takes commands, by the controller's name in them."""
+        """The ports of controllers, by their names in commands."""
         return {
             self.controller(robot, port.name): (robot, port)
             for robot in self.robots
@@ -78,7 +78,7 @@ class Scene:
         }
 
     def starting_commands(self, joints: Mapping[str, JointState]) -> dict[str, Any]:
-        """What the controllers hold when an episode starts with such joints."""
+        """What the controllers hold when an episode starts with these joints."""
         positions = {name: state.position for name, state in joints.items()}
         found = {}
         for name, (robot, port) in self.ports.items():
@@ -87,29 +87,28 @@ class Scene:
         return found
 
     def commands(self, given: Commands) -> dict[str, float | tuple[float, ...]]:
-        """Commands as plain numbers.
+        """Converts commands to plain numbers.
 
         Raises:
-            TaskError: for a controller that isn't commanded, another number of numbers, or one that
-                isn't finite.
+            TaskError: for an unknown controller, the wrong count of numbers, or one that isn't finite.
         """
         found: dict[str, float | tuple[float, ...]] = {}
         try:
             items = given.items()
         except AttributeError:
             raise TaskError(
-                f"commands are told by controller, {{{next(iter(self.ports), '')!r}: ...}}, not {given!r}"
+                f"commands are given by controller, {{{next(iter(self.ports), '')!r}: ...}}, not {given!r}"
             ) from None
         for name, value in items:
             if type(value) is float and name in self._singles and math.isfinite(value):
-                found[name] = value  # nearly always
+                found[name] = value  # the usual case, fast
             else:
                 found[name] = _command(self._port(name), name, value)
         return found
 
     @cached_property
     def _singles(self) -> frozenset[str]:
-        """Controllers that take one number."""
+        """Names of controllers that take one number."""
         return frozenset(name for name, (_, port) in self.ports.items() if port.single)
 
     def _port(self, name: str) -> CommandPort:
@@ -122,11 +121,7 @@ class Scene:
         return found[1]
 
     def placed_joints(self, initial: InitialState) -> Placed:
-        """Position and velocity of all joints that move.
-
-        Raises:
-            TaskError: for a joint that isn't there, or something that is neither.
-        """
+        """Position and velocity of all movable joints; raises TaskError for an unknown or wrong one."""
         if not isinstance(initial, InitialState):
             raise TaskError(f"an episode begins with an InitialState(...), not {initial!r}")
         found: Placed = dict.fromkeys(self.moved, (0.0, 0.0))
@@ -138,11 +133,7 @@ class Scene:
         return found
 
     def placed_models(self, initial: InitialState) -> dict[str, Motion]:
-        """The models to place.
-
-        Raises:
-            TaskError: for something that is no place.
-        """
+        """The models to place; raises TaskError for an impossible pose."""
         found = {}
         for name, at in initial.models.items():
             placed = found[name] = at if isinstance(at, Motion) else Motion(at)
@@ -152,12 +143,11 @@ class Scene:
         return found
 
     def stand(self, initial: InitialState, robot: Robot) -> Pose:
-        """Where a robot's model is when an episode begins."""
+        """The pose of a robot's model when an episode begins."""
         return self.placed_models(initial).get(robot.model, Motion(robot.pose)).pose
 
 
 def _command(port: CommandPort, name: str, value: Any) -> float | tuple[float, ...]:
-    """A command in plain numbers."""
     try:
         numbers = (float(value),) if port.single else tuple(map(float, value))
     except (TypeError, ValueError):
@@ -173,7 +163,6 @@ def _command(port: CommandPort, name: str, value: Any) -> float | tuple[float, .
 
 
 def _place(name: str, given: Any) -> tuple[float, float]:
-    """Position and velocity of a joint."""
     try:
         position, velocity = given if isinstance(given, (tuple, list)) else (given, 0.0)
         place = (float(position), float(velocity))

@@ -1,6 +1,6 @@
-"""What is to be learned: observation, reward, end of an episode, initial state, and what an action does.
+"""What is to be learned: actions, observations, reward, and how an episode begins and ends.
 
-Knows neither ROS nor a simulator nor a learner; every backend runs the same tasks.
+A task knows neither ROS nor a simulator nor a learner; every backend runs the same tasks.
 """
 
 from abc import ABC, abstractmethod
@@ -17,12 +17,12 @@ from robot_envs.world_state import Commands, InitialState, Pose, StateQuery, Wor
 
 @dataclass(frozen=True)
 class Object:
-    """An obstacle, or a thing to handle, that a task needs beside its robots.
+    """An obstacle or a thing to handle, which a task needs beside its robots.
 
     Args:
         name: of the model in the world.
         file: its SDF or URDF: a path, "package://PACKAGE/PLACE", or the text itself.
-        pose: where it is spawned; an `InitialState` may put it elsewhere for an episode.
+        pose: where it is spawned; an `InitialState` may put it somewhere else for an episode.
     """
 
     name: str
@@ -33,17 +33,17 @@ class Object:
 class Task(ABC):
     """One thing to learn.
 
-    A class of one's own says at least what actions and observations are, what they mean, and the reward:
+    A subclass defines at least the spaces of actions and observations, what they mean, and the reward:
 
-    | attribute | what it says |
+    | attribute | meaning |
     |---|---|
-    | `max_steps` | after how many steps an episode is cut off (truncated); None: never |
-    | `query` | links, models and contacts that a `state` tells beside joints; others cost nothing |
+    | `max_steps` | after how many steps an episode is truncated; None: never |
+    | `query` | links, models and contacts that a `state` has beside joints; others cost nothing |
     | `objects` | what is spawned beside the robots |
 
-    Names that a state has for joints, and commands for controllers, are plain where a world has one robot;
-    see `WorldState` for several. A task may keep what it likes from one call to the next, if
-    `initial_state`, which begins an episode, sets it anew.
+    Names of joints in states and of controllers in commands are plain in a world with one robot; see
+    `WorldState` for several. A task may store data between calls, if `initial_state`, which begins an
+    episode, resets it.
     """
 
     max_steps: int | None = None
@@ -52,87 +52,86 @@ class Task(ABC):
 
     @abstractmethod
     def action_space(self) -> gymnasium.Space[Any]:
-        """A new space of the actions."""
+        """Makes the action space."""
 
     @abstractmethod
     def observation_space(self) -> gymnasium.Space[Any]:
-        """A new space of the observations."""
+        """Makes the observation space."""
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
-        """Draws where an episode begins; as spawned, with all joints at 0, unless overridden."""
+        """Draws the state in which an episode begins; by default as spawned, with all joints at 0."""
         return InitialState()
 
     @abstractmethod
     def apply(self, action: Any, state: WorldState) -> Commands:
-        """What an action, which lies in its space, commands.
+        """Converts an action to commands.
 
         Args:
-            action: of the action space.
+            action: in the action space.
             state: before the action; `state.commands` is what the controllers hold.
 
         Returns:
-            Commands by controller; those that aren't named keep theirs.
+            Commands by controller; controllers that aren't named keep theirs.
         """
 
     @abstractmethod
     def observe(self, state: WorldState) -> Any:
-        """The state as the learner sees it: of the observation space's shape."""
+        """The observation of a state, in the observation space's shape."""
 
     @abstractmethod
     def reward(self, state: WorldState, action: Any) -> float:
-        """The reward for arriving in a state by an action."""
+        """The reward for reaching a state by an action."""
 
     def is_terminal(self, state: WorldState) -> bool:
-        """Whether the state ends the episode; none does, unless overridden."""
+        """Whether the state terminates the episode; by default none does."""
         return False
 
     def info(self, state: WorldState) -> dict[str, Any]:
-        """What else is told of a state, beside the observation."""
+        """The info dict of a state."""
         return {}
 
 
 class GoalTask(Task):
-    """A task with a goal that each episode draws: for hindsight experience replay, too.
+    """A task with a goal that each episode draws, also for hindsight experience replay.
 
-    Observations are dicts of "observation" (`observe`), "achieved_goal" and "desired_goal", as
-    Gymnasium-Robotics has them; `compute_reward` is the environment's, too. The infos tell
-    "is_success".
+    Observations are dicts of "observation" (`observe`), "achieved_goal" and "desired_goal", as in
+    Gymnasium-Robotics; the environment has `compute_reward`. The info has "is_success".
     """
 
     desired: np.ndarray
-    """The goal of this episode."""
+    """The goal of the present episode."""
 
     @abstractmethod
     def goals(self) -> gymnasium.spaces.Box:
-        """A new space of the goals."""
+        """Makes the space of goals."""
 
     @abstractmethod
     def goal(self, rng: np.random.Generator, state: WorldState) -> np.ndarray:
-        """Draws the goal of an episode that begins in a state."""
+        """Draws the goal of an episode that begins in `state`."""
 
     @abstractmethod
     def achieved(self, state: WorldState) -> np.ndarray:
-        """The goal that a state reaches."""
+        """The goal that a state achieves."""
 
     @abstractmethod
     def is_success(self, achieved: np.ndarray, desired: np.ndarray) -> Any:
-        """Whether goals are reached: (..., n) and (..., n) to (...) of bool."""
+        """Whether goals are reached: bool of shape (...) from goals of shape (..., n)."""
 
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> Any:
-        """The reward for achieving one goal where another one is desired: (..., n) and (..., n) to (...).
+        """The reward for achieving one goal when another one is desired: shape (...) from goals (..., n).
 
-        0 for a success, and -1, unless overridden.
+        By default 0 for a success, and -1 otherwise.
         """
         return np.where(self.is_success(achieved, desired), 0.0, -1.0)
 
     def reward(self, state: WorldState, action: Any) -> float:
-        """`compute_reward` of what the state achieves."""
+        """`compute_reward` of the goal that the state achieves."""
         return float(self.compute_reward(self._reached(state), self.desired, {}))
 
     def info(self, state: WorldState) -> dict[str, Any]:
-        """Tells `is_success`."""
+        """Has `is_success`."""
         return {"is_success": bool(self.is_success(self._reached(state), self.desired))}
 
     def _reached(self, state: WorldState) -> np.ndarray:
-        """As the observation tells it, so that a reward that is computed of it is the same."""
+        # In the observation's type, so that a reward that is computed from it is the same.
         return np.asarray(self.achieved(state), self.desired.dtype)

@@ -1,4 +1,4 @@
-"""Many robots at once: what `gymnasium.make_vec` makes of every environment here."""
+"""Vectors of robots: what `gymnasium.make_vec` makes of every environment of this library."""
 
 import contextlib
 from collections.abc import Callable
@@ -20,18 +20,16 @@ Results = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
 class RobotVectorEnv(SyncVectorEnv[Any, Any]):
     """`num_envs` environments with robots of their own: Gymnasium's `SyncVectorEnv`, also over ROS.
 
-    With `backend="ros"` each has a simulator of its own, under a master of its own; all are started side by
-    side and end with this process. `step` sends all commands before it waits for the first answer, so the
-    simulators move at the same time, on as many cores as there are. In this process the worlds move one
-    after the other.
+    With `backend="ros"` each has a simulator and a master of its own; all start side by side, and end with
+    this process. `step` sends all commands before it waits for the first answer, so the simulators move at
+    the same time, on as many cores as there are. In this process the worlds move one after the other.
 
-    Each environment gives exactly what it would give alone: a seed s stands for s, s + 1, ..., one for each.
-    An action that is none is refused before anything moves. After an error in the middle of a step all have
-    to be reset.
+    Each environment is bit-identical to one alone: the seed s stands for s, s + 1, ..., one for each. A wrong
+    action is refused before anything moves. After an error in the middle of a step all have to be reset.
 
     Args:
         num_envs: number of environments.
-        make: makes one, from `backend` and `options`.
+        make: makes one environment, from `backend` and `options`.
         backend: of all; "ros" and "ros-own" are the same here.
         autoreset_mode: Gymnasium's: "NextStep", "SameStep" or "Disabled".
         options: keyword arguments of `make`.
@@ -62,7 +60,7 @@ class RobotVectorEnv(SyncVectorEnv[Any, Any]):
             return self._robots[-1]
 
         self._side_by_side = backend == OWN
-        self._broken_off = False
+        self._interrupted = False
         try:
             with side_by_side(num_envs):
                 super().__init__([made] * num_envs, autoreset_mode=mode)
@@ -85,7 +83,7 @@ class RobotVectorEnv(SyncVectorEnv[Any, Any]):
         of_all = options is None or "reset_mask" not in options
         given = super().reset(seed=seed, options=None if options is None else dict(options))
         if of_all:
-            self._broken_off = False
+            self._interrupted = False
         return given
 
     def step(self, actions: Any) -> Results:
@@ -93,8 +91,8 @@ class RobotVectorEnv(SyncVectorEnv[Any, Any]):
 
         Raises:
             ValueError: if there are not as many actions as environments, or one is wrong; nothing has moved.
-            gymnasium.error.ResetNeeded: if an episode has ended that isn't reset by itself, or a step was
-                broken off by an error.
+            gymnasium.error.ResetNeeded: if an ended episode isn't reset automatically, or an error
+                interrupted a step.
             gymnasium.error.ClosedEnvironmentError: after `close()`.
             SimulatorError: if a simulator can't go on.
         """
@@ -102,7 +100,7 @@ class RobotVectorEnv(SyncVectorEnv[Any, Any]):
         read = [self._read(action) for action in iterate(self.action_space, actions)]
         if len(read) != self.num_envs:
             raise ValueError(f"{len(read)} actions for {self.num_envs} environments")
-        self._broken_off = True
+        self._interrupted = True
         if self._side_by_side:
             for robot, action, ended in zip(
                 self._robots, read, self._autoreset_envs.tolist(), strict=True
@@ -110,7 +108,7 @@ class RobotVectorEnv(SyncVectorEnv[Any, Any]):
                 if not ended or self.autoreset_mode is AutoresetMode.SAME_STEP:
                     robot.begin_step(action)
         given = super().step(actions)
-        self._broken_off = False
+        self._interrupted = False
         return given
 
     def _check_ready(self) -> None:
@@ -118,9 +116,9 @@ class RobotVectorEnv(SyncVectorEnv[Any, Any]):
             raise gymnasium.error.ClosedEnvironmentError(
                 "this vector environment is closed; make another one"
             )
-        if self._broken_off:
+        if self._interrupted:
             raise gymnasium.error.ResetNeeded(
-                "the step before was broken off by an error; call reset(), without a reset_mask"
+                "an error interrupted the step before; call reset(), without a reset_mask"
             )
         if self.autoreset_mode is AutoresetMode.DISABLED and self._autoreset_envs.any():
             raise gymnasium.error.ResetNeeded(

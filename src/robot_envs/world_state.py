@@ -1,4 +1,4 @@
-"""What a task sees: joints, links, models and contacts by name; and where it has an episode begin."""
+"""What a task sees: joints, links, models and contacts by name; and how an episode begins."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,9 +25,9 @@ __all__ = [
 
 Entry = TypeVar("Entry")
 Command = float | Sequence[float]
-"""Of one controller [m, rad, m/s, rad/s, N, N m]: a number, or for a group one for each joint of its list."""
+"""For one controller [m, rad, m/s, rad/s, N, N m]: a number, or for a group one for each of its joints."""
 Commands = Mapping[str, Command]
-"""By the controller's name; "/namespace/name" where a world has several robots."""
+"""By the controller's name; "/namespace/name" in a world with several robots."""
 
 
 class JointState(NamedTuple):
@@ -39,21 +39,21 @@ class JointState(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Where a link or a model is, and its linear [m/s] and angular [rad/s] velocity."""
+    """The pose of a link or model, and its linear [m/s] and angular [rad/s] velocity."""
 
     pose: Pose
     twist: Twist = AT_REST
 
     def seen_from(self, frame: "Motion") -> "Motion":
-        """The same in the frame of something else, both being told in the same frame.
+        """The same, seen from the frame of another motion, both given in one frame.
 
-        Velocities are differences, in the other's axes, without what its turning adds.
+        Velocities are differences in the other's axes; its rotation adds nothing.
         """
         return Motion(*seen_from(self, frame))
 
 
 class UnknownEntry(KeyError):
-    """A name that a state doesn't have; the text says which are near."""
+    """A name that a state doesn't have; the text has the nearest ones."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -79,30 +79,30 @@ class Joints(_Entries[JointState]):
 
 
 class Links(_Entries[Motion]):
-    """Links by the names that a query has for them."""
+    """Links by their names in the query."""
 
     __slots__ = ()
-    what, hint = "link", "; the task's query names those that it tells"
+    what, hint = "link", "; the task's query names those that a state has"
 
 
 class Models(_Entries[Motion]):
     """Models by name."""
 
     __slots__ = ()
-    what, hint = "model", "; the task's query names those that it tells"
+    what, hint = "model", "; the task's query names those that a state has"
 
 
 class WorldState(NamedTuple):
-    """The world after a reset or a control period: the same numbers in-process and over ROS in lock-step.
+    """The world after a reset or a control period: bit-identical in-process and over ROS in lock-step.
 
-    | attribute | what it tells |
+    | attribute | what it has |
     |---|---|
     | `time` | simulated time since the reset [s] |
-    | `joints` | those with a transmission, by name; as "model::joint" where a world has several robots |
+    | `joints` | joints with a transmission, by name; "model::joint" in a world with several robots |
     | `commands` | what each commanded controller was sent last, by name: a number, or a tuple for a group |
-    | `links` | those that the task's query names, by that name; each in the frame asked for |
-    | `models` | those that the query names, in the world |
-    | `contacts` | of the last physics step, as the query names them; none right after a reset |
+    | `links` | links that the task's query names, by that name, each in the frame asked for |
+    | `models` | models that the query names, in the world frame |
+    | `contacts` | contacts of the last physics step that the query asks for; none right after a reset |
     """
 
     time: float
@@ -115,14 +115,14 @@ class WorldState(NamedTuple):
 
 @dataclass(frozen=True)
 class InitialState:
-    """Where an episode begins; what isn't named is as the robot was spawned.
+    """The state in which an episode begins; whatever isn't named is as it was spawned.
 
     Args:
-        joints: positions [rad, m], or positions and velocities [rad/s, m/s], by the joint's name; the
-            others stand at 0. Beyond a stop means at it.
-        models: where models are put, in the world, by name; the others stand where they were spawned.
-        commands: what controllers hold until the first action, by name; by default position controllers
-            where their joints stand, and others 0.
+        joints: positions [rad, m], or positions and velocities [rad/s, m/s], by the joint's name; others are
+            at 0. A position beyond a stop means at the stop.
+        models: poses or motions of models in the world, by name; others are where they were spawned.
+        commands: what controllers hold until the first action, by name; by default position controllers hold
+            their joints' positions, and others 0.
     """
 
     joints: Mapping[str, float | tuple[float, float]] = field(default_factory=dict)
@@ -131,11 +131,7 @@ class InitialState:
 
 
 def link_keys(query: StateQuery) -> list[str]:
-    """The names under which `WorldState.links` has what a query asks for.
-
-    Raises:
-        ValueError: if one is there twice.
-    """
+    """The names of a query's links in `WorldState.links`; raises ValueError for one that is there twice."""
     names = [each.link for each in query.links]
     for name in names:
         if names.count(name) > 1:

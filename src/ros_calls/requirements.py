@@ -23,6 +23,7 @@ ALL = (
     "gymnasium",
     "imageio_ffmpeg",
     "matplotlib",
+    "psutil",
     "pygame",
     "tensorboard",
     "torch",

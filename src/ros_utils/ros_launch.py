@@ -9,15 +9,17 @@ from collections.abc import Mapping, Sequence
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages
-from ros_utils._internal.processes import processes as _processes
-from ros_utils._internal.processes import roslaunch as _roslaunch
-from ros_utils._internal.processes.program import CannotStart, Handle
-from ros_utils._internal.processes.readiness import (
+from ros_utils._internal import processes as _processes
+from ros_utils._internal import programs as _programs
+from ros_utils._internal import roslaunch as _roslaunch
+from ros_utils._internal.programs import (
+    CannotStart,
+    Handle,
     Readiness,
+    Started,
     wait_for_world,
     wait_until_ready,
 )
-from ros_utils._internal.processes.started import Started
 from ros_utils.readiness import Ready
 
 
@@ -118,14 +120,14 @@ def ros_kill_launch_process() -> bool:
     Returns:
         True if none is left.
     """
-    return _processes.end([entry for entry in _processes.started() if entry.kind == "launch"])
+    return _programs.end([entry for entry in _processes.started() if entry.kind == "launch"])
 
 
 def _report(handle: Handle, readiness: Readiness, timeout: float) -> Started | bool:
-    label = handle.entry.label
+    label = handle.start.label
     if readiness is Readiness.LATE:
         _log.error(f"{label}: nothing runs after {timeout:g} s; ended it{handle.where()}")
-        _processes.end([handle.entry])
+        handle.end()
         return False
     if readiness is Readiness.READY:
         _roslaunch.let_settle(handle)

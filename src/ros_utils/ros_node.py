@@ -13,16 +13,18 @@ import rospy
 
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
+from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import packages as _packages
-from ros_utils._internal.processes import nodes as _nodes
-from ros_utils._internal.processes import processes as _processes
-from ros_utils._internal.processes.program import CannotStart, Handle
-from ros_utils._internal.processes.readiness import (
+from ros_utils._internal import processes as _processes
+from ros_utils._internal import programs as _programs
+from ros_utils._internal.programs import (
+    CannotStart,
+    Handle,
     Readiness,
+    Started,
     wait_for_world,
     wait_until_ready,
 )
-from ros_utils._internal.processes.started import Started
 from ros_utils.readiness import Ready
 
 
@@ -82,7 +84,7 @@ def ros_node_from_pkg(
                 return False
             _master.require()
             before = set(_nodes.node_uris().values())
-            handle = _processes.start(
+            handle = _programs.start(
                 command,
                 "node",
                 label,
@@ -166,7 +168,7 @@ def ros_kill_all_processes() -> bool:
         True if nothing of it is left.
     """
     nodes = _nodes.node_uris()  # asked first: our master may go with the processes
-    gone = _processes.end(_processes.started())
+    gone = _programs.end(_processes.started())
     return _shut_down(nodes) and gone
 
 
@@ -223,14 +225,14 @@ def _start_master(window: bool, timeout: float) -> bool:
     """Start a master at ROS_MASTER_URI."""
     _master.is_up_or_startable()
     port = str(_master.host_and_port()[1])
-    handle = _processes.start(["roscore", "-p", port], "master", "roscore", window=window)
+    handle = _programs.start(["roscore", "-p", port], "master", "roscore", window=window)
     readiness = wait_until_ready(
         lambda: _master.is_up() and "/rosout" in _nodes.node_names(), handle, timeout
     )
     if readiness is Readiness.READY:
         return True
     _log.error(f"roscore: not up after {timeout:g} s: {handle.reason()}{handle.where()}")
-    _processes.end([handle.entry])
+    handle.end()
     return False
 
 
@@ -243,13 +245,13 @@ def _is_registered(handle: Handle, name: str | None, before: set[str]) -> bool:
 
 
 def _report(handle: Handle, readiness: Readiness, timeout: float) -> Started | bool:
-    label = handle.entry.label
+    label = handle.start.label
     if readiness is Readiness.LATE:
         _log.error(
             f"{label}: not registered at {_master.uri()} after {timeout:g} s; ended it:"
             f" {handle.reason()}{handle.where()}. For a program that is no node: wait=False"
         )
-        _processes.end([handle.entry])
+        handle.end()
         return False
     code = handle.exit_code() if readiness is Readiness.ENDED else 0
     if code:

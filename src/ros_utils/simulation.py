@@ -21,7 +21,7 @@ from typing import Any
 
 from ros_calls import master as _master
 from ros_utils import ros_gazebo, ros_node
-from ros_utils._internal.processes.started import Started
+from ros_utils._internal.programs import Started
 
 LOOPBACK = "127.0.0.1"
 

@@ -1,14 +1,19 @@
-"""Where a picture is taken from."""
+"""The camera of a picture, and its background: a sky, and tiles that fade towards the horizon."""
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from bullet_gazebo.physics.pose import Vector
 
-NEAR, FAR = 0.02, 100.0  # of what is seen, as shares of the distance
-AROUND = 1.1  # of what an overview has to show: a margin
+NEAR, FAR = 0.02, 100.0  # of what is drawn, as shares of the distance
+MARGIN = 1.1  # around what an overview has to show
+SKY = (238, 242, 247)
+TILES = ((222, 225, 230), (203, 207, 213))
+TILES_IN_SIGHT = 8.0  # within the camera's distance
+FADING = 3.0  # of the camera's distance, until a third of the colour is left
 
 
 @dataclass(frozen=True)
@@ -20,8 +25,8 @@ class Camera:
         distance: from it [m].
         yaw: [degrees]; at 0 it looks along +y, with x to the right, at 90 along -x.
         pitch: [degrees]; negative looks down.
-        view: height of what it sees, as an angle [degrees].
-        follows: whether it goes with a robot that drives, in pictures of an environment.
+        view: vertical field of view [degrees].
+        follows: whether it follows a robot that drives, in pictures of an environment.
     """
 
     target: Vector = (0.0, 0.0, 0.0)
@@ -32,12 +37,12 @@ class Camera:
     follows: bool = True
 
     def at(self, target: Vector) -> "Camera":
-        """The same camera looking at another point [m]: one that follows something."""
+        """Returns the same camera, looking at another point [m]."""
         return replace(self, target=target)
 
     @property
     def axes(self) -> np.ndarray:
-        """Its right, up and forward in the world: rows of (3, 3)."""
+        """Right, up and forward in the world: rows of (3, 3)."""
         yaw, pitch = math.radians(self.yaw), math.radians(self.pitch)
         right = (math.cos(yaw), math.sin(yaw), 0.0)
         level = (-math.sin(yaw), math.cos(yaw))
@@ -46,26 +51,26 @@ class Camera:
 
     @property
     def eye(self) -> np.ndarray:
-        """Where it is [m]."""
+        """Its position [m]."""
         return np.array(self.target) - self.distance * self.axes[2]
 
     @property
     def near(self) -> float:
-        """The least distance of what is seen [m]."""
+        """The least distance that it sees [m]."""
         return NEAR * self.distance
 
     @property
     def far(self) -> float:
-        """The greatest distance of what is seen [m]."""
+        """The greatest distance that it sees [m]."""
         return FAR * self.distance
 
     @property
     def slope(self) -> float:
-        """Half the height of what is seen, at a distance of 1."""
+        """Half the height of its view at a distance of 1."""
         return math.tan(math.radians(self.view) / 2.0)
 
     def view_matrix(self) -> np.ndarray:
-        """From the world to the camera's axes, as OpenGL has them: (4, 4)."""
+        """Returns the transform from the world to the camera's axes, as in OpenGL: (4, 4)."""
         right, up, forward = self.axes
         matrix = np.eye(4)
         matrix[:3, :3] = right, up, -forward
@@ -75,12 +80,12 @@ class Camera:
     def projection_matrix(
         self, width: int, height: int, region: tuple[int, int, int, int] | None = None
     ) -> np.ndarray:
-        """From the camera's axes to OpenGL's cube: (4, 4).
+        """Returns the projection from the camera's axes to OpenGL's cube: (4, 4).
 
         Args:
             width: of the picture [pixels].
             height: of the picture [pixels].
-            region: left, top, right and bottom of what is wanted of it [pixels]; by default all.
+            region: left, top, right and bottom of the part to draw [pixels]; default: all.
         """
         near, far = self.near, self.far
         left, top, right, bottom = region or (0, 0, width, height)
@@ -94,7 +99,7 @@ class Camera:
 
 
 def overview(points: np.ndarray, aspect: float, looking: Camera | None = None) -> Camera:
-    """A camera that sees all of `points` [m] (n, 3), in the direction of `looking`."""
+    """Returns a camera that sees all of `points` [m] (n, 3), in the direction of `looking`."""
     looking = looking or Camera()
     if not len(points):
         return looking
@@ -102,7 +107,52 @@ def overview(points: np.ndarray, aspect: float, looking: Camera | None = None) -
     x, y, z = ((low + high) / 2.0).tolist()
     right, up, forward = looking.axes
     seen = points - (x, y, z)
-    # Each point, and how far away the camera has to be to see it.
+    # How far away the camera has to be to see each point.
     sideways, upright = abs(seen @ right) / aspect, abs(seen @ up)
-    needed = np.maximum(sideways, upright) * AROUND / looking.slope - seen @ forward
+    needed = np.maximum(sideways, upright) * MARGIN / looking.slope - seen @ forward
     return replace(looking, target=(x, y, z), distance=max(float(needed.max()), 1e-3))
+
+
+class Background(NamedTuple):
+    """Colours (h, w, 3) of uint8, and the ground's depth as OpenGL measures it, by row (h, 1); 1 is none."""
+
+    colours: np.ndarray
+    depth: np.ndarray
+
+
+def background(camera: Camera, width: int, height: int) -> Background:
+    """Draws what the camera sees of an empty world, whose ground is at z = 0."""
+    across = (np.arange(width) + 0.5 - width / 2.0) * (2.0 * camera.slope / height)
+    down = (np.arange(height)[:, np.newaxis] + 0.5 - height / 2.0) * (2.0 * camera.slope / height)
+    right, up, forward = camera.axes
+    eye = camera.eye
+    falling = forward[2] - down * up[2]  # the same along a row: the camera is upright
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.where(falling * eye[2] < 0.0, -eye[2] / falling, np.inf)
+    seen = reach < camera.far
+    reach = np.where(seen, reach, camera.far)
+    size = _tile(camera.distance)
+    odd = np.zeros((height, width), bool)
+    for axis in (0, 1):
+        start = eye[axis] + reach * (forward[axis] - down * up[axis])
+        places = (start / size) + (reach * right[axis] / size) * across
+        odd ^= (np.floor(places).astype(np.int32) & 1).astype(bool)
+    strength = np.where(seen, np.exp(-reach / (FADING * camera.distance)), 0.0)
+    even_rows, odd_rows = (
+        np.rint(np.array(SKY) + strength * (np.array(tile) - np.array(SKY))).astype(np.uint8)
+        for tile in TILES
+    )
+    colours = np.where(odd[..., np.newaxis], odd_rows[:, np.newaxis], even_rows[:, np.newaxis])
+    return Background(colours, np.where(seen, _depth(reach, camera), 1.0).astype(np.float32))
+
+
+def _tile(distance: float) -> float:
+    """Returns the side of a tile [m]: 1, 2 or 5 times a power of ten."""
+    wanted = distance / TILES_IN_SIGHT
+    power = 10.0 ** math.floor(math.log10(wanted))
+    return power * next(step for step in (5.0, 2.0, 1.0) if step * power <= wanted)
+
+
+def _depth(reach: np.ndarray, camera: Camera) -> np.ndarray:
+    near, far = camera.near, camera.far
+    return far * (reach - near) / (np.maximum(reach, near) * (far - near))

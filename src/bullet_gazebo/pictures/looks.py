@@ -1,7 +1,7 @@
-"""Mesh files as they look: with colours and textures where the file has them.
+"""Mesh files with their colours and textures.
 
-A file is read by our checked reader first. What it refuses isn't shown; what it takes may be read once more,
-for what it leaves aside: materials.
+Our checked reader reads a file first. If it refuses the file, nothing is shown; else the file may be read
+once more for its materials, which that reader skips.
 """
 
 import os
@@ -17,7 +17,7 @@ from bullet_gazebo.physics.files.elements import parse_xml
 from bullet_gazebo.physics.files.mesh_program import axes_of
 from bullet_gazebo.physics.files.meshes import check_mesh, read_mesh
 
-if TYPE_CHECKING:  # imported with the first mesh: who looks at none doesn't pay for it
+if TYPE_CHECKING:  # imported with the first mesh, because they take long
     import trimesh
     from PIL import Image
 
@@ -25,10 +25,10 @@ MOST_KEPT = 32  # files
 MOST_TEXTURE = 32_000_000  # [bytes] of a model with its textures, for the browser
 MOST_COLORS = 64  # of a mesh whose faces have colours of their own, for pictures
 LARGEST_IMAGE = 1024  # [pixels] a side, for pictures
-STOPGAP = 2  # [pixels] a side of trimesh's image where there is none
+STOPGAP = 2  # [pixels] a side of trimesh's image for a missing one
 WHITE = (255, 255, 255, 255)
 PLAIN = (".stl",)  # endings of files that have no materials
-# What trimesh, pycollada and Pillow raise over broken materials: the shape without looks is shown.
+# What trimesh, pycollada and Pillow raise over broken materials: the shape is shown without its looks.
 FAULTY = (
     *(ArithmeticError, AssertionError, AttributeError, LookupError, RuntimeError),
     *(TypeError, ValueError, OSError, ImportError, SyntaxError),
@@ -36,8 +36,8 @@ FAULTY = (
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """Triangles of one look: corners (n, 3, 3), and a colour, if they have one, which a texture takes on.
+class MeshPart:
+    """Triangles of one colour or texture: corners (n, 3, 3), and a colour, which also tints the texture.
 
     `uvs` (n, 3, 2) are the corners' places in the texture, with v upwards; it repeats beyond [0, 1].
     """
@@ -50,7 +50,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class MeshLook:
-    """Triangles; and the file's scene with materials, z up and in metres, where it has looks of its own."""
+    """Triangles; and the file's scene, z up and in metres, if it has materials."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -58,7 +58,7 @@ class MeshLook:
 
     @cached_property
     def glb(self) -> bytes | None:
-        """The whole for a browser, as binary glTF; None where it has no looks, or is too large."""
+        """Binary glTF for a browser; None without materials, or if it is too large."""
         if self.scene is None:
             return None
         try:
@@ -69,8 +69,8 @@ class MeshLook:
         return content if fits else None
 
     @cached_property
-    def parts(self) -> list[Part]:
-        """The same for a renderer of triangles; none where the file has no looks."""
+    def parts(self) -> list[MeshPart]:
+        """The parts for a renderer of triangles; none without materials."""
         if self.scene is None:
             return []
         try:
@@ -78,7 +78,7 @@ class MeshLook:
         except FAULTY:
             return []
 
-    def _parts(self, node: str) -> list[Part]:
+    def _parts(self, node: str) -> list[MeshPart]:
         assert self.scene is not None
         frame, name = self.scene.graph[node]
         mesh = self.scene.geometry[name]
@@ -92,18 +92,18 @@ class MeshLook:
         if visual.kind != "texture":
             return _coloured(triangles, np.asarray(visual.face_colors))
         if _is_stopgap(visual.material):
-            return [Part(triangles, None)]
+            return [MeshPart(triangles, None)]
         rgba, image = _color(visual.material), _image(visual.material)
         if image is None or visual.uv is None:
-            return [Part(triangles, rgba)]
-        return [Part(triangles, rgba, image, np.asarray(visual.uv, float)[mesh.faces])]
+            return [MeshPart(triangles, rgba)]
+        return [MeshPart(triangles, rgba, image, np.asarray(visual.uv, float)[mesh.faces])]
 
 
 def read_look(path: str) -> MeshLook:
-    """Returns how the file of a visual looks.
+    """Reads the mesh file of a visual.
 
     Raises:
-        DescriptionError: if it can't be shown: the file, and what is wrong with it, in one line.
+        DescriptionError: it can't be shown; one line with the file and what is wrong.
     """
     check_mesh(Path(path))
     try:
@@ -120,7 +120,7 @@ def _read(path: str, _changed: int, _size: int) -> MeshLook:
 
 
 def _scene(path: str) -> "trimesh.Scene | None":
-    """The file with its materials; None where it has none, or none that can be read."""
+    """Returns the file with its materials; None if it has none that can be read."""
     if path.lower().endswith(PLAIN):
         return None
     import trimesh
@@ -153,27 +153,27 @@ def _has_look(part: object) -> bool:
 
 
 def _is_stopgap(material: Any) -> bool:
-    """Whether trimesh has put it where the file names no material, or one that isn't there."""
+    """Returns whether it is trimesh's own, for a missing material."""
     image = getattr(material, "image", None)
     return getattr(material, "kwargs", None) == {} and (image is None or max(image.size) <= STOPGAP)
 
 
 def _brighten(material: Any) -> None:
-    """A texture whose file gives it no colour is seen as it is; trimesh would have it dark."""
+    """Shows a texture without a colour as it is; trimesh would darken it."""
     told = getattr(material, "kwargs", None)
     if told is not None and "kd" not in told and getattr(material, "image", None) is not None:
         material.diffuse = WHITE
 
 
-def _coloured(triangles: np.ndarray, colors: np.ndarray) -> list[Part]:
-    """Triangles by their colours (n, 4) of uint8; a few of them stand for many."""
+def _coloured(triangles: np.ndarray, colors: np.ndarray) -> list[MeshPart]:
+    """Groups triangles by colours (n, 4) of uint8; many colours are reduced to a few."""
     found, kinds = np.unique(colors, axis=0, return_inverse=True)
     if len(found) > MOST_COLORS:
         coarse = (colors[:, :3] // 64).astype(int) @ (16, 4, 1)
         _, kinds = np.unique(coarse, return_inverse=True)
         found = np.array([colors[kinds == kind].mean(axis=0) for kind in range(kinds.max() + 1)])
     return [
-        Part(triangles[kinds.ravel() == kind], _rgba(color)) for kind, color in enumerate(found)
+        MeshPart(triangles[kinds.ravel() == kind], _rgba(color)) for kind, color in enumerate(found)
     ]
 
 
@@ -186,7 +186,7 @@ def _color(material: Any) -> Color:
 
 
 def _rgba(color: Any) -> Color:
-    """A colour of trimesh's: of 0 to 255 where it has whole numbers, else of 0 to 1."""
+    """Converts a colour of trimesh's: of 0 to 255 if it has integers, else of 0 to 1."""
     numbers = np.ravel(color)
     scale = 255.0 if np.issubdtype(numbers.dtype, np.integer) or numbers.max() > 1.0 else 1.0
     red, green, blue, *rest = np.clip(numbers / scale, 0.0, 1.0).tolist()

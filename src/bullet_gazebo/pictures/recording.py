@@ -1,39 +1,48 @@
-"""Records a simulation as it runs: poses are copied within ticks, pictures are drawn in another process.
+"""Records a simulation as it runs: poses are copied within ticks, frames are drawn in another process.
 
-The other process (filming.py) is told what models look like once, and gets numbers for each picture. It lives
-in a session of its own and ends with its pipe: also a simulator that was killed leaves a video that can be
-played.
+The simulator sends the visible shapes once, and poses for each frame, through a pipe. The other process
+lives in a session of its own and ends with the pipe, so that even a killed simulator leaves a video that
+can be played.
 """
 
-import json
 import logging
 import os
-import struct
+import pickle
+import queue
+import signal
 import subprocess
 import sys
 import threading
 from array import array
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
+import numpy as np
+
+from bullet_gazebo.physics.description import Shape
 from bullet_gazebo.physics.model import Model
-from bullet_gazebo.pictures.solids import visible_shapes
+from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, subtract
+from bullet_gazebo.pictures.camera import Camera, overview
+from bullet_gazebo.pictures.visuals import visible_shapes
 from bullet_gazebo.simulator import NANOSECONDS, Simulator
 
-FILMING = "bullet_gazebo.pictures.filming"
-HEADER = struct.Struct("<cI")  # kind of a message, and its length [bytes]
-CAST, PICTURE = b"c", b"p"  # kinds: models as JSON, and poses
-MOST_WAITING = 100_000_000  # [bytes] for the other process to take; beyond it pictures are left out
+if TYPE_CHECKING:  # only the other process draws
+    from bullet_gazebo.pictures.renderer import Renderer
+
+MAIN = "import sys; from bullet_gazebo.pictures.recording import main; sys.exit(main(sys.argv[1:]))"
+MOST_WAITING = 100_000_000  # [bytes] for the other process; beyond it frames are dropped
 LEAST_SIZE, LARGEST_SIZE, FASTEST = 16, 4096, 240.0
+NUMBERS = 7  # of a pose
+ROOM = 1.25  # factor on the camera's distance: things move
 
 logger = logging.getLogger(__name__)
 
 
 class RecordingError(ValueError):
-    """A recording that can't begin; the text says why."""
+    """A recording can't begin; the text says why."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +51,10 @@ class RecordingOptions:
 
     Args:
         path: the file, whose name ends in .mp4; an older one is replaced.
-        rate: pictures for each second of simulated time [Hz].
-        width: of the pictures [pixels].
-        height: of the pictures [pixels].
-        model: who is in the middle of the picture; empty: all that can move.
+        rate: frames per second of simulated time [Hz].
+        width: of the frames [pixels].
+        height: of the frames [pixels].
+        model: the model in the middle; empty: all movable ones.
     """
 
     path: Path
@@ -55,73 +64,78 @@ class RecordingOptions:
     model: str = ""
 
     def check(self) -> None:
-        """Refuses what can't be done.
+        """Checks the options.
 
         Raises:
-            RecordingError: if it can't.
+            RecordingError: one of them is invalid.
         """
         if self.path.suffix.lower() != ".mp4":
             raise RecordingError(f"a recording's name ends in .mp4: not '{self.path}'")
         if self.path.is_dir() or not os.access(self.path.parent, os.W_OK):
             raise RecordingError(f"'{self.path}' can't be written")
         if not 0.0 < self.rate <= FASTEST:
-            raise RecordingError(f"a recording has up to {FASTEST:g} pictures a second")
+            raise RecordingError(f"a recording has up to {FASTEST:g} frames a second")
         if not all(LEAST_SIZE <= side <= LARGEST_SIZE for side in (self.width, self.height)):
             raise RecordingError(
                 f"a recording is {LEAST_SIZE} to {LARGEST_SIZE} pixels wide and high"
             )
 
 
-class Recorder:
-    """Copies poses out of the world's ticks for as long as the other process takes them."""
+class RecordedModel(NamedTuple):
+    """What the other process has to know of a model; `links` are in the order of their poses."""
+
+    name: str
+    root: str
+    static: bool
+    links: list[str]
+    shapes: list[tuple[str, Shape]]
+
+
+class SimulationRecorder:
+    """Copies poses within the world's ticks and sends them to the other process."""
 
     def __init__(self, sim: Simulator, options: RecordingOptions) -> None:
-        """Begins at the next tick; the options were checked."""
+        """Begins at the next tick, with checked options."""
         self._sim = sim
         self._period = round(NANOSECONDS / options.rate)
         self._due, self._last = 0, -1  # [ns]
-        self._cast: list[Model] = []
+        self._models: list[Model] = []
         self._waiting: deque[bytes] = deque()
-        self._size = 0  # [bytes] of what waits
-        self._lost = 0
+        self._size = 0  # [bytes] in `_waiting`
+        self._dropped = 0
         self._news, self._ending = threading.Condition(), False
         self._process = _start(options)
         self._thread = threading.Thread(target=self._feed, name="recording", daemon=True)
         self._thread.start()
-        sim.listeners.append(self._look)
+        sim.listeners.append(self._on_tick)
 
-    def _look(self, now: int) -> None:
-        """After a tick's controllers, before its step."""
+    def _on_tick(self, now: int) -> None:
         if now < self._last:
-            self._due = 0  # time began anew
+            self._due = 0  # time was reset
         self._last = now
-        if now < self._due:
+        if now < self._due or self._ending:
             return
         self._due = max(self._due + self._period, now)
         models = list(self._sim.world.models.values())
-        if models != self._cast:
-            self._cast = models
-            self._send(CAST, lambda: json.dumps([_looks(model) for model in models]).encode())
+        recorded = None
+        if models != self._models:
+            self._models = models
+            recorded = [_recorded(model) for model in models]
+        elif self._size > MOST_WAITING:
+            self._dropped += 1
+            return
         poses = array("d")
         for model in models:
             for position, orientation in model.link_poses():
                 poses.extend((*position, *orientation))
-        self._send(PICTURE, poses.tobytes)
-
-    def _send(self, kind: bytes, content: Callable[[], bytes]) -> None:
+        data = pickle.dumps((recorded, poses))
         with self._news:
-            if self._ending:
-                return
-            if kind == PICTURE and self._size > MOST_WAITING:
-                self._lost += 1
-                return
-            data = content()
-            self._waiting.append(HEADER.pack(kind, len(data)) + data)
+            self._waiting.append(data)
             self._size += len(data)
             self._news.notify()
 
     def _feed(self) -> None:
-        """Hands over what waits, until the end or until the other process has ended."""
+        """Sends what waits, until `close` or until the other process has ended."""
         pipe: Any = self._process.stdin
         try:
             while True:
@@ -134,18 +148,17 @@ class Recorder:
                 pipe.write(data)
                 pipe.flush()
             pipe.close()
-        except OSError:  # it has told why
-            with self._news:
-                self._ending = True
+        except OSError:  # the other process has printed why
+            self._ending = True
             logger.warning("the recording has ended before the simulation")
-        if self._lost:
-            logger.warning("%d pictures of the recording were left out", self._lost)
+        if self._dropped:
+            logger.warning("%d frames of the recording were dropped", self._dropped)
 
     def close(self, patience: float) -> None:
-        """Ends the recording; what is still to be drawn is drawn after this process's end.
+        """Ends the recording; the other process draws the last frames also after this one's end.
 
         Args:
-            patience: [s] for handing over what waits.
+            patience: [s] for sending what waits.
         """
         with self._news:
             self._ending = True
@@ -153,17 +166,15 @@ class Recorder:
         self._thread.join(patience)
 
 
-def _looks(model: Model) -> list[Any]:
-    """Name, root link, whether it stays where it is, links in the order of their poses, shapes with links.
-
-    A mesh goes by the name of its file.
-    """
+def _recorded(model: Model) -> RecordedModel:
     description = model.description
-    shapes = [
-        (link, (shape.kind, shape.size, shape.pose, shape.mesh, shape.rgba))
-        for link, shape in visible_shapes(description)
-    ]
-    return [model.name, description.root, description.static, model.link_names, shapes]
+    return RecordedModel(
+        model.name,
+        description.root,
+        description.static,
+        list(model.link_names),
+        visible_shapes(description),
+    )
 
 
 def _start(options: RecordingOptions) -> subprocess.Popen[bytes]:
@@ -172,6 +183,99 @@ def _start(options: RecordingOptions) -> subprocess.Popen[bytes]:
     ]  # fmt: skip
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", FILMING, *words], stdin=subprocess.PIPE, env=environment,
+        [sys.executable, "-P", "-c", MAIN, *words], stdin=subprocess.PIPE, env=environment,
         start_new_session=True,
     )  # fmt: skip
+
+
+class Film:
+    """Draws the frames: the recorded models in a renderer, and a camera that looks at them."""
+
+    def __init__(self, options: RecordingOptions, renderer: "Renderer") -> None:
+        self._options = options
+        self._renderer = renderer
+        self._models: list[RecordedModel] = []
+        self._camera: Camera | None = None
+        self._followed, self._offset = "", ZERO
+
+    def change(self, models: list[RecordedModel]) -> None:
+        """Replaces the models; the next frame places the camera anew."""
+        for model in self._models:
+            self._renderer.remove(model.name)
+        for model in models:
+            self._renderer.add(model.name, model.shapes)
+        self._models, self._camera = models, None
+
+    def frame(self, poses: Sequence[float]) -> np.ndarray:
+        """Draws the models with their links at these poses, 7 numbers each."""
+        rows = iter(np.reshape(np.asarray(poses), (-1, NUMBERS)).tolist())
+        places: dict[str, Vector] = {}
+        for model in self._models:
+            found = {link: _pose(*next(rows)) for link in model.links}
+            self._renderer.place(model.name, found)
+            places[model.name] = found[model.root].position if model.root in found else ZERO
+        width, height = self._options.width, self._options.height
+        if self._camera is None:
+            self._camera = self._aim(places, width / height)
+        if self._followed:
+            self._camera = self._camera.at(add(places[self._followed], self._offset))
+        return self._renderer.picture(self._camera, width, height)
+
+    def _aim(self, places: dict[str, Vector], aspect: float) -> Camera:
+        movable = [model.name for model in self._models if not model.static]
+        named = [self._options.model] if self._options.model in places else []
+        names = named or movable or list(places)
+        corners = [np.zeros((0, 3)), *(self._renderer.corners(name) for name in names)]
+        camera = overview(np.concatenate(corners), aspect)
+        self._followed = names[0] if len(names) == 1 else ""
+        if self._followed:
+            self._offset = subtract(camera.target, places[self._followed])
+        return Camera(camera.target, ROOM * camera.distance, camera.yaw, camera.pitch, camera.view)
+
+
+def _pose(x: float, y: float, z: float, qx: float, qy: float, qz: float, qw: float) -> Pose:
+    return Pose((x, y, z), (qx, qy, qz, qw))
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Draws until standard input ends; SIGTERM drops the frames that aren't drawn yet."""
+    from bullet_gazebo.pictures.renderer import Renderer
+    from viewer.video import EncoderFailed, Mp4Writer
+
+    logging.basicConfig(format="recording: %(message)s")
+    path, rate, width, height, model = arguments
+    options = RecordingOptions(Path(path), float(rate), int(width), int(height), model)
+    inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    stopping = False
+
+    def stop(*_: object) -> None:
+        nonlocal stopping
+        stopping = True
+        inbox.put(None)
+
+    signal.signal(signal.SIGTERM, stop)
+    # In a thread, so that the simulator never waits for a frame.
+    threading.Thread(target=_read, args=(sys.stdin.buffer, inbox), daemon=True).start()
+    film, writer, count = Film(options, Renderer()), Mp4Writer(options.path, options.rate), 0
+    try:
+        while (message := inbox.get()) is not None and not stopping:
+            models, poses = message
+            if models is not None:
+                film.change(models)
+            writer.add(film.frame(poses))
+            count += 1
+        writer.close()
+    except EncoderFailed as error:
+        print(f"recording: {path}: {error}", file=sys.stderr, flush=True)
+        return 1
+    length = f"{count} frames, {count / options.rate:.1f} s" if count else "no time has passed"
+    print(f"recording: {path}: {length}", flush=True)
+    return 0
+
+
+def _read(stream: BinaryIO, inbox: "queue.SimpleQueue[Any]") -> None:
+    try:
+        while True:
+            inbox.put(pickle.load(stream))
+    except (EOFError, pickle.UnpicklingError):  # the end; a killed simulator leaves half a message
+        inbox.put(None)

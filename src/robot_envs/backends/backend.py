@@ -15,7 +15,11 @@ PHYSICS_STEP = 0.001  # [s]; Gazebo's default, and that of a world in this proce
 
 
 class RobotBackend(Protocol):
-    """Moves the robots of a scene, whose controllers follow commands."""
+    """Moves the robots of a scene, whose controllers follow commands.
+
+    All methods raise SimulatorError if the world refuses, for an unknown link or model, and if a simulator
+    doesn't answer; `look` and `reset` raise ValueError for a link that is named twice and an unknown joint.
+    """
 
     scene: Scene
     deterministic: bool  # whether the same commands give the same states

@@ -37,7 +37,7 @@ from robot_envs.files import resources
 from robot_envs.robot import DRIVES, Robot
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
-from robot_envs.variation.applying import Applier, JointFigures, PidFigures
+from robot_envs.variation.applying import Applier, JointFriction, PidGains
 from robot_envs.variation.parts import RobotPart
 from robot_envs.world_state import (
     Commands,
@@ -53,13 +53,13 @@ from robot_envs.world_state import (
 )
 
 _numbers = attrgetter("position", "velocity", "effort")
-_make = tuple.__new__  # as a NamedTuple's own, and twice as fast
+_make = tuple.__new__  # what a NamedTuple's constructor does, twice as fast
 
 
 class InProcessWorld:
     """A scene's robots and their controllers, in a world of their own.
 
-    Nobody else knows this world, so its lock is never taken.
+    No other thread knows this world, so its lock is never taken.
 
     Args:
         scene: the robots and objects.
@@ -67,9 +67,9 @@ class InProcessWorld:
         engine: "bullet", or "mujoco"; see `bullet_gazebo.physics.engines`.
 
     Raises:
-        ValueError: if the period isn't a whole number of physics steps, or there is no such
-            engine, or it isn't installed.
-        RobotEnvError: if files aren't found, or something in them is wrong.
+        ValueError: if the period isn't a whole number of physics steps, or the engine is unknown or not
+            installed.
+        RobotEnvError: if a file isn't found, or something in it is wrong.
     """
 
     deterministic, shared = True, False
@@ -93,12 +93,12 @@ class InProcessWorld:
         self._apply = Applier(scene, InProcessChanges(self._sim))
         self._reader = StateReader(world, NOTHING)
         self._links: list[str] = []
-        self._asked = False  # for more than the joints
+        self._reads_more = False  # than the joints
         self._held: dict[str, Any] = {}
         self._begin = 0  # [ns] of the episode
 
     def _add(self, robot: Robot) -> tuple[Model, RobotHardware, Loaded]:
-        """Spawns a robot, and starts its controllers."""
+        """Spawns a robot and starts its controllers."""
         try:
             description = parse_urdf(robot.xml, resources=resources())
             model = self._sim.world.spawn(robot.model, description, robot.pose)
@@ -130,26 +130,16 @@ class InProcessWorld:
         }
 
     def look(self, query: StateQuery) -> None:
-        """See `RobotBackend.look`.
-
-        Raises:
-            ValueError: for a link that is named twice.
-            SimulatorError: for a name of nothing in this world.
-        """
+        """See `RobotBackend.look`."""
         links = link_keys(query)
         try:
             self._reader = StateReader(self._sim.world, query)
         except UnknownName as error:
             raise SimulatorError(str(error)) from error
-        self._links, self._asked = links, query != NOTHING
+        self._links, self._reads_more = links, query != NOTHING
 
     def reset(self, initial: InitialState) -> WorldState:
-        """See `RobotBackend.reset`; the state asked for is the state reached, within the joints' stops.
-
-        Raises:
-            ValueError: for a joint to place that isn't there.
-            SimulatorError: for a model to place that isn't there.
-        """
+        """See `RobotBackend.reset`; the state reached is the one asked for, within the joints' stops."""
         joints, world = self.scene.placed_joints(initial), self._sim.world
         placed = self.scene.placed_models(initial)
         try:
@@ -175,14 +165,10 @@ class InProcessWorld:
         return state._replace(commands=self._held)
 
     def begin(self, commands: Commands) -> None:
-        """See `RobotBackend.begin`; there is nothing to begin."""
+        """See `RobotBackend.begin`; does nothing."""
 
     def act(self, commands: Commands) -> WorldState:
-        """See `RobotBackend.act`.
-
-        Raises:
-            SimulatorError: if the physics has come to something that isn't finite.
-        """
+        """See `RobotBackend.act`."""
         receivers = self._receivers
         for name, command in commands.items():
             receivers[name](command)
@@ -199,7 +185,7 @@ class InProcessWorld:
         if not math.isfinite(total):
             raise SimulatorError(f"the joint state isn't finite: {joints}")
         passed = self._sim.now - self._begin
-        if not self._asked:
+        if not self._reads_more:
             return WorldState(passed / NANOSECONDS, joints, self._held)
         answer = self._reader.read(stepped=passed > 0)
         return WorldState(
@@ -212,19 +198,11 @@ class InProcessWorld:
         )
 
     def vary(self, variation: Variation) -> None:
-        """See `RobotBackend.vary`.
-
-        Raises:
-            SimulatorError: for a name that isn't there, or figures that no robot can have.
-        """
+        """See `RobotBackend.vary`."""
         self._apply(variation)
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
-        """See `RobotBackend.poses`.
-
-        Raises:
-            SimulatorError: for a link that isn't there.
-        """
+        """See `RobotBackend.poses`."""
         try:
             found = [find_link(self._sim.world, name) for name in links]
         except UnknownName as error:
@@ -243,7 +221,7 @@ def _motion(state: tuple[Pose, Twist]) -> Motion:
 
 
 def control_tick(description: ModelDescription) -> float:
-    """How often the URDF has its controllers updated [s]; 0: with each step."""
+    """The period at which the URDF has controllers updated [s]; 0: every physics step."""
     for plugin in description.plugins:
         if plugin.filename == DRIVES:
             with contextlib.suppress(ValueError):
@@ -252,11 +230,7 @@ def control_tick(description: ModelDescription) -> float:
 
 
 class InProcessChanges:
-    """What can be changed of robots; see `robot_envs.variation.applying.Changeable`.
-
-    Args:
-        sim: of the world that they are in.
-    """
+    """Varies the robots of a simulator in this process; see `Changeable`."""
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
@@ -276,8 +250,8 @@ class InProcessChanges:
         except (PropertyError, DescriptionError) as error:
             raise SimulatorError(f"link {link.name} can't be changed: {error}") from error
 
-    def set_joint(self, joint: RobotPart, figures: JointFigures) -> None:
-        wanted = JointProperties(damping=figures.damping, motor_effort=figures.friction)
+    def set_joint(self, joint: RobotPart, friction: JointFriction) -> None:
+        wanted = JointProperties(damping=friction.damping, motor_effort=friction.friction)
         step = self._sim.world.time_step
         try:
             set_joint_properties(self._model(joint), joint.name, wanted, step)
@@ -292,11 +266,11 @@ class InProcessChanges:
                 f"surfaces of link {link.name} can't be changed: {error}"
             ) from error
 
-    def pids(self, controller: RobotPart) -> Mapping[str, PidFigures]:
+    def pids(self, controller: RobotPart) -> Mapping[str, PidGains]:
         pids = self._robots[controller.robot.model].manager.get(controller.name).pids.items()
-        return {place: PidFigures(pid.gains.p, pid.gains.i, pid.gains.d) for place, pid in pids}
+        return {place: PidGains(pid.gains.p, pid.gains.i, pid.gains.d) for place, pid in pids}
 
-    def set_pid(self, controller: RobotPart, place: str, gains: PidFigures) -> None:
+    def set_pid(self, controller: RobotPart, place: str, gains: PidGains) -> None:
         manager = self._robots[controller.robot.model].manager
         pid = manager.get(controller.name).pids[place]
         pid.gains = replace(pid.gains, **gains._asdict())
@@ -306,7 +280,7 @@ class InProcessChanges:
         return self._sim.world.gravity
 
     def set_gravity(self, gravity: Vector) -> None:
-        """As set_physics_properties does it, which sets the step and the solver, too."""
+        # The service set_physics_properties sets step and solver, too, and the bits must be the same.
         world = self._sim.world
         world.set_gravity(gravity)
         self._sim.set_time_step(world.time_step)

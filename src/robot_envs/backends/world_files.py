@@ -1,4 +1,4 @@
-"""What stands in a world of this process beside its robots: a world file's models, and a task's objects."""
+"""Models of a world in this process beside its robots: those of a world file, and a task's objects."""
 
 import logging
 from dataclasses import replace
@@ -23,20 +23,20 @@ logger = logging.getLogger(__name__)
 
 
 def fill(sim: Simulator, source: Source | None) -> None:
-    """Puts a world file's models into an empty world, with its gravity and its step, as gzserver does.
+    """Loads a world file into an empty world: models, gravity and physics step, as gzserver does.
 
     Args:
         sim: of the world.
         source: the file; `EMPTY`: a ground plane; None: nothing.
 
     Raises:
-        RobotEnvError: if the file can't be read, or something in it not be simulated.
+        RobotEnvError: if the file can't be read or simulated.
     """
     if source is None:
         return
     found = empty_world() if source == EMPTY else _read(source)
     for warning in found.warnings:
-        logger.warning("world %s: %s", _told(source), warning)
+        logger.warning("world %s: %s", _shown(source), warning)
     sim.set_time_step(found.time_step)
     sim.world.set_gravity(found.gravity)
     if found.iterations is not None:
@@ -45,7 +45,7 @@ def fill(sim: Simulator, source: Source | None) -> None:
         try:
             sim.world.spawn(name, description, description.initial_pose)
         except DescriptionError as error:
-            raise RobotEnvError(f"world {_told(source)}: model '{name}': {error}") from error
+            raise RobotEnvError(f"world {_shown(source)}: model '{name}': {error}") from error
 
 
 def _read(source: Source) -> WorldDescription:
@@ -56,36 +56,28 @@ def _read(source: Source) -> WorldDescription:
         need_file(path)
         return load_world(path, resources())
     except (DescriptionError, RobotEnvError) as error:
-        raise RobotEnvError(f"world {_told(source)}: {error}") from error
+        raise RobotEnvError(f"world {_shown(source)}: {error}") from error
 
 
 def world_models(source: Source | None) -> dict[str, ModelDescription]:
-    """The models that a world file brings; none for `EMPTY`.
-
-    Raises:
-        RobotEnvError: if it can't be read.
-    """
+    """The models of a world file; none for `EMPTY`. Raises RobotEnvError if it can't be read."""
     return {} if source is None or source == EMPTY else _read(source).models
 
 
 def object_model(thing: Object) -> ModelDescription:
-    """What an object is.
-
-    Raises:
-        RobotEnvError: if its file can't be read, or is that of a light.
-    """
+    """Reads an object's file; raises RobotEnvError if that fails, or if it describes a light."""
     text = read_text(thing.file)
     try:
         entity = read_entity(text, thing.name, resources(), Reading())
     except DescriptionError as error:
-        raise RobotEnvError(f"the object '{thing.name}' ({_told(thing.file)}): {error}") from error
+        raise RobotEnvError(f"the object '{thing.name}' ({_shown(thing.file)}): {error}") from error
     if isinstance(entity, Light):
         raise RobotEnvError(f"the object '{thing.name}' is a light; an object is a model")
     return entity
 
 
 def spawn(world: World, thing: Object) -> None:
-    """Adds an object.
+    """Spawns an object.
 
     Raises:
         RobotEnvError: if its file can't be read or simulated, or the world has a model of that name.
@@ -98,8 +90,8 @@ def spawn(world: World, thing: Object) -> None:
             f"the object '{thing.name}': the world has a model of that name; give it another one"
         ) from error
     except DescriptionError as error:
-        raise RobotEnvError(f"the object '{thing.name}' ({_told(thing.file)}): {error}") from error
+        raise RobotEnvError(f"the object '{thing.name}' ({_shown(thing.file)}): {error}") from error
 
 
-def _told(source: Source) -> str:
+def _shown(source: Source) -> str:
     return "given as text" if is_text(source) else str(source)

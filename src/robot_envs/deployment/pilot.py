@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bullet_gazebo.control.joint import JointLimits
-from robot_envs.checks import action_reader, observation_reader, with_goals
+from robot_envs.checks import action_reader, checked_goal, observation_reader, with_goals
 from robot_envs.controllers import CommandPort
 from robot_envs.deployment.kinematics import LinkView
 from robot_envs.errors import RobotEnvError
@@ -146,7 +146,7 @@ class Pilot:
         task = self._task
         if isinstance(task, GoalTask):
             drawn = task.goal(self._generator, self._state(0.0, joints))
-            task.desired = _goal_of(task, drawn if self._goal is None else self._goal)
+            task.desired = checked_goal(task, drawn if self._goal is None else self._goal)
 
     def aim(self, goal: Any) -> None:
         """Gives a `GoalTask` a goal, for good.
@@ -157,7 +157,7 @@ class Pilot:
         task = self._task
         if not isinstance(task, GoalTask):
             raise ValueError(f"{type(task).__name__} has no goal; only a GoalTask does")
-        task.desired = self._goal = _goal_of(task, goal)
+        task.desired = self._goal = checked_goal(task, goal)
 
     def go_on(self, joints: Joints) -> None:
         """Has commands go on from where the joints are, after they were stopped."""
@@ -209,11 +209,3 @@ class Pilot:
         """Commands that have all joints stop where they are."""
         self.go_on(joints)
         return dict(self._held)
-
-
-def _goal_of(task: GoalTask, goal: Any) -> np.ndarray:
-    space = task.goals()
-    found = np.asarray(goal, space.dtype)
-    if not space.contains(found):
-        raise ValueError(f"the goal {found} isn't one of {type(task).__name__}'s goals: {space}")
-    return found

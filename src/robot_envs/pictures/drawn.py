@@ -92,11 +92,11 @@ class _DrawnRobot:
     """A robot in a scene, and a camera."""
 
     def __init__(self, placement: Placement, camera: Camera | None, size: tuple[int, int]) -> None:
-        from bullet_gazebo.pictures.scene import Scene  # loads PyBullet
+        from bullet_gazebo.pictures.renderer import Renderer  # loads PyBullet
 
         self._placement, self._size = placement, size
         self._camera = placement.camera(camera, size[0] / size[1])
-        self.scene = Scene()
+        self.scene = Renderer()
         for name, shapes in placement.models.items():
             self.scene.add(name, shapes)
 

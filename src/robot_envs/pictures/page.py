@@ -13,8 +13,8 @@ from bullet_gazebo.physics.description import Shape
 from bullet_gazebo.physics.files.world_file import empty_world
 from bullet_gazebo.physics.pose import IDENTITY, ZERO
 from bullet_gazebo.pictures.camera import Camera, overview
-from bullet_gazebo.pictures.page.picture import Picture
-from bullet_gazebo.pictures.page.seen import SeenLink, SeenModel, seen_model
+from bullet_gazebo.pictures.page import Picture
+from bullet_gazebo.pictures.visuals import VisibleLink, VisibleModel, visible_model
 from robot_envs.pictures.placement import Placement
 from viewer.address import LOOPBACK, find_address
 from viewer.server import serve, stop
@@ -165,7 +165,7 @@ class LivePage:
 def _draw_ground(server: viser.ViserServer) -> None:
     world = empty_world()
     seen = [
-        seen_model(model, number, name, list(model.links), [], collisions=False)
+        visible_model(model, number, name, list(model.links), [], collisions=False)
         for number, (name, model) in enumerate(world.models.items())
     ]
     ground = Picture(server, logger.warning, below=WORLD)
@@ -173,7 +173,7 @@ def _draw_ground(server: viser.ViserServer) -> None:
     ground.move(np.array([(*ZERO, *IDENTITY)] * sum(len(model.links) for model in seen)))
 
 
-def _seen(placement: Placement) -> list[SeenModel]:
+def _seen(placement: Placement) -> list[VisibleModel]:
     """The robot with all of its links, and the visible links of what is beside it."""
     models = []
     for number, (name, shapes) in enumerate(placement.models.items()):
@@ -182,5 +182,5 @@ def _seen(placement: Placement) -> list[SeenModel]:
             links |= {link: [] for link in placement.description.links}
         for link, shape in shapes:
             links[link].append(shape)
-        models.append(SeenModel(number, name, [SeenLink(*each) for each in links.items()]))
+        models.append(VisibleModel(number, name, [VisibleLink(*each) for each in links.items()]))
     return models

@@ -11,7 +11,7 @@ from bullet_gazebo.physics.description import DescriptionError, Joint, ModelDesc
 from bullet_gazebo.physics.dynamics import link_poses
 from bullet_gazebo.physics.pose import Pose, Vector, subtract
 from bullet_gazebo.pictures.camera import Camera, overview
-from bullet_gazebo.pictures.solids import box_around, moved, solid_of, visible_shapes
+from bullet_gazebo.pictures.visuals import box_around, moved, solid_of, visible_shapes
 from robot_envs.backends.world_files import object_model, world_models
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -20,13 +20,14 @@ Shapes = list[tuple[str, Shape]]  # each with its link
 
 
 class Surroundings:
-    """Knows what is seen beside the first robot, and asks a backend where it is.
+    """What is visible beside the first robot: other robots, a task's objects, the world file's models.
 
-    Where the first robot has joints that a state doesn't tell, their links are asked for, too.
+    A backend is asked where they are, and also for the first robot's links if it has joints that a state
+    doesn't have.
 
     Args:
         scene: the robots and objects.
-        ask: where the frames of links are in the world, each named model::link.
+        ask: returns the poses of link frames in the world, each link named model::link.
     """
 
     def __init__(self, scene: Scene, ask: Callable[[Sequence[str]], Sequence[Pose]]) -> None:
@@ -34,11 +35,7 @@ class Surroundings:
 
     @cached_property
     def shapes(self) -> Mapping[str, Shapes]:
-        """What is seen of each model, by its name.
-
-        Raises:
-            RobotEnvError: if a file can't be read.
-        """
+        """The visible shapes of each model, by its name."""
         first, *others = self._scene.robots
         models: dict[str, ModelDescription] = {robot.model: robot.links for robot in others}
         models |= {each.name: object_model(each) for each in self._scene.objects}
@@ -48,15 +45,11 @@ class Surroundings:
 
     @property
     def robots(self) -> Sequence[Robot]:
-        """Those beside the first one."""
+        """The robots beside the first one."""
         return self._scene.robots[1:]
 
     def poses(self) -> dict[str, dict[str, Pose]]:
-        """Where the links are, by model.
-
-        Raises:
-            SimulatorError: if the backend has to be asked, and doesn't answer.
-        """
+        """The poses of links, by model."""
         asked = self._asked
         found: dict[str, dict[str, Pose]] = {model: {} for model, _ in asked}
         if asked:
@@ -76,9 +69,8 @@ class Surroundings:
         return links
 
 
-ROOM = (
-    2.5  # for the way that a robot without a fixed base goes, as a factor of the camera's distance
-)
+# of the camera's distance, to see the way of a robot without a fixed base
+ROOM = 2.5
 QUARTERS = (0.0, pi / 2.0, pi, -pi / 2.0)  # [rad] of a joint without stops
 
 
@@ -87,11 +79,8 @@ class Placement:
 
     Args:
         robot: the robot.
-        base: where its root link is now; None: where it is spawned.
+        base: returns the pose of its root link; None: where it is spawned.
         beside: what else is in its world; None: nothing.
-
-    Raises:
-        RobotEnvError: if the robot's file can't be read.
     """
 
     def __init__(
@@ -111,7 +100,7 @@ class Placement:
 
     @property
     def models(self) -> dict[str, Shapes]:
-        """What is seen of each model, the robot first."""
+        """The visible shapes of each model, the robot first."""
         return {self.name: self.shapes, **(self._beside.shapes if self._beside else {})}
 
     def poses(self, positions: Mapping[str, float], base: Pose) -> dict[str, dict[str, Pose]]:
@@ -119,17 +108,14 @@ class Placement:
 
         Args:
             positions: of the robot's joints [rad, m].
-            base: where its root link is.
-
-        Raises:
-            SimulatorError: if the backend has to be asked, and doesn't answer.
+            base: the pose of its root link.
         """
         others = self._beside.poses() if self._beside else {}
         own = {} if self.name in others else link_poses(self.description, base, positions)
         return {self.name: own, **others}
 
     def reach(self) -> np.ndarray:
-        """Corners of boxes around all that robots' joints can reach from the start [m]: (n, 3)."""
+        """Corners of boxes around all that the robots' joints can reach from the start, (n, 3) [m]."""
         others = [Placement(each).reach() for each in self._beside.robots] if self._beside else []
         return np.concatenate([self._own_reach(), *others])
 
@@ -144,7 +130,7 @@ class Placement:
         return np.concatenate([np.zeros((0, 3)), *corners])
 
     def camera(self, camera: Camera | None, aspect: float) -> Camera:
-        """A camera that sees all that joints can reach, and more of the ground of what drives; or `camera`.
+        """`camera`, or one that sees all that joints can reach, and more ground around a robot that drives.
 
         Args:
             camera: for the robot as it is spawned.
@@ -158,7 +144,7 @@ class Placement:
         return replace(seen, distance=ROOM * seen.distance)
 
     def travelled(self, positions: Mapping[str, float], base: Pose) -> Vector:
-        """How far it has come from where it starts [m]: its root link, and along slides without near ends."""
+        """How far it has moved from its start [m]: its root link, and along slides without near stops."""
         if self._carried is None:
             return subtract(base.position, self._start.position)
         here, there = (
@@ -173,10 +159,10 @@ class Placement:
             try:
                 yield link, shape.pose, box_around(solid_of(shape))
             except DescriptionError:
-                continue  # who draws it tells
+                continue  # drawing it reports that
 
     def _places(self) -> Iterator[tuple[Joint, float]]:
-        """Some of where the joints can be [rad, m]: at their stops, or all the way round."""
+        """Sample positions of the joints [rad, m]: at their stops, or all the way round."""
         for joint in self.description.movable_joints:
             if _has_near_stops(joint):
                 yield from ((joint, joint.lower), (joint, joint.upper))

@@ -44,12 +44,12 @@ class Balance(Task):
     1 - 0.5 x² - 0.01 action² for each step, with the cart's position x [m].
 
     ## Start of an episode
-    Upright and at rest in the middle: each joint's position and speed within `noise` [m, m/s, rad, rad/s] of
-    it.
+    Upright in the middle, at rest: each joint's position and speed are off by up to `noise` [m, m/s, rad,
+    rad/s].
 
     ## End of an episode
-    It is terminated when a rod is 0.5 rad from the vertical or the cart 0.95 m from the middle, and truncated
-    after 500 steps of 0.02 s.
+    Terminated when a rod is 0.5 rad from the vertical or the cart 0.95 m from the middle; truncated after 500
+    steps of 0.02 s.
 
     Args:
         noise: see above.
@@ -61,15 +61,12 @@ class Balance(Task):
         self.noise = noise
 
     def action_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.actions(1)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.numbers(6)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
-        """Draws how far it is off."""
         names = ("cart_joint", "lower_joint", "upper_joint")
         off = rng.uniform(-self.noise, self.noise, (3, 2)).tolist()
         return InitialState(
@@ -79,11 +76,9 @@ class Balance(Task):
         )
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, float]:
-        """The force on the cart."""
         return {"cart_controller": STRONGEST * float(action[0])}
 
     def observe(self, state: WorldState) -> np.ndarray:
-        """See the class."""
         cart, lower, upper = rods(state)
         seen = [
             cart[0],
@@ -96,7 +91,6 @@ class Balance(Task):
         return np.array(seen, np.float32)
 
     def reward(self, state: WorldState, action: np.ndarray) -> float:
-        """See the class."""
         off = state.joints["cart_joint"].position
         return 1.0 - 0.5 * off * off - 0.01 * float(np.square(action).sum())
 

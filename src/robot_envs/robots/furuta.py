@@ -27,7 +27,7 @@ ROBOT = Robot(
 
 
 class SwingUp(Task):
-    """The rod hangs; it is to be swung up and held upright, with the arm near where it began.
+    """Swing the hanging rod up and hold it upright, with the arm near where it began.
 
     ## Action space
     `Box(-1, 1, (1,))`: the motor's torque [0.3 N m].
@@ -47,10 +47,10 @@ class SwingUp(Task):
     the speeds [rad/s], near = 1 / (1 + 0.3 arm²) for the arm's angle [rad].
 
     ## Start of an episode
-    The rod hangs, the arm points ahead, both at rest: each of the four figures within 0.1 rad or rad/s of it.
+    The rod hangs and the arm points ahead, at rest; angles and speeds are off by up to 0.1 rad and rad/s.
 
     ## End of an episode
-    It is terminated when the arm is a whole turn away from ahead, and truncated after 300 steps of 0.02 s.
+    Terminated when the arm is a full turn away from ahead; truncated after 300 steps of 0.02 s.
 
     ## Info
     `upright`: whether the rod is within 0.2 rad of it.
@@ -62,26 +62,21 @@ class SwingUp(Task):
         self._last = 0.0
 
     def action_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.actions(1)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.numbers(5)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
-        """Draws how the rod hangs."""
         arm, arm_speed, rod, rod_speed = (float(each) for each in rng.uniform(-0.1, 0.1, 4))
         return InitialState(
             joints={"arm_joint": (arm, arm_speed), "rod_joint": (math.pi + rod, rod_speed)}
         )
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, float]:
-        """The motor's torque."""
         return {"arm_controller": STRONGEST * float(action[0])}
 
     def observe(self, state: WorldState) -> np.ndarray:
-        """See the class."""
         arm, rod = state.joints["arm_joint"], state.joints["rod_joint"]
         seen = [
             math.cos(rod.position),
@@ -93,7 +88,6 @@ class SwingUp(Task):
         return np.array(seen, np.float32)
 
     def reward(self, state: WorldState, action: np.ndarray) -> float:
-        """See the class."""
         arm, rod = state.joints["arm_joint"], state.joints["rod_joint"]
         height = (1.0 + math.cos(rod.position)) / 2.0
         calm = 1.0 / (1.0 + 0.01 * (arm.velocity**2 + rod.velocity**2))
@@ -105,5 +99,4 @@ class SwingUp(Task):
         return abs(state.joints["arm_joint"].position) > TURNS
 
     def info(self, state: WorldState) -> dict[str, Any]:
-        """See the class."""
         return {"upright": math.cos(state.joints["rod_joint"].position) > math.cos(0.2)}

@@ -30,11 +30,11 @@ ROBOT = Robot(
 
 
 class HopForward(Task):
-    """The hopper goes forward as fast as it can, and doesn't fall.
+    """Hop forward as fast as possible without falling.
 
     ## Action space
-    `Box(-1, 1, (3,))`: where hip, knee and ankle are asked to be, beside a bent stance [0.6, 0.7, 0.5 rad].
-    Position controllers follow with torques.
+    `Box(-1, 1, (3,))`: set-points of hip, knee and ankle, relative to a bent stance [0.6, 0.7, 0.5 rad].
+    Position controllers follow them with torques.
 
     ## Observation space
     `Box((12,))`
@@ -55,26 +55,23 @@ class HopForward(Task):
     In the stance at rest, leg and torso within 0.02 rad of it, the foot about 1 cm above the ground.
 
     ## End of an episode
-    It is terminated when it falls: the hip 0.25 m below that of a stretched leg, or the torso 0.6 rad from
-    the vertical. It is truncated after 250 steps of 0.02 s.
+    Terminated when it falls: the hip is 0.25 m below that of a stretched leg, or the torso 0.6 rad from the
+    vertical. Truncated after 250 steps of 0.02 s.
 
     ## Info
-    `x`: how far it has come [m].
+    `x`: the distance covered [m].
     """
 
     max_steps = 250
     query = StateQuery(contacts_of=("foot",))
 
     def action_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.actions(3)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.numbers(12)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
-        """The stance, a little off it."""
         off = rng.uniform(-0.02, 0.02, 4).tolist()
         leg = {name: each + move for name, each, move in zip(LEG, STANCE, off, strict=False)}
         bent = 0.3 * (2.0 - math.cos(leg["hip"]) - math.cos(leg["hip"] + leg["knee"]))
@@ -82,7 +79,6 @@ class HopForward(Task):
         return InitialState(joints={**leg, "pitch": off[3], "up": 0.01 - bent}, commands=commands)
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
-        """Angles of the leg."""
         moves = action.tolist()
         return {
             "leg_controller": tuple(
@@ -92,7 +88,6 @@ class HopForward(Task):
         }
 
     def observe(self, state: WorldState) -> np.ndarray:
-        """See the class."""
         each = state.joints
         up, pitch = each["up"], each["pitch"]
         seen = [
@@ -111,7 +106,6 @@ class HopForward(Task):
         return np.array(seen, np.float32)
 
     def reward(self, state: WorldState, action: np.ndarray) -> float:
-        """See the class."""
         speed = min(state.joints["forward"].velocity, 2.0)
         return 0.5 + speed - 0.02 * float(np.square(action).sum())
 
@@ -121,5 +115,4 @@ class HopForward(Task):
         return joints["up"].position < LOW or abs(joints["pitch"].position) > LEAN
 
     def info(self, state: WorldState) -> dict[str, Any]:
-        """See the class."""
         return {"x": state.joints["forward"].position}

@@ -43,20 +43,20 @@ class ReachInSpace(Task):
     | numbers | what they are | unit |
     |---|---|---|
     | 0 to 5 | the joints' set-points | 2 rad |
-    | 6 to 8 | where the tip is, (x, y, z) | 0.5 m |
-    | 9 to 11 | the way from there to the target, (x, y, z) | 0.5 m |
-    | 12 to 14 | the same, cut off at 1 | 0.05 m |
+    | 6 to 8 | position of the tip, (x, y, z) | 0.5 m |
+    | 9 to 11 | from the tip to the target, (x, y, z) | 0.5 m |
+    | 12 to 14 | the same, clipped at 1 | 0.05 m |
 
     ## Rewards
-    -2 d + exp(-(d / 0.02)²) - 0.02 |action|² / 6, with the distance d [m] of the tip from the target when the
-    step is over: at most 1, which is for being there at rest.
+    -2 d + exp(-(d / 0.02)²) - 0.02 |action|² / 6, where d is the distance of the tip from the target after
+    the step [m]: at most 1, for resting at the target.
 
     ## Start of an episode
     The hand hangs in front of the arm, each joint within 0.3 rad of it, at rest. The target is anywhere in a
     box of 0.3 x 0.6 x 0.4 m whose middle is 0.45 m ahead of the waist and 0.4 m above the ground.
 
     ## End of an episode
-    It is truncated after 50 steps of 0.04 s. Nothing terminates it.
+    Truncated after 50 steps of 0.04 s; never terminated.
 
     ## Info
     `distance`: d [m]. `is_success`: whether it is at most 0.02 m.
@@ -69,11 +69,9 @@ class ReachInSpace(Task):
         self.target = CENTRE
 
     def action_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.actions(6)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.numbers(15)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
@@ -91,13 +89,12 @@ class ReachInSpace(Task):
         )
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, tuple[float, ...]]:
-        """Moves the set-points on, within the joints' ranges."""
+        """Moves the set-points, within the joints' ranges."""
         moves = STEP * action
         wanted = np.clip(np.add(set_points(state), moves), np.negative(RANGES), RANGES)
         return {"arm_controller": tuple(wanted.tolist())}
 
     def observe(self, state: WorldState) -> np.ndarray:
-        """See the class."""
         tip = state.links["tip"].pose.position
         way = [(there - here) / 0.5 for here, there in zip(tip, self.target, strict=True)]
         seen = [
@@ -109,13 +106,11 @@ class ReachInSpace(Task):
         return np.array(seen, np.float32)
 
     def reward(self, state: WorldState, action: np.ndarray) -> float:
-        """See the class."""
         away = self._away(state)
         effort = float(np.square(action).mean())
         return -2.0 * away + math.exp(-((away / CLOSE) ** 2)) - 0.02 * effort
 
     def info(self, state: WorldState) -> dict[str, Any]:
-        """See the class."""
         away = self._away(state)
         return {"distance": away, "is_success": away <= CLOSE}
 
@@ -124,5 +119,5 @@ class ReachInSpace(Task):
 
 
 def set_points(state: WorldState) -> tuple[float, ...]:
-    """Where the joints are told to be [rad]."""
+    """The set-points of the joints [rad]."""
     return state.commands["arm_controller"]

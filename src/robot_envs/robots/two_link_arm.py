@@ -44,20 +44,20 @@ class Reach(Task):
     |---|---|---|
     | 0 to 3 | cosine and sine of the shoulder's angle, of the elbow's | 1 |
     | 4, 5 | speed of shoulder and elbow | 3 rad/s |
-    | 6, 7 | where the tip is, (x, y) from the shoulder | 0.5 m |
-    | 8, 9 | the way from there to the target, (x, y) | 0.5 m |
-    | 10, 11 | the same, cut off at 1 | 0.05 m |
+    | 6, 7 | position of the tip from the shoulder, (x, y) | 0.5 m |
+    | 8, 9 | from the tip to the target, (x, y) | 0.5 m |
+    | 10, 11 | the same, clipped at 1 | 0.05 m |
 
     ## Rewards
-    -2 d + exp(-(d / 0.02)²) - 0.02 |action|², with the distance d [m] of the tip from the target when the
-    step is over: at most 1, which is for being there at rest.
+    -2 d + exp(-(d / 0.02)²) - 0.02 |action|², where d is the distance of the tip from the target after the
+    step [m]: at most 1, for resting at the target.
 
     ## Start of an episode
     Shoulder within -2.4 and 1.6 rad, elbow within 0.2 and 2.4 rad, at rest. The target is 0.2 to 0.5 m away
     from the shoulder, up to a right angle to either side; each point of that is as likely as any other.
 
     ## End of an episode
-    It is truncated after 50 steps of 0.04 s. Nothing terminates it.
+    Truncated after 50 steps of 0.04 s; never terminated.
 
     ## Info
     `distance`: d [m]. `is_success`: whether it is at most 0.02 m.
@@ -70,11 +70,9 @@ class Reach(Task):
         self.target = (FURTHEST, 0.0)
 
     def action_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.actions(2)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.numbers(12)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
@@ -83,11 +81,9 @@ class Reach(Task):
         return draw_pose(rng)
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, float]:
-        """The speeds of both joints."""
         return speeds(action)
 
     def observe(self, state: WorldState) -> np.ndarray:
-        """See the class."""
         here = tip(state)
         way = [aim - at for aim, at in zip(self.target, here, strict=True)]
         near = [max(-1.0, min(1.0, each / NEAR)) for each in way]
@@ -95,13 +91,11 @@ class Reach(Task):
         return np.array(seen, np.float32)
 
     def reward(self, state: WorldState, action: np.ndarray) -> float:
-        """See the class."""
         away = self._away(state)
         effort = float(np.square(action).sum())
         return -2.0 * away + math.exp(-((away / CLOSE) ** 2)) - 0.02 * effort
 
     def info(self, state: WorldState) -> dict[str, Any]:
-        """See the class."""
         away = self._away(state)
         return {"distance": away, "is_success": away <= CLOSE}
 
@@ -121,8 +115,8 @@ class ReachGoal(GoalTask):
     | key | space | what it is | unit |
     |---|---|---|---|
     | `observation` | `Box((6,))` | cosine and sine of shoulder and elbow; their speeds | 1; 3 rad/s |
-    | `achieved_goal` | `Box(-10, 10, (2,))` | where the tip is, (x, y) from the shoulder | 0.1 m |
-    | `desired_goal` | `Box(-10, 10, (2,))` | where it shall be | 0.1 m |
+    | `achieved_goal` | `Box(-10, 10, (2,))` | position of the tip from the shoulder, (x, y) | 0.1 m |
+    | `desired_goal` | `Box(-10, 10, (2,))` | where it should be | 0.1 m |
 
     ## Rewards
     0 if the tip is within 0.02 m of the goal when the step is over, else -1.
@@ -131,7 +125,7 @@ class ReachGoal(GoalTask):
     The arm's pose and the goal are drawn as in `Reach`.
 
     ## End of an episode
-    It is truncated after 50 steps of 0.04 s. Nothing terminates it.
+    Truncated after 50 steps of 0.04 s; never terminated.
 
     ## Info
     `is_success`: whether the tip is there.
@@ -141,11 +135,9 @@ class ReachGoal(GoalTask):
     query = StateQuery(links=(LinkQuery("tip"),))
 
     def action_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.actions(2)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        """See the class."""
         return spaces.numbers(6)
 
     def goals(self) -> gymnasium.spaces.Box:
@@ -153,7 +145,6 @@ class ReachGoal(GoalTask):
         return gymnasium.spaces.Box(-10.0, 10.0, (2,), np.float32)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
-        """Draws a pose."""
         return draw_pose(rng)
 
     def goal(self, rng: np.random.Generator, state: WorldState) -> np.ndarray:
@@ -161,15 +152,12 @@ class ReachGoal(GoalTask):
         return np.array(draw_target(rng), np.float32) / np.float32(GOAL_UNIT)
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, float]:
-        """The speeds of both joints."""
         return speeds(action)
 
     def observe(self, state: WorldState) -> np.ndarray:
-        """See the class."""
         return np.array(joints(state), np.float32)
 
     def achieved(self, state: WorldState) -> np.ndarray:
-        """Where the tip is [0.1 m]."""
         return np.array(tip(state), np.float32) / np.float32(GOAL_UNIT)
 
     def is_success(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
@@ -191,7 +179,7 @@ def draw_target(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def speeds(action: np.ndarray) -> dict[str, float]:
-    """What the controllers are told [rad/s]."""
+    """The commands of the controllers [rad/s]."""
     shoulder, elbow = action * FASTEST
     return {"shoulder_controller": float(shoulder), "elbow_controller": float(elbow)}
 
@@ -210,6 +198,6 @@ def joints(state: WorldState) -> list[float]:
 
 
 def tip(state: WorldState) -> tuple[float, float]:
-    """Where the tip is in the plane, (x, y) [m]."""
+    """Position of the tip in the plane, (x, y) [m]."""
     x, y, _ = state.links["tip"].pose.position
     return x, y

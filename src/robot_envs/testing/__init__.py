@@ -1,4 +1,4 @@
-"""What every environment of robots promises, as one call for a test of one's own.
+"""The conformance suite of robot environments, as one call for your own tests.
 
 from robot_envs.testing import check_robot_env
 

@@ -45,7 +45,7 @@ def observations(subject: Subject) -> None:
 
 
 def observations_are_new(subject: Subject) -> None:
-    """What was observed doesn't change behind the learner's back."""
+    """An observation doesn't change with later steps."""
     with subject.made() as env:
         env.action_space.seed(2)
         first, _ = env.reset(seed=2)
@@ -58,7 +58,7 @@ def observations_are_new(subject: Subject) -> None:
 
 
 def ends(subject: Subject) -> None:
-    """An episode is cut off after `max_steps`, which isn't its own end; behind an end there is no step."""
+    """An episode is truncated after `max_steps`, and not terminated by that; no step follows an end."""
     with subject.made(max_steps=1) as env:
         action = env.action_space.sample()
         cut = False
@@ -77,7 +77,7 @@ def ends(subject: Subject) -> None:
 
 
 def beginnings(subject: Subject) -> None:
-    """No step before a reset; and the options of a reset do what they say."""
+    """No step precedes the first reset; a reset's options work."""
     with subject.made() as env:
         action = env.action_space.sample()
         first = "step() before the first reset()"
@@ -97,7 +97,7 @@ def beginnings(subject: Subject) -> None:
 
 
 def wrong_actions(subject: Subject) -> None:
-    """An action that isn't of the space is refused, and moves nothing."""
+    """An action outside the space is refused, and moves nothing."""
     with subject.made() as env:
         env.action_space.seed(3)
         actions = [env.action_space.sample() for _ in range(4)]
@@ -120,7 +120,7 @@ def _given(env: Any, actions: list[Any], wrong: list[Any]) -> list[tuple[Any, ..
 
 
 def _wrong(space: gymnasium.Space[Any]) -> list[Any]:
-    """Actions that aren't of a space."""
+    """Actions outside a space."""
     wrong: list[Any] = [None, "1", float("nan")]
     if isinstance(space, gymnasium.spaces.Discrete):
         return [*wrong, int(space.start) - 1, int(space.start + space.n), np.zeros(2)]
@@ -144,7 +144,7 @@ def closed(subject: Subject) -> None:
 
 
 def wrong_options(subject: Subject) -> None:
-    """An option that doesn't exist, and a control period of broken physics steps, are refused."""
+    """An unknown option, and a control period of fractional physics steps, are refused."""
     for options in ({"no_such_option": 1}, {"control_period": 0.00123}):
 
         def make(options: dict[str, Any] = options) -> None:
@@ -156,7 +156,7 @@ def wrong_options(subject: Subject) -> None:
 
 
 def pictures(subject: Subject) -> None:
-    """Pictures have the size that was asked for, and change as the robot moves."""
+    """Pictures have the requested size, and change as the robot moves."""
     with subject.made(render_mode="rgb_array", width=96, height=64) as env:
         env.action_space.seed(4)
         env.reset(seed=4)
@@ -176,11 +176,11 @@ def pictures(subject: Subject) -> None:
         raise AssertionError(f"pictures of {subject.steps} steps are all the same")
 
 
-CLOSE = 1e-9  # between a reward and the same one among others
+CLOSE = 1e-9  # relative difference between a reward alone and in a batch
 
 
 def goals(subject: Subject) -> None:
-    """Goals lie in their space; rewards are those of `compute_reward`, one by one and all at once."""
+    """Goals are in their space; rewards are those of `compute_reward`, one by one and all at once."""
     with subject.made() as env:
         if not isinstance(env.task, GoalTask):
             expect(
@@ -231,7 +231,7 @@ def _check_all_at_once(env: Any, given: list[Any]) -> None:
 
 
 def _check_own_goal(env: Any) -> None:
-    """A goal that a user asks for is the episode's, unless it can't be."""
+    """A requested goal is the episode's, unless it is impossible."""
     wanted = env.task.goals().sample()
     seen, _ = env.reset(seed=6, options={"goal": wanted})
     expect(

@@ -1,4 +1,4 @@
-"""Checks that what an environment gives can be had again: by seed, elsewhere, and beside others."""
+"""Checks that an environment repeats itself: by seed, in other instances, backends and vectors."""
 
 import copy
 import pickle
@@ -16,7 +16,7 @@ TRIES = 20  # actions, to find another one
 
 
 def seeding(subject: Subject) -> None:
-    """The same seed and actions give the same bits: again, after other episodes, and in another instance."""
+    """The same seed and actions are bit-identical: again, after other episodes, in another instance."""
     with subject.made() as env:
         if not env.backend.deterministic:
             expect(
@@ -36,7 +36,7 @@ def seeding(subject: Subject) -> None:
 
 
 def two_phases(subject: Subject) -> None:
-    """A step that is begun first gives the same bits; a reset drops it, and no other action takes it."""
+    """`begin_step` changes no bit; a reset drops the step, and no other action takes it."""
     with subject.made() as env:
         first = rollout(env, subject.steps, SEED)
         env.reset(seed=SEED)
@@ -61,7 +61,7 @@ def _samples(env: gymnasium.Env[Any, Any]) -> Iterator[Any]:
 
 
 def backends(subject: Subject, other: Subject) -> None:
-    """Two backends give the same bits."""
+    """Two backends are bit-identical."""
     runs = []
     for each in (subject, other):
         with each.made() as env:
@@ -71,7 +71,7 @@ def backends(subject: Subject, other: Subject) -> None:
 
 
 def specification(subject: Subject) -> None:
-    """What it was made of can be copied, sent to other processes, and made again."""
+    """The spec can be copied, pickled, and made again."""
     if subject.identifier is None:
         return
     with subject.made() as env:
@@ -93,7 +93,7 @@ def specification(subject: Subject) -> None:
 
 
 def vectors(subject: Subject) -> None:
-    """Several in a vector give what each gives alone."""
+    """Environments in a vector are bit-identical to environments alone."""
     alone = []
     for index in range(WORLDS):
         with subject.made() as env:
@@ -136,7 +136,7 @@ def _vectors(subject: Subject) -> list[tuple[VectorEnv, str]]:
 
 
 def _run(env: gymnasium.Env[Any, Any], index: int, steps: int) -> list[Any]:
-    """Observations and results of one alone; the step behind an end begins anew, as in a vector."""
+    """Results of one environment alone; the step after an end is a reset, as in a vector."""
     env.action_space.seed(SEED)
     given: list[Any] = [env.reset(seed=SEED + index)[0]]
     ended = False
@@ -152,7 +152,7 @@ def _run(env: gymnasium.Env[Any, Any], index: int, steps: int) -> list[Any]:
 
 
 def _run_all(vector: VectorEnv, steps: int) -> list[list[Any]]:
-    """The same of all in a vector."""
+    """The same for all environments of a vector."""
     space = vector.single_action_space
     space.seed(SEED)
     seen, _ = vector.reset(seed=SEED)

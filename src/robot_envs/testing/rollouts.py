@@ -16,7 +16,7 @@ Make = Callable[..., gymnasium.Env[Any, Any]]
 
 @dataclass(frozen=True)
 class Subject:
-    """An environment to check.
+    """An environment under test.
 
     Args:
         make: makes one, from options.
@@ -34,7 +34,7 @@ class Subject:
 
     @contextlib.contextmanager
     def made(self, **options: Any) -> Iterator[RobotEnv]:
-        """A new one, without wrappers, which is closed in the end."""
+        """Makes one without wrappers, and closes it in the end."""
         env = self.make(**{**self._all_options, **options}).unwrapped
         try:
             expect(isinstance(env, RobotEnv), f"it is {env!r}, and no robot_envs.RobotEnv")
@@ -52,25 +52,18 @@ class Subject:
 
 
 def expect(right: bool, otherwise: str) -> None:
-    """Holds a promise against what was seen.
-
-    Raises:
-        AssertionError: with that text, if it isn't kept.
-    """
+    """Raises AssertionError with a text unless something is right."""
     if not right:
         raise AssertionError(otherwise)
 
 
 def expect_error(call: Callable[[], Any], what: str, *kinds: type[Exception]) -> None:
-    """Holds a promise to refuse something against what a call does.
+    """Raises AssertionError unless a call raises an error of some kinds.
 
     Args:
-        call: what is to be refused.
-        what: the call, in words.
+        call: should be refused.
+        what: describes the call, for the error.
         kinds: of errors that are right.
-
-    Raises:
-        AssertionError: if it raises nothing, or something else.
     """
     wanted = " or ".join(kind.__name__ for kind in kinds)
     try:
@@ -86,7 +79,7 @@ def expect_error(call: Callable[[], Any], what: str, *kinds: type[Exception]) ->
 
 
 Given = list[tuple[Any, ...]]
-"""What `reset` and `step` have returned, one after the other."""
+"""Results of `reset` and `step`, in order."""
 
 PARTS = {
     2: ("the observation", "the info"),
@@ -95,13 +88,13 @@ PARTS = {
 
 
 def rollout(env: gymnasium.Env[Any, Any], steps: int, seed: int, two_phases: bool = False) -> Given:
-    """All that an environment gives for seeded random actions; episodes follow one another.
+    """Results of an environment for seeded random actions; episodes follow one another.
 
     Args:
         env: the environment.
         steps: number of actions.
         seed: of the first episode, and of the actions.
-        two_phases: begin each step before it is taken.
+        two_phases: call `begin_step` before each step.
     """
     env.action_space.seed(seed)
     given: Given = [env.reset(seed=seed)]
@@ -116,7 +109,7 @@ def rollout(env: gymnasium.Env[Any, Any], steps: int, seed: int, two_phases: boo
 
 
 def differences(one: Given, other: Given) -> str:
-    """Where the bits of two rollouts differ first, in words; empty: nowhere."""
+    """The first difference of two rollouts, in words; empty if they are bit-identical."""
     for at, (first, second) in enumerate(zip(one, other, strict=False)):
         steps = sum(len(each) == 5 for each in one[: at + 1])
         when = f"step {steps}" if len(first) == 5 else f"the reset after {steps} steps"
@@ -129,13 +122,15 @@ def differences(one: Given, other: Given) -> str:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Whether two things have the same bits: arrays, numbers, and containers of them."""
+    """Whether two values are bit-identical: arrays, numbers, and containers of them."""
     if type(one) is not type(other):
         return False
     if isinstance(one, np.ndarray):
         fits = one.dtype == other.dtype and one.shape == other.shape
         return fits and (
-            one.tolist() == other.tolist() if one.dtype == object else _bits(one, other)
+            one.tolist() == other.tolist()
+            if one.dtype == object
+            else one.tobytes() == other.tobytes()
         )
     if isinstance(one, Mapping):
         return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
@@ -144,12 +139,8 @@ def same(one: Any, other: Any) -> bool:
     return bool(one == other) or (isinstance(one, float) and math.isnan(one) and math.isnan(other))
 
 
-def _bits(one: np.ndarray, other: np.ndarray) -> bool:
-    return one.tobytes() == other.tobytes()
-
-
 def outside(space: gymnasium.Space[Any], value: Any) -> str:
-    """Why a value isn't of a space, in words; empty: it is."""
+    """Why a value isn't in a space, in words; empty if it is."""
     if space.contains(value):
         return ""
     if isinstance(space, gymnasium.spaces.Dict) and isinstance(value, Mapping):

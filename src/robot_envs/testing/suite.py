@@ -1,4 +1,4 @@
-"""The conformance suite: all checks, over all backends, told together."""
+"""The conformance suite: runs all checks over all backends, and reports all faults together."""
 
 import contextlib
 import warnings
@@ -13,7 +13,7 @@ from robot_envs.testing import episodes, repetition
 from robot_envs.testing.rollouts import Make, Subject, expect
 
 STEPS = 100
-# What Gymnasium's checker says of robots whose places have no bounds, and of those that have no id.
+# Warnings of Gymnasium's checker for observations without bounds, and environments without an id.
 FINE = ("space minimum value is -infinity", "space maximum value is infinity", "not having a spec")
 
 
@@ -24,15 +24,14 @@ def check_robot_env(
     options: dict[str, Any] | None = None,
     steps: int = STEPS,
 ) -> None:
-    """Checks that an environment keeps what environments of robots promise.
+    """Checks that an environment does what environments of this library promise.
 
-    Over each backend: observations lie in their space and are finite, flags are plain, the same seed and
-    actions give the same bits (again, after other episodes, in another instance, with steps that are begun
-    before they are taken, over every backend but real time), wrong actions and options are refused and
-    move nothing, an episode is cut off apart from its end, reset knows its options, spec can be copied and
-    sent, pictures show what moves, a closed environment says so, goals have rewards that agree, and
-    Gymnasium's own checker has nothing to say. In this process also: vectors give what each gives
-    alone.
+    Over each backend: observations are in their space and finite; flags are plain bools; the same seed and
+    actions are bit-identical (again, after other episodes, in another instance, with `begin_step`, and over
+    every backend but real time); wrong actions and options are refused and move nothing; truncation isn't
+    termination; reset knows its options; the spec can be copied and pickled; pictures show motion; a closed
+    environment says so; rewards of goals agree; and Gymnasium's own checker finds nothing. In this process
+    also: vectors are bit-identical to environments alone.
 
     Args:
         env: an id, "my_arm/Reach-v0" or "my_module:my_arm/Reach-v0"; or a function that makes an
@@ -42,7 +41,7 @@ def check_robot_env(
         steps: of each rollout.
 
     Raises:
-        AssertionError: lists what isn't kept, and errors of the environment's own; a line each.
+        AssertionError: lists broken promises and the environment's own errors, a line each.
     """
     if isinstance(env, str):
         identifier = env
@@ -58,11 +57,11 @@ def check_robot_env(
     for backend in backends:
         over = subject.over(backend)
         for check in CHECKS:
-            _hold(check, f"over {backend}", faults, over)
+            _run(check, f"over {backend}", faults, over)
         if backend in same[1:]:
-            _hold(repetition.backends, f"over {backend}", faults, subject.over(same[0]), over)
+            _run(repetition.backends, f"over {backend}", faults, subject.over(same[0]), over)
     if IN_PROCESS in backends:
-        _hold(repetition.vectors, "in this process", faults, subject)
+        _run(repetition.vectors, "in this process", faults, subject)
     if faults:
         listed = "".join(f"\n- {each}" for each in faults)
         others = (each for each in faults.values() if not isinstance(each, AssertionError))
@@ -72,20 +71,20 @@ def check_robot_env(
 
 
 def gymnasiums_checker(subject: Subject) -> None:
-    """Gymnasium's own checker has nothing to say, and nothing warns."""
-    with _warnings() as told, subject.made() as env:
+    """Gymnasium's own checker finds nothing, and nothing warns."""
+    with _warnings() as texts, subject.made() as env:
         check_env(env)
-    expect(not told, f"Gymnasium's checker warns: {' '.join(told)}")
+    expect(not texts, f"Gymnasium's checker warns: {' '.join(texts)}")
 
 
 @contextlib.contextmanager
 def _warnings() -> Iterator[list[str]]:
-    """Texts of those in it; rospy warns of Python's renamed methods, in threads of its own."""
-    told: list[str] = []
+    """Collects warnings, except rospy's about renamed methods of Python, from its own threads."""
+    texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        yield told
-    told += [
+        yield texts
+    texts += [
         str(each.message)
         for each in caught
         if "/rospy/" not in each.filename and not any(text in str(each.message) for text in FINE)
@@ -109,10 +108,10 @@ CHECKS: tuple[Callable[[Subject], None], ...] = (
 )
 
 
-def _hold(
+def _run(
     check: Callable[..., None], where: str, faults: dict[str, Exception], *subjects: Subject
 ) -> None:
-    """Carries out a check; what it finds, or runs into, joins the faults."""
+    """Runs a check, and adds its failure or error to the faults."""
     name = f"{check.__name__.replace('_', ' ')} ({where})"
     try:
         check(*subjects)

@@ -2,14 +2,13 @@
 
 | module | what it does |
 |---|---|
-| variation.py | what can differ of a robot |
-| randomisation.py | draws that for each episode, from options.py, by the names of parts.py |
-| applying.py | changes a robot, wherever it moves, and gives it back as it was found |
-| inertia.py | what becomes of a link's figures |
-| sensing.py | what is measured: noise, encoders, delay |
-| actuation.py | what becomes of commands: delay, limits, lag |
+| variation.py | what may differ from a robot as it was made |
+| randomisation.py | draws that for each episode, from options |
+| parts.py | links, joints and controllers by the names that options have for them |
+| applying.py | varies robots on any backend, and restores them |
+| imperfections.py | sensors: noise, encoders, delay; actuators: delay, limits, lag |
 
-Nothing in here knows ROS or a simulator: the same bits on all backends.
+Nothing here knows ROS or a simulator: all backends are bit-identical.
 """
 
 from robot_envs.variation.variation import LinkScale, Randomisation, Variation

@@ -1,4 +1,4 @@
-"""Changes robots as a variation says, in one order on all backends, and gives them back as found."""
+"""Applies variations to robots, in one order on all backends, and restores the robots afterwards."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol
@@ -10,14 +10,14 @@ from robot_envs.variation.parts import Parts, RobotPart
 from robot_envs.variation.variation import Variation, scaled
 
 
-class JointFigures(NamedTuple):
-    """Viscous [N s/m, N m s/rad] and dry [N, N m] friction of a joint; None: it stays as it is."""
+class JointFriction(NamedTuple):
+    """Viscous [N s/m, N m s/rad] and dry [N, N m] friction of a joint; None: unchanged."""
 
     damping: float | None = None
     friction: float | None = None
 
 
-class PidFigures(NamedTuple):
+class PidGains(NamedTuple):
     """Gains of a PID: p, i, d [command per error, per error s, s per error]."""
 
     p: float
@@ -26,108 +26,104 @@ class PidFigures(NamedTuple):
 
 
 class Changeable(Protocol):
-    """Reads and changes what a variation may name, in the world that the robots move in.
-
-    Raises:
-        SimulatorError: by each of them, if the world refuses, or doesn't answer.
-    """
+    """A world whose robots can be varied; each method raises SimulatorError if the world refuses."""
 
     def link(self, link: RobotPart) -> Inertia:
-        """What a link has now."""
+        """A link's present inertia."""
         ...
 
     def set_link(self, link: RobotPart, inertia: Inertia) -> None:
-        """Gives a link other figures; its axes stay."""
+        """Changes a link's inertia; its axes stay."""
         ...
 
-    def set_joint(self, joint: RobotPart, figures: JointFigures) -> None:
-        """Gives a joint other figures."""
+    def set_joint(self, joint: RobotPart, friction: JointFriction) -> None:
+        """Changes a joint's friction."""
         ...
 
     def set_surface(self, link: RobotPart, factor: float) -> None:
-        """Gives a link's surfaces so many times the friction of their file."""
+        """Multiplies the friction of a link's surfaces, as its file has it."""
         ...
 
-    def pids(self, controller: RobotPart) -> Mapping[str, PidFigures]:
-        """The gains of a controller's PIDs now, by their place below the controller."""
+    def pids(self, controller: RobotPart) -> Mapping[str, PidGains]:
+        """The present gains of a controller's PIDs, by their place below the controller."""
         ...
 
-    def set_pid(self, controller: RobotPart, place: str, gains: PidFigures) -> None:
-        """Gives a PID other gains."""
+    def set_pid(self, controller: RobotPart, place: str, gains: PidGains) -> None:
+        """Changes a PID's gains."""
         ...
 
     def gravity(self) -> Vector:
-        """The world's now [m/s²]."""
+        """The world's present gravity [m/s²]."""
         ...
 
     def set_gravity(self, gravity: Vector) -> None:
-        """Gives the world another one [m/s²]."""
+        """Changes the world's gravity [m/s²]."""
         ...
 
 
 class Applier:
-    """Applies variations to robots as they were found; what their files alone tell is taken from those.
+    """Applies variations to robots as they were found.
+
+    What the world doesn't report, a joint's own friction, is taken from the robot's file.
 
     Args:
         scene: the robots.
-        world: what they are in.
+        world: in which they are.
     """
 
     def __init__(self, scene: Scene, world: Changeable) -> None:
         self._scene, self._world = scene, world
-        self._parts: Parts | None = None  # None: there was nothing to vary yet
+        self._parts: Parts | None = None  # None: nothing was varied yet
         self._last = Variation()
-        self._links: dict[str, Inertia] = {}
-        self._pids: dict[str, Mapping[str, PidFigures]] = {}
+        self._links: dict[str, Inertia] = {}  # as they were found, like the following
+        self._pids: dict[str, Mapping[str, PidGains]] = {}
         self._gravity: Vector | None = None
 
     def __call__(self, variation: Variation) -> None:
-        """Gives the robots their own figures, with what the variation says.
+        """Applies a variation to the robots as they were found.
 
         Raises:
-            SimulatorError: for a name that isn't there, or if the world refuses.
+            SimulatorError: for an unknown name, or if the world refuses.
         """
         if self._parts is None and variation.is_nominal:
             return
         parts = self._parts = self._parts or Parts(self._scene)
         links = {name: parts.link(name) for name in (*variation.links, *variation.surfaces)}
         joints = {name: parts.joint(name) for name in (*variation.damping, *variation.friction)}
-        tuned = {name: parts.controller(name) for name in variation.gains}
+        controllers = {name: parts.controller(name) for name in variation.gains}
         self._last = variation  # all names are known: from here on there is something to undo
         for name, difference in variation.links.items():
             if name not in self._links:
                 self._links[name] = self._world.link(links[name])
             self._world.set_link(links[name], scaled(self._links[name], difference))
         for name, joint in joints.items():
-            self._rub(name, joint, variation)
+            self._set_friction(name, joint, variation)
         for name, factor in variation.surfaces.items():
             self._world.set_surface(links[name], factor)
-        for name, controller in tuned.items():
-            self._tune(name, controller, variation.gains[name])
+        for name, controller in controllers.items():
+            self._scale_gains(name, controller, variation.gains[name])
         if variation.gravity is not None:
             if self._gravity is None:
                 self._gravity = self._world.gravity()
             self._world.set_gravity(scale(self._gravity, variation.gravity))
 
-    def _rub(self, name: str, joint: RobotPart, variation: Variation) -> None:
-        own = joint.robot.links.joints[joint.name]  # Gazebo's services don't tell it
+    def _set_friction(self, name: str, joint: RobotPart, variation: Variation) -> None:
+        own = joint.robot.links.joints[joint.name]  # Gazebo's services don't report it
         damping, friction = variation.damping.get(name), variation.friction.get(name)
-        self._world.set_joint(
-            joint,
-            JointFigures(
-                None if damping is None else own.damping + damping,
-                None if friction is None else own.friction + friction,
-            ),
+        wanted = JointFriction(
+            None if damping is None else own.damping + damping,
+            None if friction is None else own.friction + friction,
         )
+        self._world.set_joint(joint, wanted)
 
-    def _tune(self, name: str, controller: RobotPart, factor: float) -> None:
+    def _scale_gains(self, name: str, controller: RobotPart, factor: float) -> None:
         if name not in self._pids:
             self._pids[name] = self._world.pids(controller)
         for place, gains in self._pids[name].items():
-            self._world.set_pid(controller, place, PidFigures(*(factor * gain for gain in gains)))
+            self._world.set_pid(controller, place, PidGains(*(factor * gain for gain in gains)))
 
     def undo(self) -> None:
-        """Gives the robots their own figures back, if they were changed.
+        """Restores the robots as they were found, if they were varied.
 
         Raises:
             SimulatorError: if the world refuses.

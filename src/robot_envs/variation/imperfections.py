@@ -12,7 +12,7 @@ from robot_envs.world_state import Joints, JointState, WorldState
 
 
 def is_number(value: Any) -> bool:
-    """Whether it is a finite number, also one of NumPy's; True and False are none."""
+    """Whether it is a finite number, Python's or NumPy's, and no bool."""
     if isinstance(value, bool):
         return False
     try:
@@ -24,17 +24,17 @@ def is_number(value: Any) -> bool:
 def by_name(
     option: str, given: Any, names: Sequence[str], kind: str, which: str = ""
 ) -> dict[str, Any]:
-    """What is given for each of `names`, unchecked; without those that a mapping leaves out.
+    """An option's values by name, unchecked; a mapping may leave names out.
 
     Args:
-        option: whose, for the error text.
-        given: one for all, or a mapping by name.
-        names: that there are.
-        kind: what has them: "joint", "controller".
-        which: which of them: "that moves".
+        option: its name, for the error.
+        given: one value for all, or a mapping by name.
+        names: that exist.
+        kind: what has these names, for the error: "joint", "controller".
+        which: more about that, for the error: "that moves".
 
     Raises:
-        ValueError: for a name that isn't there, with the nearest one.
+        ValueError: for an unknown name, with the nearest one.
     """
     if not isinstance(given, Mapping):
         return dict.fromkeys(names, given)
@@ -46,22 +46,14 @@ def by_name(
 
 
 def at_least_zero(option: str, given: Any) -> float:
-    """A number that may be 0.
-
-    Raises:
-        ValueError: for anything else.
-    """
+    """A finite number >= 0; raises ValueError for anything else."""
     if not is_number(given) or given < 0.0:
         raise ValueError(f"{option} must be a number >= 0, not {given!r}")
     return float(given)
 
 
 def steps(option: str, given: Any, most: int) -> int:
-    """A number of control steps.
-
-    Raises:
-        ValueError: for anything else.
-    """
+    """A number of control steps; raises ValueError for anything else."""
     if not is_number(given) or not 0 <= given <= most or given != int(given):
         raise ValueError(
             f"{option} must be a number of control steps from 0 to {most}, not {given!r}"
@@ -80,7 +72,7 @@ class Encoder(NamedTuple):
     Args:
         noise: standard deviation of a position [rad, m].
         rate_noise: standard deviation of a velocity [rad/s, m/s].
-        step: between two positions that the encoder can tell [rad, m]; 0: it tells them all.
+        step: resolution of positions [rad, m]; 0: exact.
     """
 
     noise: float = 0.0
@@ -88,29 +80,29 @@ class Encoder(NamedTuple):
     step: float = 0.0
 
     def rounded(self, position: float) -> float:
-        """The position that it tells."""
+        """The position that the encoder measures."""
         return round(position / self.step) * self.step if self.step else position
 
 
 class Sensor:
-    """Measures the joints. What else a state tells is as it was, and as late, but for the commands.
+    """Measures the joints, with noise, rounding and delay. The rest of a state is delayed alone, but for the
+    commands, which are the present ones.
 
-    A joint with an `encoder_step` has a velocity that its driver takes from two positions: their difference
-    over the control period. It is a multiple of step / period, and its only noise is that of the positions.
+    The velocity of a joint with an `encoder_step` is the difference of two measured positions over the
+    control period, as drivers compute it: a multiple of step / period, without noise of its own.
 
     Args:
         joints: their names.
         period: of control [s].
         noise: standard deviation of the normal noise on positions and velocities [m, m/s, rad, rad/s]: a
-            number, or a pair (position, velocity), for all joints, or by joint. It is drawn for all of
-            them, first for those of a mapping, in its order. Noise of a joint with steps comes before they
-            are taken.
-        delay: how many control steps old a measurement is. Before there are any so old, it is the one of
-            the episode's start.
-        encoder_step: between two positions that are told [rad, m]: one for all joints, or by joint; 0: none.
+            number, or a pair (position, velocity), for all joints, or by joint. It is drawn for all joints,
+            those of a mapping first, in its order, and added before an encoder rounds.
+        delay: age of a measurement [control steps]; until there are any so old, the episode's first is
+            repeated.
+        encoder_step: resolution of positions [rad, m]: one for all joints, or by joint; 0: exact.
 
     Raises:
-        ValueError: for a number that makes no sense, or a joint that isn't there.
+        ValueError: for an impossible number, or an unknown joint.
     """
 
     def __init__(
@@ -133,11 +125,11 @@ class Sensor:
         self._is_noisy = any(map(any, sizes.values()))
         self._distorts = self._is_noisy or any(notches.values())
         self._seen: deque[WorldState] = deque(maxlen=steps("sensor_delay", delay, MOST_DELAY) + 1)
-        self._before: dict[str, float] = {}  # positions of joints with steps
+        self._before: dict[str, float] = {}  # measured positions of joints with encoder steps
 
     @property
     def is_exact(self) -> bool:
-        """Whether the truth is measured, at once."""
+        """Whether it measures the true state, without delay."""
         return not self._distorts and self._seen.maxlen == 1
 
     def begin(self, state: WorldState, rng: np.random.Generator) -> WorldState:
@@ -160,22 +152,22 @@ class Sensor:
             position, velocity, effort = joints[name]
             position += encoder.noise * error
             if encoder.step:
-                position, velocity = self._told(name, encoder, position, velocity)
+                position, velocity = self._measured(name, encoder, position, velocity)
             else:
                 velocity += encoder.rate_noise * rate_error
             joints[name] = JointState(position, velocity, effort)
         return state._replace(joints=joints)
 
-    def _told(
+    def _measured(
         self, name: str, encoder: Encoder, position: float, velocity: float
     ) -> tuple[float, float]:
-        """What an encoder tells; before an episode a joint has moved as it does at its start."""
-        told = encoder.rounded(position)
+        """What an encoder measures; before its start an episode's joints are taken to have moved steadily."""
+        measured = encoder.rounded(position)
         before = self._before.get(name)
         if before is None:
             before = encoder.rounded(position - velocity * self._period)
-        self._before[name] = told
-        return told, (told - before) / self._period
+        self._before[name] = measured
+        return measured, (measured - before) / self._period
 
 
 def _pair(option: str, given: Any) -> tuple[float, float]:
@@ -197,27 +189,27 @@ def _step(given: Any) -> float:
 Commands = dict[str, Any]
 """By controller: a number, or for a group a tuple of them [m, rad, m/s, rad/s, N, N m]."""
 Rule = Callable[[float, float, float], float]
-"""What becomes of a number: of how much there is of it, what is wanted, and what was there before."""
+"""From a parameter, the number that is wanted, and the one before: the number that is reached."""
 Rules = dict[str, tuple[Rule, float]]
 
 
 class Actuator:
     """Between a task's commands and the controllers: first the delay, then the limit, then the lag.
 
-    Commands are numbers here, not angles: a set-point that jumps from pi to -pi passes 0.
+    Angles are treated as plain numbers: a set-point that jumps from pi to -pi passes 0.
 
     Args:
-        holds: by controller, whether it takes positions; others take velocities or efforts.
+        holds: whether a controller takes positions, or else velocities or efforts, by its name.
         period: of control [s].
-        delay: how many control steps pass before a command arrives. Until the first one does, controllers
-            hold what they held at the episode's start.
-        limit: one for all, or by controller. Efforts [N, N m] and velocities [m/s, rad/s] are cut at it,
-            either way; positions follow no faster than that [m/s, rad/s].
-        lag: time constant of a first-order lag [s]: one for all, or by controller; 0: none. For a control
-            period a controller gets what the lag comes to at its end: 1 - exp(-t / lag) of a step.
+        delay: how many control steps pass before a command arrives; until then controllers hold what they
+            held at the episode's start.
+        limit: one for all, or by controller. Efforts [N, N m] and velocities [m/s, rad/s] are clipped to it,
+            either way; positions move no faster than that [m/s, rad/s].
+        lag: time constant of a first-order lag [s]: one for all, or by controller; 0: none. During a control
+            period a controller gets what the lag reaches at its end: 1 - exp(-t / lag) of a step.
 
     Raises:
-        ValueError: for a number that makes no sense, or a controller that isn't there.
+        ValueError: for an impossible number, or an unknown controller.
     """
 
     def __init__(
@@ -247,7 +239,7 @@ class Actuator:
 
     @property
     def is_ideal(self) -> bool:
-        """Whether commands arrive as they are, at once."""
+        """Whether commands arrive unchanged, without delay."""
         return not (self._delay or self._limits or self._lags)
 
     def begin(self, held: Mapping[str, Any]) -> None:
@@ -261,10 +253,10 @@ class Actuator:
         self._limited, self._reached = dict(held), dict(held)
 
     def __call__(self, commands: Mapping[str, Any]) -> Commands:
-        """What arrives at the controllers in a control period.
+        """Returns the commands that reach the controllers in a control period.
 
         Args:
-            commands: what is sent to all of them: the last one, where there is no new one.
+            commands: what is sent to each of them, or was sent last.
         """
         self._sent.append(dict(commands))
         arriving = self._sent[0]
@@ -286,7 +278,7 @@ def _lag(share: float, wanted: float, before: float) -> float:
 
 
 def _ruled(rules: Rules, wanted: Commands, before: Commands) -> Commands:
-    """Commands by the controllers' rules, number by number."""
+    """Applies each controller's rule, number by number."""
     found = dict(wanted)
     for name, (rule, size) in rules.items():
         to, at = wanted[name], before[name]

@@ -1,6 +1,6 @@
-"""What of a scene's robots can differ from episode to episode: links, joints and controllers, by name.
+"""The links, joints and controllers of a scene that can be varied, by name.
 
-Names are those that a state has for joints, and commands for controllers; a link's is made like a joint's.
+Joints are named as in a state, controllers as in commands, and links like joints.
 """
 
 from collections.abc import Mapping
@@ -25,23 +25,23 @@ MOST_GAINS = {
 
 
 class RobotPart(NamedTuple):
-    """A link, joint or controller: whose, and its plain name."""
+    """A link, joint or controller: its robot, and its plain name."""
 
     robot: Robot
     name: str
 
 
 class Parts:
-    """Those of a scene by the names that variations have for them, in the order in which numbers are drawn.
+    """The parts of a scene, in the order in which numbers are drawn.
 
-    | attribute | what it has |
+    | attribute | what it has, by name |
     |---|---|
-    | `links` | all |
-    | `axes` | of the length of links that move and have a mass |
+    | `links` | all links |
+    | `axes` | the axis of the length of each link that moves and has a mass |
     | `solids` | links with a collision |
-    | `lumped` | links that a fixed joint has made part of another one: that one |
-    | `joints` | those that move |
-    | `controllers` | those that run |
+    | `lumped` | links that a fixed joint merges into another one: that one's name |
+    | `joints` | joints that move |
+    | `controllers` | controllers that run |
 
     Args:
         scene: the robots.
@@ -72,35 +72,19 @@ class Parts:
                 self.controllers[scene.controller(robot, plain)] = RobotPart(robot, plain)
 
     def link(self, name: str) -> RobotPart:
-        """The link of that name.
-
-        Raises:
-            SimulatorError: if there is none.
-        """
+        """The link of that name; raises SimulatorError if there is none."""
         return _found("link", self.links, name)
 
     def joint(self, name: str) -> RobotPart:
-        """The joint of that name, which moves.
-
-        Raises:
-            SimulatorError: if there is none.
-        """
+        """The movable joint of that name; raises SimulatorError if there is none."""
         return _found("joint", self.joints, name)
 
     def controller(self, name: str) -> RobotPart:
-        """The controller of that name, which runs.
-
-        Raises:
-            SimulatorError: if there is none.
-        """
+        """The running controller of that name; raises SimulatorError if there is none."""
         return _found("controller", self.controllers, name)
 
     def pids(self) -> dict[str, dict[str, Gains]]:
-        """The gains of all PIDs, by controller and by place below it; without controllers that have none.
-
-        Raises:
-            RobotEnvError: if something in a robot's description is wrong.
-        """
+        """The gains of all PIDs, by controller and place below it; only controllers that have PIDs."""
         found = {name: gains_of(part) for name, part in self.controllers.items()}
         return {name: gains for name, gains in found.items() if gains}
 
@@ -113,11 +97,7 @@ def _found(kind: str, parts: Mapping[str, RobotPart], name: str) -> RobotPart:
 
 
 def gains_of(controller: RobotPart) -> dict[str, Gains]:
-    """The gains of a controller's PIDs by their place below it, as the robot's files have them.
-
-    Raises:
-        RobotEnvError: if something in the robot's description is wrong.
-    """
+    """The gains of a controller's PIDs in the robot's files, by their place below it."""
     robot, name = controller
     try:
         loaded = load([name], robot.parameters, robot.hardware())[1]
@@ -127,14 +107,14 @@ def gains_of(controller: RobotPart) -> dict[str, Gains]:
 
 
 def check_tunable(pids: Mapping[str, Mapping[str, Gains]], factors: Mapping[str, float]) -> None:
-    """Sees to it that gains can be changed over ROS, so that they are the same on all backends.
+    """Checks that gains can be changed over ROS: dynamic_reconfigure clips larger ones silently.
 
     Args:
         pids: gains by controller, and place below it.
         factors: the largest, by controller.
 
     Raises:
-        ValueError: if one is beyond what dynamic_reconfigure takes, which would cut it without a word.
+        ValueError: if gains are too large for dynamic_reconfigure.
     """
     for controller, factor in factors.items():
         for place, gains in pids[controller].items():

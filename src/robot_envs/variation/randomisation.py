@@ -13,7 +13,7 @@ from robot_envs.variation.variation import LinkScale, Variation
 
 
 class Kind(NamedTuple):
-    """What has something that is drawn: links, joints or controllers, and which of them."""
+    """What a number is drawn for: links, joints, controllers or the world, and which of them."""
 
     name: str
     which: str
@@ -27,16 +27,17 @@ WORLD = Kind("world", "")
 
 
 class Option(NamedTuple):
-    """One thing that is drawn for each link, joint or controller, or for the world.
+    """An option of a randomisation.
 
     Args:
         name: of the option.
-        of: what has it.
-        least: that may be drawn.
-        most: that may be drawn.
-        nominal: what a robot has that doesn't differ.
-        numbers: of it, for each.
-        either_way: whether a single number is a half-width about the nominal one, not the most.
+        of: what a number is drawn for.
+        least: smallest value that may be drawn.
+        most: largest value that may be drawn.
+        nominal: the value of a robot that isn't varied.
+        numbers: how many are drawn for each.
+        either_way: whether a single number is a half-width about the nominal value, or else the largest
+            value.
     """
 
     name: str
@@ -48,7 +49,7 @@ class Option(NamedTuple):
     either_way: bool = True
 
 
-OPTIONS = (  # in the order in which numbers are drawn: new ones go to the end
+OPTIONS = (  # in the order of drawing, which is part of the bits: new ones go to the end
     Option("mass", LINKS, 0.1, 10.0),
     Option("length", LINKS, 0.1, 10.0),
     Option("com", LINKS, -10.0, 10.0, nominal=0.0, numbers=3),
@@ -62,22 +63,18 @@ ROUNDING = 1e-9  # 1 - 0.9 is a little less than 0.1
 
 
 class Interval(NamedTuple):
-    """From what is drawn, uniformly."""
+    """The bounds between which a number is drawn, uniformly."""
 
     low: float
     high: float
 
     def at(self, share: float) -> float:
-        """The value at a share of the way from low to high."""
+        """The value at a share of the way from low to high, 0 to 1."""
         return self.low + (self.high - self.low) * share
 
 
 def check_names(given: Iterable[str]) -> None:
-    """Refuses options that there are none of.
-
-    Raises:
-        ValueError: naming the nearest one.
-    """
+    """Raises ValueError for an unknown option, with the nearest name."""
     known = [option.name for option in OPTIONS]
     for name in given:
         if name not in known:
@@ -86,15 +83,15 @@ def check_names(given: Iterable[str]) -> None:
 
 
 def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, Interval]:
-    """What is drawn for which of `names`.
+    """The intervals of an option, by name.
 
     Args:
-        option: whose.
+        option: the option.
         given: a number, a pair (low, high), or a mapping with either by name.
-        names: of what has it.
+        names: of the links, joints or controllers that have it.
 
     Raises:
-        ValueError: for what it can't be, or a name that isn't there.
+        ValueError: for an impossible interval, or an unknown name.
     """
     if not names:
         raise ValueError(
@@ -138,31 +135,30 @@ Drawn = dict[str, Any]
 
 
 class UniformRandomisation:
-    """Draws a robot for each episode, uniformly, as options say.
+    """Draws a robot for each episode, uniformly, within the bounds of its options.
 
     | option | of each | what differs | a number means |
     |---|---|---|---|
     | `mass` | link | factor of its mass and moments | half-width: 0.2 is 0.8 to 1.2 |
-    | `length` | link | factor of the way to its centre of mass, and of what goes with it | half-width |
+    | `length` | link | factor of the distance of its centre of mass, and of its moments | half-width |
     | `com` | link | its centre of mass [m], each of x, y and z | half-width |
-    | `damping` | joint | viscous friction [N s/m, N m s/rad] beside its own | most |
-    | `friction` | joint | dry friction [N, N m] beside its own | most |
+    | `damping` | joint | viscous friction [N s/m, N m s/rad] beside its own | largest value |
+    | `friction` | joint | dry friction [N, N m] beside its own | largest value |
     | `surface_friction` | link | factor of the friction of its surfaces | half-width |
     | `gains` | controller | factor of p, i and d of its PIDs | half-width |
     | `gravity` | the world | factor of its gravity | half-width |
 
-    Instead of the number there may be a pair (low, high), or a mapping with either by name, for some links,
-    joints or controllers only.
+    A value is a number, a pair (low, high), or a mapping with either by name, for some links, joints or
+    controllers only.
 
-    A robot takes as many random numbers whatever is asked for, so that streams don't depend on it.
+    The same count of random numbers is drawn whatever the options, so that later draws don't depend on them.
 
     Args:
-        scene: whose links, joints and controllers are meant; their names are those that a state has for
-            joints, and commands for controllers.
+        scene: the robots; names are as in `Parts`.
         options: by name.
 
     Raises:
-        ValueError: for an option, name or range that there can't be.
+        ValueError: for an unknown option or name, or an impossible interval.
         RobotEnvError: if something in a robot's description is wrong.
     """
 
@@ -176,7 +172,9 @@ class UniformRandomisation:
             CONTROLLERS: parts.controllers, WORLD: (WORLD.name,),
         }  # fmt: skip
         self._ranges: dict[str, dict[str, Interval]] = {}
-        self._places: dict[str, dict[str, int]] = {}  # of the options' numbers among those drawn
+        self._places: dict[
+            str, dict[str, int]
+        ] = {}  # indices of an option's numbers among those drawn
         self._count = 0
         for option in OPTIONS:
             names = list(drawn_for[option.of])
@@ -192,7 +190,7 @@ class UniformRandomisation:
         check_tunable(pids, {name: span.high for name, span in tuned.items()})
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, Drawn]:
-        """Draws one robot; what was drawn comes with it, by option and name."""
+        """Draws a variation; returns it, and the numbers by option and name."""
         shares = rng.random(self._count).tolist()
         drawn: Drawn = {}
         for option in OPTIONS:
@@ -207,7 +205,7 @@ class UniformRandomisation:
             drawn.get("gains", {}),
             drawn.get("gravity"),
         )
-        return variation, {name: _told(value) for name, value in drawn.items()}
+        return variation, {name: _reported(value) for name, value in drawn.items()}
 
     def _drawn(self, option: Option, shares: Sequence[float]) -> Any:
         places, several = self._places[option.name], option.numbers
@@ -228,7 +226,7 @@ class UniformRandomisation:
 
 
 def _check_whole(option: Option, given: Any, lumped: Mapping[str, str]) -> None:
-    """Says where a link has gone that isn't one in the physics."""
+    """Raises ValueError for a link that the physics merge into another one, and names that one."""
     if isinstance(given, Mapping) and option.of in (LINKS, SOLIDS):
         for name in given:
             if name in lumped:
@@ -238,8 +236,8 @@ def _check_whole(option: Option, given: Any, lumped: Mapping[str, str]) -> None:
                 )
 
 
-def _told(drawn: Any) -> Any:
-    """A copy, with arrays for what has several numbers, which vectors of environments can stack."""
+def _reported(drawn: Any) -> Any:
+    """A copy with arrays for several numbers, which vectors of environments can stack."""
     if not isinstance(drawn, Mapping):
         return drawn
     return {

@@ -12,15 +12,15 @@ from bullet_gazebo.physics.pose import IDENTITY, ZERO, Quaternion, Vector, conju
 
 
 class LinkScale(NamedTuple):
-    """How a link's figures differ.
+    """How a link's inertia differs.
 
-    Its length is that along an axis of its own frame: with it grow the way to the centre of mass, and the
-    moments. Shapes and joints stay where they are.
+    The length is measured along an axis of the link's frame: the distance of the centre of mass and the
+    moments scale with it. Shapes and joints stay where they are.
     """
 
     mass: float = 1.0  # factor
     length: float = 1.0  # factor
-    com: Vector = ZERO  # [m] by which the centre of mass lies off, in the link's frame
+    com: Vector = ZERO  # [m] displacement of the centre of mass, in the link's frame
     axis: str = "z"  # of the length
 
 
@@ -28,16 +28,15 @@ class LinkScale(NamedTuple):
 class Variation:
     """What differs from the robot as it was made.
 
-    Every variation of one robot names the same links, joints and controllers: those that aren't named stay
-    as the variation before left them.
+    Links, joints and controllers that aren't named stay as the variation before left them.
 
     Args:
         links: by the link's name.
-        damping: viscous friction [N s/m, N m s/rad] beside the joint's own, by its name.
-        friction: dry friction [N, N m] beside the joint's own, by its name.
-        surfaces: factors of the friction of a link's surfaces, by its name.
+        damping: viscous friction that is added to a joint's own [N s/m, N m s/rad], by its name.
+        friction: dry friction that is added to a joint's own [N, N m], by its name.
+        surfaces: factors of a link's surface friction, by its name.
         gains: factors of p, i and d of all PIDs of a controller, by its name; clamps stay.
-        gravity: factor of the world's; None: nothing is said of it.
+        gravity: factor of the world's; None: unchanged.
     """
 
     links: Mapping[str, LinkScale] = field(default_factory=dict)
@@ -75,14 +74,14 @@ class Variation:
 
 
 class Randomisation(Protocol):
-    """Says which robot an episode gets."""
+    """Draws the robot of each episode."""
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, Any]:
-        """Draws one; what tells of it in the reset's `info["variation"]` comes with it."""
+        """Draws a variation; returns it, and what the reset's `info["variation"]` reports."""
         ...
 
 
-_AXES = {  # of a length: its index, and the moments and products that each power of the length goes with
+_AXES = {  # of a length: index, the moments that scale with its square, the products that scale with it
     "x": (0, ("iyy", "izz"), ("ixy", "ixz")),
     "y": (1, ("ixx", "izz"), ("ixy", "iyz")),
     "z": (2, ("ixx", "iyy"), ("ixz", "iyz")),
@@ -98,15 +97,15 @@ _ENTRIES = {
 
 
 def length_axis(inertia: Inertia) -> str:
-    """The axis of the link's frame along which it is long: where its centre of mass lies furthest out."""
+    """The axis of the link's frame along which its centre of mass lies furthest out."""
     x, y, z = (abs(value) for value in inertia.com.position)
     return "z" if z >= max(x, y) else "x" if x >= y else "y"
 
 
 def scaled(inertia: Inertia, scale: LinkScale) -> Inertia:
-    """A link's figures as a variation has them, taken for a rod's.
+    """A link's inertia as a variation changes it, as if the link were a rod.
 
-    With the length the moments about the axes across it grow with its square, about it not at all.
+    Moments about axes across the length scale with its square; the moment about it doesn't change.
     """
     index, moments, products = _AXES[scale.axis]
     mass, length = scale.mass, scale.length
@@ -114,7 +113,7 @@ def scaled(inertia: Inertia, scale: LinkScale) -> Inertia:
     turned = inertia.com.orientation
     if length == 1.0 or turned == IDENTITY:
         tensor = {key: getattr(inertia, key) * powers.get(key, mass) for key in _ENTRIES}
-    else:  # the length is along an axis of the link, the tensor is given in axes of its own
+    else:  # the tensor is given in axes of its own, the length along one of the link's
         straight = _turned(inertia, IDENTITY)
         tensor = {key: value * powers.get(key, mass) for key, value in straight.items()}
         tensor = _turned(Inertia(inertia.mass, **tensor), conjugate(turned))

@@ -15,7 +15,7 @@ from support.robots.new_robots import (
 )
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
-from package_writing.ground import standing_height
+from package_writing.survey import standing_height
 
 ROUND = """<collision><origin rpy="1.5707963267948966 0 0"/><geometry>
 <cylinder radius="0.1" length="0.04"/></geometry></collision>"""

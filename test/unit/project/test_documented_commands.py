@@ -42,7 +42,7 @@ RUN_ELSEWHERE = (
 )  # fmt: skip
 STARTS = re.compile(r"(\./ws|rosrun|roslaunch|rosservice|gz|spawn_model)\s")
 PLACEHOLDERS = {"your_script.py", "my_arm"}  # the reader's own
-RUN_BY_TESTS = ("examples/own_task.py", "examples/ppo_over_ros.py")
+RUN_BY_TESTS = ("examples/own_task.py", "examples/plot_policy.py", "examples/ppo_over_ros.py")
 TRAININGS = {"pg_train.py": pg_train.main, "dqn_train.py": dqn_train.main}
 THEIR_ENVIRONMENT = """
 import gymnasium

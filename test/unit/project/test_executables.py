@@ -11,13 +11,13 @@ import pytest
 pytestmark = pytest.mark.slow
 
 BOUND = 60.0  # [s]
-MAIN = "import sys; from bullet_gazebo.ros.{} import main; sys.exit(main())"
-PROGRAMS = {  # module: arguments, exit code after Ctrl-C
-    "clients.controller_manager.spawner": (["a_controller"], 0),
-    "clients.controller_manager.unspawner": (["a_controller"], 0),
-    "clients.spawn_model": (["-urdf", "-file", "/dev/null", "-model", "m", "-b"], 1),
-    "clients.gzclient": ([], 0),
-    "node.gazebo": ([], 130),
+MAIN = "import sys; from bullet_gazebo.ros.{} import {} as main; sys.exit(main())"
+PROGRAMS = {  # module and function: arguments, exit code after Ctrl-C
+    "clients.spawner main": (["a_controller"], 0),
+    "clients.spawner unspawner_main": (["a_controller"], 0),
+    "clients.spawn_model main": (["-urdf", "-file", "/dev/null", "-model", "m", "-b"], 1),
+    "clients.gzclient main": ([], 0),
+    "node.gzserver main_with_window": ([], 130),
 }
 
 
@@ -34,7 +34,7 @@ def start(tmp_path):
             "ROS_LOG_DIR": str(tmp_path),
         }
         program = subprocess.Popen(
-            [sys.executable, "-c", MAIN.format(name), *arguments],
+            [sys.executable, "-c", MAIN.format(*name.split()), *arguments],
             env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
         programs.append(program)

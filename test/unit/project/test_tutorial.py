@@ -7,6 +7,8 @@ shorten a command go behind those of the page, where they win.
 
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
@@ -64,6 +66,10 @@ def shortened(line: str) -> list[str]:
 
 
 def run_line(line: str, mark: str) -> None:
+    if line.startswith("./ws python3 examples/"):
+        script, *arguments = shlex.split(line)[2:]
+        subprocess.run([sys.executable, ROOT / script, *arguments], check=True)
+        return
     if line == "./ws extras":  # a test installs nothing; `ws test` has done so
         return
     script, *arguments = shortened(line)

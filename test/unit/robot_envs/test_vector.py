@@ -144,7 +144,7 @@ def test_after_an_error_in_the_middle_all_are_reset(many, monkeypatch):
     mask = {"reset_mask": np.array([True, False])}
     for begin in (lambda: None, lambda: vector.reset(options=mask)):
         begin()
-        with pytest.raises(gymnasium.error.ResetNeeded, match="broken off by an error"):
+        with pytest.raises(gymnasium.error.ResetNeeded, match="an error interrupted the step"):
             vector.step(np.ones(2, int))
     again = vector.reset(seed=1)[0]
     assert np.array_equal(again, many().reset(seed=1)[0])

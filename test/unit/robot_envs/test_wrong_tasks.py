@@ -41,7 +41,7 @@ TASKS = {
     ),
     "a link that wasn't asked for": (
         Hold(observe=lambda state: state.links["tip"]),
-        "no link 'tip'; there are: none; the task's query names those that it tells",
+        "no link 'tip'; there are: none; the task's query names those that a state has",
     ),
     "a model that wasn't asked for": (
         Hold(observe=lambda state: state.models["arms"], query=StateQuery(models=("arm",))),
@@ -72,11 +72,11 @@ TASKS = {
     ),
     "no commands": (
         Hold(apply=lambda *_: None),
-        "commands are told by controller, {'pair': ...}, not None",
+        "commands are given by controller, {'pair': ...}, not None",
     ),
     "the action as commands": (
         Hold(apply=lambda action, _: action),
-        "commands are told by controller",
+        "commands are given by controller",
     ),
     "a controller's wrong name": (
         Hold(apply=lambda *_: {"pear": (0, 0)}),

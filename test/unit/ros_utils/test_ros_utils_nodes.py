@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from ros_calls import master as ros_master
-from ros_utils._internal.processes import nodes as _nodes
+from ros_utils._internal import nodes as _nodes
 
 OURS, THEIRS = "http://localhost:45678", "http://localhost:45679"
 NODE = """

@@ -1,5 +1,6 @@
 """Programs that ros_utils starts: remembered by all processes, ended completely, nobody else's."""
 
+import contextlib
 import dataclasses
 import json
 import os
@@ -10,15 +11,13 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 from ros_utils import ros_launch, ros_node
-from ros_utils._internal.processes import processes as _processes
-from ros_utils._internal.processes import procfs as _procfs
-from ros_utils._internal.processes import registry as _registry
-from ros_utils._internal.processes import termination as _termination
-from ros_utils._internal.processes.program import CannotStart
-from ros_utils._internal.processes.readiness import Readiness, wait_until_ready
+from ros_utils._internal import processes as _processes
+from ros_utils._internal import programs as _programs
+from ros_utils._internal.programs import CannotStart, Readiness, wait_until_ready
 
 SLEEP = ["sleep", "1000"]
 BOUND = 60.0  # [s] for anything that a test waits for
@@ -35,14 +34,16 @@ def place(tmp_path, monkeypatch):
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr(
-        _termination, "LEFTOVERS", 0.3
+        _processes, "LEFTOVERS", 0.3
     )  # a shell has its background jobs ignore SIGINT
     yield tmp_path
-    _processes.end(_processes.started())
+    _programs.end(_processes.started())
 
 
 def runs(pid):
-    return _procfs.stat(pid) is not None
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    return False
 
 
 def wait_until(condition):
@@ -65,8 +66,8 @@ def python(code, *arguments):
 
 STARTER = """
 import signal, sys, time
-from ros_utils._internal.processes import processes
-print(processes.start(["sleep", "1000"], "node", "sleeper").process.pid, flush=True)
+from ros_utils._internal import programs
+print(programs.start(["sleep", "1000"], "node", "sleeper").process.pid, flush=True)
 signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
 if "stay" in sys.argv:
     signal.pause()
@@ -75,12 +76,12 @@ sys.stdin.read()
 
 
 def test_what_is_started_is_remembered_and_forgotten_once_ended():
-    handle = _processes.start(SLEEP, "node", "sleeper")
+    handle = _programs.start(SLEEP, "node", "sleeper")
     assert [entry.pid for entry in _processes.started()] == [handle.process.pid]
-    assert _processes.end(_processes.started())
+    assert _programs.end(_processes.started())
     assert not runs(handle.process.pid)
     assert _processes.started() == []
-    assert not os.path.exists(_registry.path())
+    assert not os.path.exists(_processes.list_path())
 
 
 LINGERING = """
@@ -91,29 +92,29 @@ ctypes.CDLL(None).pthread_exit(None)
 
 
 def test_a_program_whose_threads_outlive_its_main_thread_has_ended_when_it_is_said_so():
-    handle = _processes.start([sys.executable, "-c", LINGERING], "node", "lingering")
+    handle = _programs.start([sys.executable, "-c", LINGERING], "node", "lingering")
     wait_until(lambda: not runs(handle.process.pid))  # for /proc it is a zombie already
     assert handle.exit_code() is None
-    assert _processes.end(_processes.started())
+    assert _programs.end(_processes.started())
     assert handle.exit_code() is not None
 
 
 def test_it_has_a_session_of_its_own():
-    handle = _processes.start(SLEEP, "node", "sleeper")
+    handle = _programs.start(SLEEP, "node", "sleeper")
     assert os.getsid(handle.process.pid) == handle.process.pid
 
 
 def test_children_in_other_sessions_are_ended_too(place):
     code = "setsid sleep 1000 & echo $! > $0; wait"
-    handle = _processes.start(["sh", "-c", code, str(place / "pid")], "launch", "parent")
+    handle = _programs.start(["sh", "-c", code, str(place / "pid")], "launch", "parent")
     child = read_number(place / "pid")
-    assert _processes.end([handle.entry])
+    assert _programs.end([handle.start])
     assert not runs(child)
 
 
 def test_orphans_of_a_killed_parent_are_ended_too(place):
     code = "setsid sleep 1000 & echo $! > $0; wait"
-    handle = _processes.start(["sh", "-c", code, str(place / "pid")], "launch", "parent")
+    handle = _programs.start(["sh", "-c", code, str(place / "pid")], "launch", "parent")
     orphan = read_number(place / "pid")
     handle.process.kill()
     handle.process.wait()
@@ -125,9 +126,9 @@ def test_orphans_of_a_killed_parent_are_ended_too(place):
 def test_a_recycled_process_id_is_not_touched():
     stranger = subprocess.Popen(SLEEP)
     try:
-        handle = _processes.start(SLEEP, "node", "sleeper")
-        _processes.end([handle.entry])
-        _registry.add(dataclasses.replace(handle.entry, pid=stranger.pid, start=1))
+        handle = _programs.start(SLEEP, "node", "sleeper")
+        _programs.end([handle.start])
+        _processes.add(dataclasses.replace(handle.start, pid=stranger.pid))
         assert ros_node.ros_kill_all_processes()
         assert stranger.poll() is None
     finally:
@@ -136,7 +137,7 @@ def test_a_recycled_process_id_is_not_touched():
 
 
 def test_another_masters_processes_are_not_touched(monkeypatch):
-    handle = _processes.start(SLEEP, "node", "sleeper")
+    handle = _programs.start(SLEEP, "node", "sleeper")
     mine = os.environ["ROS_MASTER_URI"]
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
     assert ros_node.ros_kill_all_processes()
@@ -145,29 +146,29 @@ def test_another_masters_processes_are_not_touched(monkeypatch):
 
 
 def test_names_of_this_machine_mean_the_same_master(monkeypatch):
-    path = _registry.path()
+    path = _processes.list_path()
     monkeypatch.setenv(
         "ROS_MASTER_URI", os.environ["ROS_MASTER_URI"].replace("127.0.0.1", "localhost")
     )
-    assert _registry.path() == path
+    assert _processes.list_path() == path
 
 
 @pytest.mark.parametrize(
     ("trap", "number"), [("INT", signal.SIGTERM), ("INT TERM", signal.SIGKILL)]
 )
 def test_a_stubborn_program_is_ended(place, monkeypatch, trap, number):
-    monkeypatch.setitem(_termination.PATIENCE, "node", 0.3)
-    monkeypatch.setattr(_termination, "AFTER_TERM", 0.3)
+    monkeypatch.setitem(_processes.PATIENCE, "node", 0.3)
+    monkeypatch.setattr(_processes, "AFTER_TERM", 0.3)
     code = "import signal; [signal.signal(getattr(signal, 'SIG' + n), signal.SIG_IGN)"
     code += f" for n in '{trap}'.split()]; open({str(place / 'pid')!r}, 'w').write('1\\n'); "
-    handle = _processes.start([sys.executable, "-c", code + "signal.pause()"], "node", "stubborn")
+    handle = _programs.start([sys.executable, "-c", code + "signal.pause()"], "node", "stubborn")
     read_number(place / "pid")
-    assert _processes.end([handle.entry])
+    assert _programs.end([handle.start])
     assert handle.process.returncode == -number
 
 
 def test_another_process_ends_it():
-    handle = _processes.start(SLEEP, "node", "sleeper")
+    handle = _programs.start(SLEEP, "node", "sleeper")
     code = "from ros_utils import ros_node; assert ros_node.ros_kill_all_processes()"
     assert python(code).wait(BOUND) == 0
     assert handle.process.wait(BOUND) == -signal.SIGINT
@@ -198,16 +199,16 @@ while True:
 def test_a_launch_whose_caller_was_killed_is_waited_for(place, monkeypatch, stubborn):
     """Its master is about to end: what is started now must not take it for its own."""
     program = SLOW_TO_END.replace("0.5", "1000") if stubborn else SLOW_TO_END
-    monkeypatch.setitem(_termination.PATIENCE, "launch", 0.3 if stubborn else BOUND)
+    monkeypatch.setitem(_processes.PATIENCE, "launch", 0.3 if stubborn else BOUND)
     command = [sys.executable, "-c", program, str(place / "listens")]
-    code = "from ros_utils._internal.processes import processes as p; import signal;"
+    code = "from ros_utils._internal import programs as p; import signal;"
     starter = python(f"{code} p.start({command!r}, 'launch', 'slow'); signal.pause()")
     read_number(place / "listens")
     (entry,) = _processes.started()
-    assert _processes.end_orphans() and runs(entry.pid), "its caller lives"
+    assert _programs.end_orphans() and runs(entry.pid), "its caller lives"
     starter.kill()
     starter.wait(BOUND)
-    assert _processes.end_orphans() and not runs(entry.pid)
+    assert _programs.end_orphans() and not runs(entry.pid)
     assert _processes.started() == []
 
 
@@ -216,7 +217,7 @@ def test_a_program_of_ours_does_not_end_itself(place):
         "from ros_utils import ros_node; assert ros_node.ros_kill_all_processes();"
         f"open({str(place / 'done')!r}, 'w').write('1\\n')"
     )
-    handle = _processes.start([sys.executable, "-c", code], "node", "tidy")
+    handle = _programs.start([sys.executable, "-c", code], "node", "tidy")
     read_number(place / "done")
     assert handle.process.wait(BOUND) == 0
 
@@ -232,17 +233,11 @@ def test_killing_without_a_master_waits_for_nothing(monkeypatch):
 
 
 def test_a_broken_registry_is_an_empty_one():
-    handle = _processes.start(SLEEP, "node", "sleeper")
-    Path(_registry.path()).write_text("{ not JSON")
+    handle = _programs.start(SLEEP, "node", "sleeper")
+    Path(_processes.list_path()).write_text("{ not JSON")
     assert _processes.started() == []
-    _registry.add(handle.entry)
-    assert json.loads(Path(_registry.path()).read_text())[0]["pid"] == handle.process.pid
-
-
-def test_an_earlier_boots_entries_are_dropped():
-    handle = _processes.start(SLEEP, "node", "sleeper")
-    _registry.add(dataclasses.replace(handle.entry, boot="earlier"))
-    assert _processes.started() == [handle.entry]
+    _processes.add(handle.start)
+    assert json.loads(Path(_processes.list_path()).read_text())[0]["pid"] == handle.process.pid
 
 
 def test_starts_at_the_same_time_are_all_remembered():
@@ -258,7 +253,7 @@ def test_starts_at_the_same_time_are_all_remembered():
 
 def test_output_goes_to_a_log_and_its_error_is_the_reason():
     code = "echo one; echo 'ValueError: two'; echo three; exit 3"
-    handle = _processes.start(["sh", "-c", code], "node", "talker")
+    handle = _programs.start(["sh", "-c", code], "node", "talker")
     assert wait_until_ready(lambda: False, handle, BOUND) is Readiness.ENDED
     assert handle.exit_code() == 3
     assert handle.reason() == "ValueError: two"
@@ -266,14 +261,14 @@ def test_output_goes_to_a_log_and_its_error_is_the_reason():
 
 
 def test_a_wait_has_a_bound():
-    handle = _processes.start(SLEEP, "node", "sleeper")
+    handle = _programs.start(SLEEP, "node", "sleeper")
     assert wait_until_ready(lambda: False, handle, 0.1) is Readiness.LATE
     assert wait_until_ready(lambda: True, handle, 0.1) is Readiness.READY
 
 
 def test_a_missing_program_is_refused():
     with pytest.raises(CannotStart, match="nix"):
-        _processes.start(["/nix"], "node", "nix")
+        _programs.start(["/nix"], "node", "nix")
 
 
 @pytest.mark.parametrize("code", [0, 7])
@@ -283,13 +278,13 @@ def test_in_a_window_the_programs_exit_code_is_known(place, monkeypatch, code):
     xterm.chmod(0o755)
     monkeypatch.setenv("PATH", f"{place}:{os.environ['PATH']}")
     monkeypatch.setenv("DISPLAY", ":0")
-    handle = _processes.start(["sh", "-c", f"exit {code}"], "node", "a 'quoted' name", window=True)
+    handle = _programs.start(["sh", "-c", f"exit {code}"], "node", "a 'quoted' name", window=True)
     assert wait_until_ready(lambda: False, handle, BOUND) is Readiness.ENDED
     assert handle.exit_code() == code
 
 
 def test_without_a_display_a_window_falls_back_to_a_log(capsys):
-    handle = _processes.start(["echo", "hello"], "node", "greeter", window=True)
+    handle = _programs.start(["echo", "hello"], "node", "greeter", window=True)
     handle.process.wait(BOUND)
     assert handle.lines() == ["hello"]
-    assert handle.entry.log in capsys.readouterr().out
+    assert handle.start.log in capsys.readouterr().out

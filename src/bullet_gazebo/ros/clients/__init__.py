@@ -1,1 +1,1 @@
-"""Programs that talk to a running simulator: spawn_model, spawner, gz, gzclient."""
+"""Programs that talk to a running simulator: spawn_model, spawner, controller_manager, gz, gzclient."""

@@ -23,7 +23,7 @@ def spawn_sdf_model_client(
     """Spawns a model from SDF text; waits for the simulator without limit.
 
     Returns:
-        Whether it was spawned; None, after a message, if the call failed.
+        Whether the model was spawned; None, after a message, if the call failed.
     """
     request = (model_name, model_xml, robot_namespace, initial_pose, reference_frame)
     return _spawn(f"{gazebo_namespace}/spawn_sdf_model", request)
@@ -56,7 +56,7 @@ def set_model_configuration_client(
 
 
 def wait_for_service(name: str) -> None:
-    """Waits without limit, and says so every 10 s.
+    """Waits without limit, with a message every 10 s.
 
     Raises:
         rospy.ROSInterruptException: the node was shut down meanwhile.

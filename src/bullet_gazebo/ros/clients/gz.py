@@ -1,9 +1,7 @@
-"""Executable `gz`: Gazebo's command line tool, as far as it concerns the world.
-
-See docs/contract/gazebo_launch.md 5.1.
+"""The command `gz world`, and the client behind it (docs/contract/gazebo_launch.md 5.1).
 
 ``gz world -p 1|0`` pauses and goes on, ``-s`` does one step, ``-m N`` does N, ``-r`` resets time and
-models, ``-t`` the time, ``-o`` the models.
+models, ``-t`` the time, ``-o`` the models. It imports no rospy, so that it starts at once.
 """
 
 import argparse
@@ -12,9 +10,62 @@ from collections.abc import Sequence
 
 import rosgraph
 
-from bullet_gazebo.ros.clients.world_client import ControlFailed, RemoteWorld
+from ros_calls import master
 
 NODE = "gazebo"
+METHOD = "gazeboWorld"  # of the node's XML-RPC server; node/world_control.py answers it
+CHUNK = 1000  # steps in one call, so that an interrupted client stops soon
+TIMEOUT = 60.0  # [s] for one call
+
+
+class ControlFailed(Exception):
+    """The simulator can't be reached, or refuses; the text says which."""
+
+
+class RemoteWorld:
+    """A running simulator, by its node's name."""
+
+    def __init__(self, node: str, master_uri: str) -> None:
+        """`node` is the simulator's full name, usually /gazebo.
+
+        Raises:
+            ControlFailed: there is no master, or no such node.
+        """
+        self._node = node
+        try:
+            self._address = str(master.call_node(master_uri, "lookupNode", node))
+        except master.NoAnswer as fault:
+            raise ControlFailed(f"no ROS master at {master_uri}: {fault}") from fault
+        except master.Refused as fault:
+            raise ControlFailed(
+                f"no node {node} at the master {master_uri}: is a simulator running?"
+            ) from fault
+
+    def command(self, name: str, count: int = 1) -> None:
+        """Carries out one command: pause, unpause, step, reset, reset_models, reset_time or show.
+
+        Raises:
+            ControlFailed: the simulator doesn't answer, or refuses.
+        """
+        try:
+            master.call_node(self._address, METHOD, name, count, timeout=TIMEOUT)
+        except master.Refused as fault:
+            raise ControlFailed(f"{self._node}: {fault}") from fault
+        except master.BadAnswer as fault:
+            raise ControlFailed(f"{self._node} doesn't know {METHOD}: {fault}") from fault
+        except master.NoAnswer as fault:
+            raise ControlFailed(f"{self._node} doesn't answer: {fault}") from fault
+
+    def step(self, ticks: int) -> None:
+        """Pauses the world and does `ticks` steps, all of them before it returns.
+
+        Raises:
+            ControlFailed: as `command`.
+        """
+        while ticks > 0:
+            count = min(ticks, CHUNK)
+            self.command("step", count)
+            ticks -= count
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -32,7 +83,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="gz", description="Steer a running simulator.")
+    parser = argparse.ArgumentParser(prog="gz", description="Control a running simulator.")
     world = parser.add_subparsers(dest="tool", required=True).add_parser(
         "world", help="pause, step and reset the world"
     )

@@ -1,7 +1,7 @@
 """Node `gazebo_gui`: the simulator's window, a page in the browser (docs/watching.md).
 
-The simulation never depends on it: where the window can't be opened it says why and ends, and Gazebo's
-`gui:=true`, which is the default, does no harm on a server.
+The simulation doesn't depend on it. Where the window can't open, the node says why and ends, so that Gazebo's
+default `gui:=true` does no harm on a server.
 """
 
 import argparse
@@ -12,9 +12,14 @@ from collections.abc import Sequence
 import rosgraph
 import rospy
 
-from bullet_gazebo.ros.wire.names import full_name, one_at_a_time
-from bullet_gazebo.ros.wire.rospy_patches.node import stop_hearing_clock
-from bullet_gazebo.ros.wire.signals import SignalHandler, init_node, wait_for_master
+from bullet_gazebo.ros.common.node_process import (
+    SignalHandler,
+    full_name,
+    init_node,
+    one_at_a_time,
+    wait_for_master,
+)
+from bullet_gazebo.ros.common.rospy_node import stop_hearing_clock
 from ros_calls.master import NoAnswer, living_address
 from ros_calls.requirements import WINDOW, lack
 from viewer.address import PortInUse, add_flags, find_address
@@ -23,23 +28,23 @@ NAME = "gazebo_gui"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Serves the page until it is ended; returns the exit code."""
+    """Serves the page until the node is shut down; returns the exit code."""
     command_line = list(sys.argv if argv is None else argv)
     options = parse_args(rospy.myargv(command_line)[1:])
 
     def work() -> int:
         become_node(command_line)
-        stop_hearing_clock()  # the scene has the time, thirty times a second instead of thousands
+        stop_hearing_clock()  # the scene's messages have the time, thirty times a second instead of thousands
         if options.ignored:
             rospy.logwarn("Arguments without effect here: %s", " ".join(options.ignored))
         missing = lack(WINDOW)
         if missing:
             rospy.logwarn("gazebo_gui: no window; the simulation goes on without one. %s", missing)
             return 0
-        opened = importlib.import_module("bullet_gazebo.ros.clients.window.opened")
+        window = importlib.import_module("bullet_gazebo.ros.window.window")  # with viser, trimesh
         try:
             address = find_address(options.host, options.port)
-            opened.show(address, browser=not options.no_browser)
+            window.show(address, browser=not options.no_browser)
         except PortInUse as error:
             rospy.logerr("gazebo_gui: %s", error)
             return 1
@@ -49,9 +54,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def become_node(command_line: Sequence[str]) -> None:
-    """Takes the name `gazebo_gui`; one with a number behind it where another window has that already.
+    """Registers as `gazebo_gui`, with a number behind it if another window has that name.
 
-    A name that the command line gives is taken in any case, as every node does.
+    A name on the command line is taken in any case, as every node does.
     """
     wait_for_master(NAME)
     name = full_name(command_line, NAME)
@@ -68,9 +73,9 @@ def _lives(name: str) -> bool:
 
 
 def parse_args(arguments: Sequence[str]) -> argparse.Namespace:
-    """Returns host, port, no_browser, and `ignored`: what isn't known, as Gazebo's own options."""
+    """Returns host, port, no_browser, and `ignored`: unknown options, such as Gazebo's own."""
     parser = argparse.ArgumentParser(
-        prog="gzclient", description="The simulator's window: a page in the browser."
+        prog="gzclient", description="Show the simulator in the browser, and control it."
     )
     add_flags(parser)
     options, ignored = parser.parse_known_args(list(arguments))

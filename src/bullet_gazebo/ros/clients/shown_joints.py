@@ -1,12 +1,12 @@
-"""The command shown_joints.py: where a robot is, for RViz, from the first moment and thirty times a second.
+"""The command shown_joints.py: a robot's joint states and place for RViz, thirty times a second.
 
-RViz draws a link white, and at the wrong place, until it knows where the link is, and joint states come
-only while simulated time passes: in a paused world, and in one in lock-step, maybe never; and where nothing
-publishes them, never. So until one has come the simulator is asked, by a service that answers while paused,
-too. Later states are handed on, the newest first; not those of joint_state_publisher, which only has zeros.
+RViz draws a link white, and at the wrong place, until it knows where the link is. Joint states come only
+while simulated time passes, in a paused world or in lock-step maybe never. So until one comes, this node
+asks the simulator by a service that answers while paused, too. Then it forwards the newest state; not those
+of joint_state_publisher, which are zeros.
 
-Nobody tells tf where a robot stands that isn't fixed to the world: the simulator is asked, and it becomes a
-transform from world to its root link.
+Of a robot that isn't fixed to the world nobody publishes the place to tf: this node asks the simulator, and
+publishes the transform from world to the root link.
 """
 
 import contextlib
@@ -28,12 +28,12 @@ from ros_calls.service import ServiceClient, ServiceFailed
 NAME = "shown_joints"
 WORLD = "world"
 PERIOD = 1.0 / 30.0  # [s of wall time]
-ASKING = 0.1  # [s of wall time] from one question to the next, as long as no joint states come
-PATIENCE = 1.0  # [s of wall time] for a robot that isn't there, or joint states that stay the same
+ASKING = 0.1  # [s of wall time] between two questions while no joint states come
+PATIENCE = 1.0  # [s of wall time] for a missing robot, or joint states that don't change
 
 
 class ShownJoints:
-    """Hands a robot's joint states on from /joint_states to ~joint_states."""
+    """Forwards a robot's joint states from /joint_states to ~joint_states."""
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         self._joints = joints
@@ -51,13 +51,13 @@ class ShownJoints:
             self._news.set()
 
     def run(self) -> None:
-        """Until the node is shut down."""
+        """Publishes until the node is shut down."""
         names: Sequence[str] = [joint.name for joint in self._joints]
         positions: Sequence[float] = [0.0] * len(names)
         while not rospy.is_shutdown():
-            # Again and again: RViz, or who makes tf of it, may have come just now.
+            # Also without news: RViz, or the node that makes tf of them, may have come just now.
             self._publish(names, positions)
-            time.sleep(PERIOD)  # no more often; what comes meanwhile is newer
+            time.sleep(PERIOD)  # no more often; only the newest state counts
             if self._news.wait(ASKING if self._newest is None else PATIENCE):
                 self._news.clear()
                 assert self._newest is not None
@@ -66,7 +66,7 @@ class ShownJoints:
                 positions = self._asked(names) or positions
 
     def _asked(self, names: Sequence[str]) -> list[float]:
-        """Positions [rad, m] of the joints in the simulator; empty as long as it hasn't all of them."""
+        """Returns the joints' positions [rad, m]; empty while the simulator lacks one of them."""
         positions = []
         with contextlib.suppress(ServiceFailed):
             for name in names:
@@ -77,22 +77,22 @@ class ShownJoints:
         return positions if len(positions) == len(names) else []
 
     def _publish(self, names: Sequence[str], positions: Sequence[float]) -> None:
-        """In wall time, in which tf and RViz live here: simulated time may stand still or go back."""
+        """Publishes with wall time, as tf and RViz use here: simulated time may stand still or go back."""
         self._publisher.publish(JointState(header=_now(), name=names, position=positions))
 
 
 class ShownBase:
-    """Tells ~tf where the root link of a robot is that isn't fixed to the world."""
+    """Publishes to ~tf where the root link of a robot is that isn't fixed to the world."""
 
     def __init__(self, root: str) -> None:
         self._root = root
-        self._model = ""  # that has it; empty: not known yet
+        self._model = ""  # with that link; empty while unknown
         self._publisher = rospy.Publisher("~tf", TFMessage, queue_size=1)
         self._models = ServiceClient("/gazebo/get_world_properties", GetWorldProperties)
         self._state = ServiceClient("/gazebo/get_link_state", GetLinkState, persistent=True)
 
     def run(self) -> None:
-        """Until the node is shut down."""
+        """Publishes until the node is shut down."""
         while not rospy.is_shutdown():
             pose = None
             with contextlib.suppress(ServiceFailed):
@@ -102,7 +102,7 @@ class ShownBase:
             time.sleep(PATIENCE if pose is None else PERIOD)
 
     def _pose(self) -> Pose | None:
-        """Where it is in the world; None as long as no model has it."""
+        """Returns where the link is in the world; None while no model has it."""
         for model in [self._model] if self._model else self._models().model_names:
             answer = self._state(f"{model}::{self._root}", WORLD)
             if answer.success:

@@ -16,7 +16,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import Empty
 
 from bullet_gazebo.ros.clients import gazebo_interface
-from bullet_gazebo.ros.wire.signals import SignalHandler, init_node
+from bullet_gazebo.ros.common.node_process import SignalHandler, init_node
 from files.content import MAX_BYTES, FileError, read_file
 from files.xml_text import decode
 from files.xml_text import parse as parse_xml
@@ -24,13 +24,13 @@ from ros_calls.service import ServiceClient, ServiceFailed
 from ros_calls.waiting import wait_until
 
 REMIND = 10.0  # [s of wall time]
-FAREWELL = 3.0  # [s] for what has to be done during shutdown
+FAREWELL = 3.0  # [s] for the end of spawning and for a call during shutdown
 INTERRUPTED = -1
 INCLUDE = '<sdf version="1.6"><world name="default"><include><uri>model://{}</uri></include></world></sdf>'
 
 
 class CannotSpawn(Exception):
-    """There is nothing that could be spawned; the text says why."""
+    """Nothing can be spawned; the text says why."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -74,7 +74,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("-gazebo_namespace", default="/gazebo", help="of the simulator's services")
     parser.add_argument("-robot_namespace", help="of the model's plugins; default: the node's")
-    parser.add_argument("-unpause", action="store_true", help="let time run afterwards")
+    parser.add_argument("-unpause", action="store_true", help="unpause the world afterwards")
     parser.add_argument("-wait", metavar="MODEL", help="wait for another model first")
     for name, what in zip("xyzRPY", ("[m]",) * 3 + ("[rad]",) * 3, strict=True):
         parser.add_argument(f"-{name}", type=float, default=0.0, help=what)
@@ -84,14 +84,16 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )  # fmt: skip
     parser.add_argument("-package_to_model", action="store_true",
                         help="meshes: model:// instead of package://")  # fmt: skip
-    parser.add_argument("-b", dest="bond", action="store_true", help="stay; delete it at the end")
+    parser.add_argument(
+        "-b", dest="bond", action="store_true", help="stay, and delete the model at the end"
+    )
     options = parser.parse_args([_not_an_option(argument) for argument in arguments])
     options.joints = [(name, _position(parser, text)) for name, text in options.joints]
     return options
 
 
 def _not_an_option(argument: str) -> str:
-    """argparse takes -1e-05 for an option; with a blank in front it is a value."""
+    """Puts a blank in front of a negative number: argparse takes -1e-05 for an option."""
     try:
         float(argument)
     except ValueError:
@@ -137,10 +139,7 @@ def _spawn(options: argparse.Namespace, xml: str, gazebo: str) -> None:
 
 
 class _Bond:
-    """Deletes the model when the node is shut down, also in the middle of the spawning.
-
-    The block of its ``with`` statement is the spawning.
-    """
+    """Deletes the model at the node's shutdown, also in the middle of the block that spawns it."""
 
     def __init__(self, gazebo: str, model: str) -> None:
         self._service, self._model = f"{gazebo}/delete_model", model
@@ -175,7 +174,7 @@ def _place_joints(options: argparse.Namespace, gazebo: str) -> bool:
 
 
 def _wait_for_model(gazebo: str, name: str) -> None:
-    """Also sees models of a paused world, whose state topics are silent."""
+    """Waits for a model, also in a paused world, whose state topics are silent."""
     service = f"{gazebo}/get_world_properties"
     gazebo_interface.wait_for_service(service)
     rospy.loginfo("spawn_model: waiting for model '%s'", name)
@@ -195,42 +194,27 @@ def _call(service: str, kind: type) -> Any:
 
 
 def _read(options: argparse.Namespace, piped: bytes) -> str:
-    if options.stdin:
-        text, origin = _decoded(piped), "standard input"
-    elif options.file is not None:
-        text, origin = _read_file(options.file), options.file
-    elif options.param is not None:
-        text, origin = _read_param(options.param), f"parameter {rospy.resolve_name(options.param)}"
-    else:
+    if options.database is not None:
         return INCLUDE.format(options.database)
+    if options.param is not None:
+        origin = f"parameter {rospy.resolve_name(options.param)}"
+        try:
+            text = str(rospy.get_param(options.param))
+        except KeyError as fault:
+            raise CannotSpawn(f"{origin} is not set") from fault
+    else:
+        origin = options.file or "standard input"
+        try:
+            text = decode(piped if options.stdin else read_file(Path(options.file)))
+        except FileError as fault:
+            raise CannotSpawn(f"{origin}: {fault}") from fault
     if not text.strip("\ufeff \t\r\n"):
         raise CannotSpawn(f"{origin} is empty")
     return text
 
 
-def _read_file(path: str) -> str:
-    try:
-        return decode(read_file(Path(path)))
-    except FileError as fault:
-        raise CannotSpawn(f"{path}: {fault}") from fault
-
-
-def _decoded(piped: bytes) -> str:
-    try:
-        return decode(piped)
-    except FileError as fault:
-        raise CannotSpawn(f"standard input: {fault}") from fault
-
-
-def _read_param(name: str) -> str:
-    try:
-        return str(rospy.get_param(name))
-    except KeyError as fault:
-        raise CannotSpawn(f"parameter {rospy.resolve_name(name)} is not set") from fault
-
-
 def _prepared(text: str, package_to_model: bool) -> str:
-    """Returns the XML without comments and declaration, as the service gets it from Gazebo's tool."""
+    """Returns the XML without comments and declaration, as Gazebo's tool sends it."""
     try:
         root = parse_xml(text)
     except FileError as fault:
@@ -244,7 +228,7 @@ def _prepared(text: str, package_to_model: bool) -> str:
 
 
 def _pose(options: argparse.Namespace) -> Pose:
-    """Returns the pose: -R, -P, -Y are rotations about the fixed x, y and z axis, in this order."""
+    """Returns the pose; -R, -P, -Y are rotations about the fixed x, y and z axis, in this order."""
     cr, sr = math.cos(options.R / 2), math.sin(options.R / 2)
     cp, sp = math.cos(options.P / 2), math.sin(options.P / 2)
     cy, sy = math.cos(options.Y / 2), math.sin(options.Y / 2)

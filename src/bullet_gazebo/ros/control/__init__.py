@@ -1,1 +1,1 @@
-"""gazebo_ros_control: the plugin, the controller manager's services, controllers' topics."""
+"""ros_control over ROS: the controller manager's services, controllers' topics and actions."""

@@ -30,15 +30,15 @@ from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.errors import ControlError, faults
 from bullet_gazebo.control.manager import ControllerInfo, ControllerManager
 from bullet_gazebo.control.user_types import find_type
-from bullet_gazebo.ros.control.controller_ports import ControllerPorts
-from bullet_gazebo.ros.wire.thinning import Thinner
+from bullet_gazebo.ros.common.publishing import Thinner
+from bullet_gazebo.ros.control.controller_topics import ControllerTopics
 from bullet_gazebo.simulator import Simulator
 
 BASE_CLASS = "controller_interface::ControllerBase"
 
 
 class ControllerServices:
-    """Serves one manager. All calls answer at once, also while the world is paused."""
+    """Serves one manager. All calls are answered at once, also while the world is paused."""
 
     def __init__(
         self, sim: Simulator, thinner: Thinner, manager: ControllerManager, namespace: str
@@ -47,12 +47,12 @@ class ControllerServices:
         self._thinner = thinner
         self._manager = manager
         self._namespace = namespace
-        self._ports: dict[str, ControllerPorts] = {}
+        self._topics: dict[str, ControllerTopics] = {}
         self._one_at_a_time = threading.Lock()
         self._gone = False
         manager.on_fault = _report_fault
         self._services: list[rospy.Service] = []
-        with ExitStack() as opened:  # if one can't be offered, those before it are taken away
+        with ExitStack() as opened:  # if one can't be offered, those before it are closed
             opened.callback(self.shutdown)
             self._advertise("list_controllers", ListControllers, self._list)
             self._advertise("list_controller_types", ListControllerTypes, self._list_types)
@@ -63,7 +63,7 @@ class ControllerServices:
             opened.pop_all()
 
     def shutdown(self) -> None:
-        """Takes the services and all controllers' topics away."""
+        """Closes the services and all controllers' topics."""
         for service in self._services:
             service.shutdown("the model was deleted")
         with self._one_at_a_time:
@@ -98,25 +98,25 @@ class ControllerServices:
             self._know_type(params)
             with self._sim.lock:
                 controller = self._manager.load(request.name, params)
-            self._ports[request.name] = self._open(controller)
+            self._topics[request.name] = self._open(controller)
         except ControlError as error:
             return _refused(error)
         return True
 
     def _know_type(self, params: object) -> None:
-        """Imports a user's own type; not under the simulator's lock, for it takes a while."""
+        """Imports a user's own type, without the simulator's lock, because it takes a while."""
         kind = params.get("type") if isinstance(params, dict) else None
         if isinstance(kind, str) and kind not in self._manager.types:
             found = find_type(kind)
             if found is not None:
                 self._manager.types[kind] = found
 
-    def _open(self, controller: Controller) -> ControllerPorts:
+    def _open(self, controller: Controller) -> ControllerTopics:
         try:
-            return ControllerPorts(
+            return ControllerTopics(
                 self._sim, self._thinner, self._manager, controller, self._namespace
             )
-        except faults() as error:  # it may have raised where it was asked for its topics
+        except faults() as error:  # from a user's outputs, inputs or pids
             with self._sim.lock:
                 self._manager.unload(controller.name)
             raise ControlError(f"the topics of '{controller.name}': {error!r}") from error
@@ -127,7 +127,7 @@ class ControllerServices:
                 self._manager.unload(request.name)
         except ControlError as error:
             return _refused(error)
-        self._ports.pop(request.name).shutdown()
+        self._topics.pop(request.name).shutdown()
         return True
 
     def _switch(self, request: SwitchControllerRequest) -> bool:
@@ -155,13 +155,13 @@ class ControllerServices:
     def _close_all(self) -> None:
         with self._sim.lock:
             self._manager.unload_all()
-        for ports in self._ports.values():
-            ports.shutdown()
-        self._ports.clear()
+        for topics in self._topics.values():
+            topics.shutdown()
+        self._topics.clear()
 
 
 def _refused(error: ControlError) -> bool:
-    """A refused request is ok=false, and its reason stands in the log (docs/contract/ros_control.md 1.3)."""
+    """Logs why a request is refused; the answer is just ok=false (docs/contract/ros_control.md 1.3)."""
     rospy.logerr("Controller manager: %s", error)
     return False
 

@@ -1,32 +1,96 @@
-"""The action follow_joint_trajectory of a trajectory controller (docs/contract/ros_control.md 3.5)."""
+"""A trajectory controller's action, command topic and query service (docs/contract/ros_control.md 3.5)."""
 
 import threading
 import time
+from collections.abc import Iterable
+from typing import Any
 
 import rospy
 from actionlib import ServerGoalHandle
-from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryResult
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+    JointTolerance,
+    JointTrajectoryControllerState,
+)
+from control_msgs.srv import (
+    QueryTrajectoryState,
+    QueryTrajectoryStateRequest,
+    QueryTrajectoryStateResponse,
+)
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryController
 from bullet_gazebo.control.trajectory_goals import (
     ABORTED,
     SUCCEEDED,
+    GoalRequest,
     Outcome,
+    Tolerance,
+    Trajectory,
+    TrajectoryPoint,
     TrajectoryRefused,
     TrajectorySample,
 )
-from bullet_gazebo.ros.control.steady_action_server import SteadyActionServer
-from bullet_gazebo.ros.control.trajectory_conversions import to_feedback, to_request
+from bullet_gazebo.ros.common.messages import to_time
+from bullet_gazebo.ros.control.action_server import SteadyActionServer
 from bullet_gazebo.simulator import Simulator
 
-STATUS_PERIOD = (
-    0.2  # [s of wall time; of simulated time where somebody asks for it by advance_world]
-)
+# [s] of wall time; of simulated time where a client asks for time by advance_world
+STATUS_PERIOD = 0.2
 STOP_TIMEOUT = 5.0  # [s]
 
 
+class TrajectoryTopics:
+    """The topic `command`, the action `follow_joint_trajectory` and the service `query_state`."""
+
+    def __init__(
+        self, sim: Simulator, controller: JointTrajectoryController, namespace: str
+    ) -> None:
+        """`namespace` is the controller's."""
+        self._sim = sim
+        self._controller = controller
+        self._action = TrajectoryAction(sim, controller, namespace)
+        self._query_state = rospy.Service(
+            rospy.names.ns_join(namespace, "query_state"), QueryTrajectoryState, self._query
+        )
+        self._topic = rospy.names.ns_join(namespace, "command")
+        self._command = rospy.Subscriber(
+            self._topic, JointTrajectory, self._follow, queue_size=1, tcp_nodelay=True
+        )
+
+    def shutdown(self) -> None:
+        """Closes all of them."""
+        self._command.unregister()
+        self._query_state.shutdown("the controller was unloaded")
+        self._action.shutdown()
+
+    def _follow(self, message: JointTrajectory) -> None:
+        trajectory = _to_trajectory(message)
+        try:
+            with self._sim.lock:
+                warning = self._controller.follow(trajectory)
+        except TrajectoryRefused as refusal:
+            rospy.logerr("%s: %s", self._topic, refusal)
+            return
+        if warning:
+            rospy.logwarn("%s: %s", self._topic, warning)
+
+    def _query(self, request: QueryTrajectoryStateRequest) -> QueryTrajectoryStateResponse:
+        try:
+            with self._sim.lock:
+                states = self._controller.query(request.time.to_nsec())
+        except TrajectoryRefused as refusal:
+            raise rospy.ServiceException(str(refusal)) from refusal
+        names = self._controller.joint_names
+        return QueryTrajectoryStateResponse(names, *zip(*states, strict=True))
+
+
 class TrajectoryAction:
-    """Serves the action from load to unload, in a thread of its own, or as a postman of the simulator.
+    """Serves the action from load to unload, in a thread of its own or along with steps in lock-step.
 
     Locks are taken in this order: the action server's, the simulator's, ours. The control tick holds the
     simulator's and takes only ours, so it waits for nobody.
@@ -52,7 +116,7 @@ class TrajectoryAction:
         self._thread.start()
 
     def shutdown(self) -> None:
-        """Tells what is left to tell, and takes the action away. The controller has been stopped before."""
+        """Publishes the last results, and closes the action; the controller was stopped before."""
         self._sim.postmen.remove(self)
         with self._news:
             self._closing = True
@@ -61,29 +125,27 @@ class TrajectoryAction:
         self._server.stop()
 
     def note_feedback(self, handle: ServerGoalHandle, sample: TrajectorySample) -> None:
-        """Has the newest feedback published soon."""
+        """Keeps the newest feedback, to be published soon."""
         with self._news:
             self._feedback = (handle, sample)
             self._news.notify()
 
     def note_outcome(self, handle: ServerGoalHandle, outcome: Outcome) -> None:
-        """Has a goal's result published soon."""
+        """Keeps a goal's result, to be published soon."""
         with self._news:
             self._outcomes.append((handle, outcome))
             self._news.notify()
 
     def _pursue(self, handle: ServerGoalHandle) -> None:
-        request = to_request(handle.get_goal())
+        request = _to_request(handle.get_goal())
+        goal = GoalListener(self, handle)
         try:
             with self._sim.lock:
-                warning = self._controller.pursue(
-                    handle.get_goal_id().id, request, GoalPort(self, handle)
-                )
+                warning = self._controller.pursue(handle.get_goal_id().id, request, goal)
         except TrajectoryRefused as refusal:
             rospy.logerr("%s: %s", self._name, refusal)
-            handle.set_rejected(
-                FollowJointTrajectoryResult(refusal.code, str(refusal)), str(refusal)
-            )
+            result = FollowJointTrajectoryResult(refusal.code, str(refusal))
+            handle.set_rejected(result, str(refusal))
             return
         if warning:
             rospy.logwarn("%s: %s", self._name, warning)
@@ -94,16 +156,17 @@ class TrajectoryAction:
             self._controller.cancel(handle.get_goal_id().id)
 
     def has_post(self) -> bool:
-        """Whether there is something to tell; asked for within a tick."""
+        """Returns whether there is something to publish; called within a tick."""
         return bool(self._feedback or self._outcomes) or self._status_is_due()
 
     def deliver(self) -> None:
-        """Publishes results and the newest feedback and, now and then, the status."""
+        """Publishes results, the newest feedback and, when it is due, the status."""
         with self._news:
             feedback, self._feedback = self._feedback, None
             outcomes, self._outcomes = self._outcomes, []
         if feedback is not None:
-            feedback[0].publish_feedback(to_feedback(feedback[1]))
+            handle, sample = feedback
+            handle.publish_feedback(FollowJointTrajectoryFeedback(*_fields(sample)))
         for handle, outcome in outcomes:
             _settle(handle, outcome)
         if self._status_is_due():
@@ -115,7 +178,7 @@ class TrajectoryAction:
         return not now < self._status_due <= now + STATUS_PERIOD  # time may have gone back
 
     def _deliver(self) -> None:
-        """Delivers as soon as there is something, until the action is closed."""
+        """Publishes news at once until the action is closed."""
         closing = False
         while not (closing or rospy.is_shutdown()):
             with self._news:
@@ -129,12 +192,12 @@ class TrajectoryAction:
         return self._sim.sim_time if self._sim.post_goes_with_steps else time.monotonic()
 
     def _has_news(self) -> bool:
-        post = self._feedback or self._outcomes
-        return self._closing or bool(post and not self._sim.post_goes_with_steps)
+        news = self._feedback or self._outcomes
+        return self._closing or bool(news and not self._sim.post_goes_with_steps)
 
 
-class GoalPort:
-    """Hears of one goal from the controller, within a control tick, and passes it on."""
+class GoalListener:
+    """Takes the controller's news of one goal within a control tick, and passes them on."""
 
     def __init__(self, action: TrajectoryAction, handle: ServerGoalHandle) -> None:
         self._action = action
@@ -155,3 +218,40 @@ def _settle(handle: ServerGoalHandle, outcome: Outcome) -> None:
         handle.set_aborted(result, outcome.text)
     else:
         handle.set_canceled(result, outcome.text)
+
+
+def to_controller_state(sample: TrajectorySample) -> JointTrajectoryControllerState:
+    return JointTrajectoryControllerState(*_fields(sample))
+
+
+def _fields(sample: TrajectorySample) -> tuple[Any, ...]:
+    """Returns header, names, desired, actual, error: the fields of state and feedback, in their order."""
+    points = [
+        JointTrajectoryPoint(
+            **dict(zip(("positions", "velocities", "accelerations"), values, strict=False))
+        )
+        for values in (sample.desired, sample.actual, sample.error)
+    ]
+    return Header(stamp=to_time(sample.stamp)), sample.names, *points
+
+
+def _to_trajectory(msg: JointTrajectory) -> Trajectory:
+    """Converts the message without its efforts."""
+    points = tuple(
+        TrajectoryPoint(p.time_from_start.to_nsec(), p.positions, p.velocities, p.accelerations)
+        for p in msg.points
+    )
+    return Trajectory(tuple(msg.joint_names), points, msg.header.stamp.to_nsec())
+
+
+def _to_request(goal: FollowJointTrajectoryGoal) -> GoalRequest:
+    return GoalRequest(
+        _to_trajectory(goal.trajectory),
+        _tolerances(goal.path_tolerance),
+        _tolerances(goal.goal_tolerance),
+        goal.goal_time_tolerance.to_nsec(),
+    )
+
+
+def _tolerances(tolerances: Iterable[JointTolerance]) -> dict[str, Tolerance]:
+    return {each.name: Tolerance(each.position, each.velocity) for each in tolerances}

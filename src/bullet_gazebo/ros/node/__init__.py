@@ -1,1 +1,1 @@
-"""The node `gazebo`: start, plugins, state topics."""
+"""The node `gazebo`: its start and end, time and state topics, and what keeps it alive."""

@@ -1,12 +1,14 @@
-"""The node `gazebo`: what `rosrun gazebo_ros gzserver` runs."""
+"""The node `gazebo`: the command `gzserver`, and `gazebo`, which also opens the window."""
 
 import argparse
+import contextlib
 import os
 import shlex
+import signal
+import subprocess
 import sys
 import threading
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import rospy
@@ -15,54 +17,109 @@ from bullet_gazebo.heap import use_one_arena
 from bullet_gazebo.physics.engine import Engine
 from bullet_gazebo.physics.engines import BULLET, ENGINES, EngineError, make_engine
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.pictures.recording import Recorder, RecordingError, RecordingOptions
-from bullet_gazebo.ros.control.control_plugin import FILENAME as CONTROL_PLUGIN
-from bullet_gazebo.ros.control.control_plugin import ControlPlugin
-from bullet_gazebo.ros.node.joint_state_plugin import FILENAME as JOINT_STATE_PLUGIN
-from bullet_gazebo.ros.node.joint_state_plugin import JointStatePlugin
-from bullet_gazebo.ros.node.master_watch import MasterWatch
-from bullet_gazebo.ros.node.one_world import (
-    NameLoss,
-    NameTaken,
-    refuse_twin,
+from bullet_gazebo.pictures.recording import RecordingError, RecordingOptions, SimulationRecorder
+from bullet_gazebo.ros.common.node_process import (
+    SignalHandler,
+    end_within,
+    full_name,
+    init_node,
+    one_at_a_time,
+    seed_random_numbers,
+    wait_for_master,
 )
-from bullet_gazebo.ros.node.server_args import parse_args
-from bullet_gazebo.ros.node.state_topics import advertise_states
-from bullet_gazebo.ros.node.watchdog import Watchdog
-from bullet_gazebo.ros.node.world_control import WorldControl
-from bullet_gazebo.ros.node.world_loader import fill_world, load_plugins, read_world
-from bullet_gazebo.ros.plugins import PluginRegistry
-from bullet_gazebo.ros.scene.scene_offer import SceneOffer
-from bullet_gazebo.ros.services.spawn_services import SpawnServices
-from bullet_gazebo.ros.services.stepping.advance_service import AdvanceService
-from bullet_gazebo.ros.services.stepping.friction_service import FrictionService
-from bullet_gazebo.ros.services.stepping.step_service import StepService
-from bullet_gazebo.ros.services.world_services import advertise_world_services
-from bullet_gazebo.ros.wire.names import full_name, one_at_a_time
-from bullet_gazebo.ros.wire.rospy_patches.connections import (
+from bullet_gazebo.ros.common.publishing import Thinner
+from bullet_gazebo.ros.common.rospy_connections import (
     Reception,
     bound_calls,
     bound_messages,
     hang_up_on_nonsense,
 )
-from bullet_gazebo.ros.wire.rospy_patches.registration import outlive_lack_of_threads
-from bullet_gazebo.ros.wire.rospy_patches.topics import free_polls_at_once
-from bullet_gazebo.ros.wire.seeding import seed_random_numbers
-from bullet_gazebo.ros.wire.signals import SignalHandler, end_within, init_node, wait_for_master
-from bullet_gazebo.ros.wire.thinning import Thinner
+from bullet_gazebo.ros.common.rospy_topics import free_polls_at_once
+from bullet_gazebo.ros.node.master_watch import MasterWatch, NameLoss, NodeNameTaken, refuse_twin
+from bullet_gazebo.ros.node.state_topics import advertise_states
+from bullet_gazebo.ros.node.watchdog import Watchdog
+from bullet_gazebo.ros.node.world_control import WorldControl
+from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
+from bullet_gazebo.ros.scene import SceneOffer
+from bullet_gazebo.ros.services.spawn_services import (
+    SpawnServices,
+    fill_world,
+    load_plugins,
+    read_world,
+)
+from bullet_gazebo.ros.services.stepping.advance_service import AdvanceService
+from bullet_gazebo.ros.services.stepping.friction_service import FrictionService
+from bullet_gazebo.ros.services.stepping.step_service import StepService
+from bullet_gazebo.ros.services.world_services import advertise_world_services
 from bullet_gazebo.simulator import Simulator
 from ros_calls import master
 
 NAME = "gazebo"
+EMPTY_WORLD = "empty.world"
+INERT = {  # options of Gazebo's that have no effect here: how many values follow them
+    ("-r", "--record"): 0,
+    ("-q", "--quiet"): 0,
+    ("--verbose",): 0,
+    ("--minimal_comms",): 0,
+    ("--record_resources",): 0,
+    ("-s", "--server-plugin"): 1,
+    ("-g", "--gui-plugin"): 1,
+    ("-i", "--iters"): 1,
+    ("-p", "--play"): 1,
+    ("--record_path",): 1,
+    ("--record_encoding",): 1,
+    ("--record_period",): 1,
+    ("--record_filter",): 1,
+}
+MORE_ARGUMENTS = "GZSERVER_ARGS"  # variable: for a server that another program starts
 MOST_FREQUENT = 1e9  # [Hz]; time is counted in nanoseconds
-EXIT_TIMEOUT = 10.0  # [s] for what plugins may have left to be done at the end
-HANGING_TIMEOUT = 1.0  # [s] the same where one of them never comes to its end
-RECORDING_TIMEOUT = 5.0  # [s] for what is still to be handed over to it
-MORE_ARGUMENTS = "GZSERVER_ARGS"  # variable: for a server that somebody else's program starts
+EXIT_TIMEOUT = 10.0  # [s] for what plugins have left to do at the end
+HANGING_TIMEOUT = 1.0  # [s] the same where one of them hangs
+RECORDING_TIMEOUT = 5.0  # [s] to hand over the last frames
+WINDOW = "import sys; from bullet_gazebo.ros.clients.gzclient import main; sys.exit(main())"
+WINDOW_NAME = "gazebo_gui"
+WINDOW_TIMEOUT = 5.0  # [s] for the window to close
+INTERRUPTED = 130
+
+
+def parse_args(argv: Sequence[str]) -> argparse.Namespace:
+    """Reads gzserver's options, in any order (docs/contract/gazebo_launch.md 4.2); ignores ROS's a:=b.
+
+    Returns:
+        world, paused, physics, lockstep, replace, seed, the video options, and `ignored`: the unknown ones.
+    """
+    parser = argparse.ArgumentParser(
+        prog="gzserver",
+        description="Simulate a world, as Gazebo's server does.",
+        usage="gzserver [options] [WORLD_FILE]",
+        allow_abbrev=False,
+    )
+    # The world is taken from the rest: it may be anywhere, also behind an unknown option.
+    option = parser.add_argument
+    option("-u", dest="paused", action="store_true", help="start paused")
+    option("-e", "--physics", default="ode", help="mujoco; all of Gazebo's names mean PyBullet")
+    option("-o", "--profile", nargs="?", help="accepted, without effect")
+    option("--lockstep", action="store_true", help="time moves only by ~step_world")
+    option("--replace", action="store_true", help="end a running simulator that has this name")
+    option("--video", default="", help="record the simulation in this MP4 file")
+    option("--video-rate", type=float, default=30.0, help="frames per second of simulated time")
+    option("--video-size", type=int, nargs=2, default=(640, 480), help="width, height [pixels]")
+    option("--video-model", default="", help="keep this model in the middle; default: all movable")
+    option("--seed", type=int, help="of Python's and NumPy's random numbers")
+    for names, values in INERT.items():
+        kind = {"nargs": values} if values else {"action": "store_const", "const": True}
+        option(*names, help="accepted, without effect", **kind)
+    args, left = parser.parse_known_args([argument for argument in argv if ":=" not in argument])
+    worlds = [argument for argument in left if not argument.startswith("-")]
+    if not worlds and args.profile and args.profile.endswith(".world"):
+        worlds = [args.profile]  # -o is often given without a value
+    args.world = worlds[-1] if worlds else EMPTY_WORLD
+    args.ignored = [argument for argument in left if argument != args.world]
+    return args
 
 
 class GazeboNode:
-    """The simulator, the thread that moves it, and all that it offers to ROS."""
+    """The simulator, the thread that moves it, and everything that it offers to ROS."""
 
     def __init__(
         self, args: argparse.Namespace, engine: Engine, interrupted: Callable[[], bool]
@@ -77,7 +134,7 @@ class GazeboNode:
         if args.paused:
             self.sim.pause()
         self._advertise(_flag("~enable_ros_network"))
-        self._recorder = None if recording is None else Recorder(self.sim, recording)
+        self._recorder = None if recording is None else SimulationRecorder(self.sim, recording)
         MasterWatch().start()
 
     def _advertise(self, network: bool) -> None:
@@ -90,13 +147,7 @@ class GazeboNode:
         hang_up_on_nonsense()
         thinner = Thinner(self.sim)
         advertise_states(self.sim, thinner, _clock_frequency(), network)
-        plugins = PluginRegistry(
-            self.sim,
-            {
-                CONTROL_PLUGIN: partial(ControlPlugin, thinner),
-                JOINT_STATE_PLUGIN: JointStatePlugin,
-            },
-        )
+        plugins = PluginRegistry(self.sim, thinner)
         load_plugins(self.sim, plugins)
         if not network:
             return
@@ -119,12 +170,12 @@ class GazeboNode:
         """Simulates until the node is shut down; returns the exit code."""
         # Called before the topics close, so that no tick publishes to a closed one.
         rospy.on_shutdown(self._watchdog.stop)
-        if signals.noted():  # while all was made ready: no time passes any more
+        if signals.noted():  # during the start: no time passes any more
             self._watchdog.stop()
         else:
             self._watchdog.start()
-        signals.wait(self._watchdog.barks)
-        failed = self._watchdog.barks()
+        signals.wait(self._watchdog.failed)
+        failed = self._watchdog.failed()
         self._watchdog.stop()  # a shutdown that came before the hook was there doesn't call it
         if self._recorder is not None:
             self._recorder.close(RECORDING_TIMEOUT)
@@ -136,7 +187,7 @@ class GazeboNode:
 
 
 def _recording(args: argparse.Namespace) -> RecordingOptions | None:
-    """Returns what the command line says of a recording.
+    """Returns the recording that the command line asks for.
 
     Raises:
         RecordingError: if it can't be made.
@@ -151,7 +202,7 @@ def _recording(args: argparse.Namespace) -> RecordingOptions | None:
 
 
 def _flag(name: str) -> bool:
-    """Returns a parameter that is true unless it says false; what is neither is a warning, as in Gazebo."""
+    """Returns a parameter whose default is true; another value than a bool is a warning, as in Gazebo."""
     value = rospy.get_param(name, True)
     if isinstance(value, bool):
         return value
@@ -160,7 +211,7 @@ def _flag(name: str) -> bool:
 
 
 def _clock_frequency() -> float:
-    """Returns ~pub_clock_frequency [Hz of simulated time]; 0 is every tick, and what can't be one too."""
+    """Returns ~pub_clock_frequency [Hz of simulated time]; 0, which is every tick, if that is invalid."""
     value = rospy.get_param("~pub_clock_frequency", 0)
     # A period of less than a nanosecond, or of more than a thousand years, is a mistake.
     if isinstance(value, (int, float)) and (
@@ -200,13 +251,12 @@ def main(argv: list[str] | None = None) -> int:
         with one_at_a_time(name):
             if not args.replace:
                 refuse_twin(name)
-            outlive_lack_of_threads()
             init_node(NAME, command_line, anonymous=False)
-    except NameTaken as error:
+    except NodeNameTaken as error:
         print(f"gzserver: {error}", file=sys.stderr)
         return 1
     loss = NameLoss()
-    # Not before: while there is no master, a signal ends the process as such.
+    # Not before: while there is no master, a signal ends the process as usual.
     signals = SignalHandler()
     if args.physics not in ENGINES:
         rospy.logwarn("Physics engine '%s' is not known; PyBullet is used", args.physics)
@@ -224,3 +274,32 @@ def main(argv: list[str] | None = None) -> int:
         code = code or 1
     end_within(EXIT_TIMEOUT, code)
     return code
+
+
+def main_with_window(argv: Sequence[str] | None = None) -> int:
+    """Runs the node in this process and the window in another one; returns the node's exit code."""
+    command_line = list(sys.argv if argv is None else argv)
+    # Until the node listens to them, both end the block, and with it the window.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
+    try:
+        with _window(command_line[1:]):
+            return main(command_line)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+@contextlib.contextmanager
+def _window(arguments: Sequence[str]) -> Iterator[None]:
+    # The launch file's name and log file are the server's.
+    own = [a for a in arguments if ":=" in a and not a.startswith(("__name:=", "__log:="))]
+    client = subprocess.Popen([sys.executable, "-P", "-c", WINDOW, *own, f"__name:={WINDOW_NAME}"])
+    try:
+        yield
+    finally:
+        client.send_signal(signal.SIGTERM)
+        try:
+            client.wait(WINDOW_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            client.kill()
+            client.wait()

@@ -1,38 +1,87 @@
-"""A master that goes, or is started again: it doesn't know the simulator then, and nobody finds it."""
+"""The node's name at the master: refused to a second simulator, registered again at a new master."""
 
 import threading
 from collections.abc import Callable
+from urllib.parse import urlsplit
 
 import rospy
 
-from bullet_gazebo.ros.wire.rospy_patches.registration import register_again, witness
+from bullet_gazebo.ros.common.rospy_node import register_again, witness
 from ros_calls import master
-from ros_calls.master import NoAnswer, Refused
+from ros_calls.master import NoAnswer, Refused, living_address
 
 PERIOD = 10.0  # [s of wall time] between two questions
-TIMEOUT = 5.0  # [s] of one
+TIMEOUT = 5.0  # [s] of each question
+LIVING = 5.0  # [s] for an answer of a busy node; that of a killed one comes at once
 MISSES = 2  # unanswered questions, after which the master is gone
 TIME = "/use_sim_time"
+MASTERS_REASON = "new node registered with same name"
+
+
+class NodeNameTaken(Exception):
+    """A living node has the name; the text says which, and what to do."""
+
+
+def refuse_twin(name: str) -> None:
+    """Makes sure that no living node has that name: registering would end it without a word.
+
+    Raises:
+        NodeNameTaken: if one has.
+    """
+    try:
+        address = living_address(name, LIVING)
+    except NoAnswer:  # the master has gone meanwhile; rospy waits for it
+        return
+    if address is not None:
+        raise NodeNameTaken(
+            f"{name} runs at {master.uri()} already ({address}): it stays, and this one ends. "
+            f"{_two_masters()}; replace:=true (gzserver --replace) ends the one that runs"
+        )
+
+
+def _two_masters() -> str:
+    host, port = master.host_and_port()
+    scheme = urlsplit(master.uri()).scheme or "http"
+    another = f"{scheme}://{host}:{port + 1 if port < 65535 else port - 1}"
+    return f"Two simulators need two masters, for example ROS_MASTER_URI={another} before roslaunch"
+
+
+class NameLoss:
+    """Notices that the master ends this node because another one takes its name."""
+
+    def __init__(self) -> None:
+        self.happened = False
+        rospy.core.add_preshutdown_hook(self._note)
+
+    def _note(self, reason: str) -> None:
+        self.happened = MASTERS_REASON in reason
+
+    def text(self, name: str) -> str:
+        """Returns what happened, in one line."""
+        return (
+            f"another node has taken the name {name} at {master.uri()}, so this simulator ends. "
+            f"{_two_masters()}"
+        )
 
 
 class MasterWatch:
-    """Asks the master, now and then, whether it knows this node, and has it know it again.
+    """Asks the master every 10 s whether it knows this node, and registers the node again if not.
 
-    It is asked for a service, not for the node: a master that doesn't know the node learns its name with the
-    first topic that comes later.
+    It asks for a service, not for the node: a restarted master learns the node's name with the first topic
+    that is added later.
     """
 
     def __init__(self, register: Callable[[float], None] = register_again) -> None:
-        """`register` tells the master what the node offers; its argument is the time limit of a call [s]."""
+        """`register` registers the node; its argument is the time limit of each call [s]."""
         self._register = register
         self._witness, self._address = witness()
         self._use_sim_time = rospy.get_param(TIME)
         self._misses = 0
-        self._taken: str | None = None  # the address of another node's, once it was told
+        self._taken: str | None = None  # address of another node with our name, once reported
         self._ending = threading.Event()
 
     def start(self) -> None:
-        """Watches in a thread of its own, until the node ends."""
+        """Watches in a thread of its own until the node ends."""
         rospy.on_shutdown(self._ending.set)
         threading.Thread(target=self._watch, name="master", daemon=True).start()
 
@@ -41,7 +90,7 @@ class MasterWatch:
             self.look()
 
     def look(self) -> None:
-        """Asks once, and does what is to be done."""
+        """Asks once, and acts on the answer."""
         try:
             try:
                 known = master.call("lookupService", self._witness, timeout=TIMEOUT)
@@ -60,12 +109,13 @@ class MasterWatch:
         self._misses += 1
         if self._misses == MISSES and not self._ending.is_set():
             rospy.logwarn(
-                "The master at %s is gone (%s). Who is connected stays so, but nobody else finds this "
-                "simulator; it registers again once there is one at that address", master.uri(), fault,
+                "The master at %s is gone (%s). Existing connections stay, but nobody else finds this "
+                "simulator; it registers again once there is a master at that address",
+                master.uri(), fault,
             )  # fmt: skip
 
     def _come_back(self) -> None:
-        """The master doesn't know us: it isn't the one that we registered with."""
+        """Registers at a master that isn't the one we registered with."""
         if self._ending.is_set():  # we have unregistered ourselves
             return
         # Clients take the world for ready once it has its services, so the time comes first.
@@ -74,9 +124,9 @@ class MasterWatch:
         self._register(TIMEOUT)
         self._misses = 0
         rospy.logwarn(
-            "The master at %s was started again: this node wasn't registered there, and is now. Parameters, "
-            "such as robot descriptions and settings of controllers, went with the old one; who needs them "
-            "sets them again, or restarts the launch", master.uri(),
+            "The master at %s was restarted: this node wasn't registered there, and is now. Parameters, such "
+            "as robot descriptions and settings of controllers, went with the old master; set them again, or "
+            "restart the launch", master.uri(),
         )  # fmt: skip
 
     def _compare(self, known: str) -> None:
@@ -84,7 +134,7 @@ class MasterWatch:
             return
         self._taken = known
         rospy.logwarn(
-            "The master at %s was started again, and another node (at %s) has the name %s there: nobody "
-            "finds this simulator (at %s). End one of the two",
+            "The master at %s was restarted, and another node (at %s) has the name %s there: nobody finds "
+            "this simulator (at %s). End one of the two",
             master.uri(), known, rospy.get_name(), self._address,
         )  # fmt: skip

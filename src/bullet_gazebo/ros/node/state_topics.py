@@ -7,17 +7,16 @@ import rospy
 from gazebo_msgs.msg import LinkStates, ModelStates
 from rosgraph_msgs.msg import Clock
 
-from bullet_gazebo.ros.wire.conversions import to_pose_msg, to_time, to_twist_msg
-from bullet_gazebo.ros.wire.rospy_patches.node import set_time, stop_hearing_clock
-from bullet_gazebo.ros.wire.subscribers import SubscriberCount
-from bullet_gazebo.ros.wire.thinning import ThinnedTopic, Thinner
+from bullet_gazebo.ros.common.messages import to_pose_msg, to_time, to_twist_msg
+from bullet_gazebo.ros.common.publishing import SubscriberCount, ThinnedTopic, Thinner
+from bullet_gazebo.ros.common.rospy_node import set_time, stop_hearing_clock
 from bullet_gazebo.simulator import Simulator
 
 QUEUE = 10
 
 
 class StateTopic(ThinnedTopic):
-    """A topic that shows the state before each step, while somebody listens."""
+    """A topic with the state before each step, made only for subscribers."""
 
     def __init__(
         self, name: str, kind: type, sim: Simulator, thinner: Thinner, make: Callable[[], object]
@@ -27,7 +26,7 @@ class StateTopic(ThinnedTopic):
         publisher = rospy.Publisher(
             name, kind, subscriber_listener=self._subscribers, queue_size=QUEUE, tcp_nodelay=True
         )
-        # A sample only says that there is news: states are many, and made up when they are sent.
+        # A sample only says that there is news: the message is long, and made when it is sent.
         super().__init__(thinner, publisher.resolved_name, lambda now: publisher.publish(make()))
 
     def __call__(self, now: int) -> None:
@@ -35,7 +34,7 @@ class StateTopic(ThinnedTopic):
             self.send(now)
 
     def flush(self) -> None:
-        with self._sim.lock:  # making it up looks at the world
+        with self._sim.lock:  # make() reads the world
             super().flush()
 
 
@@ -70,7 +69,7 @@ class ClockTopic(ThinnedTopic):
 def advertise_states(
     sim: Simulator, thinner: Thinner, clock_frequency: float, network: bool
 ) -> None:
-    """Publishes /clock and, with `network`, the state topics, as the simulation ticks."""
+    """Publishes /clock and, with `network`, the state topics, on the simulation's ticks."""
     sim.listeners.append(ClockTopic(sim, thinner, clock_frequency))
     if network:
         for name, kind, make in (

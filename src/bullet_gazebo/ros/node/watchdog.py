@@ -1,28 +1,35 @@
-"""A world whose time silently stands still is worse than one that ends: a fault in it ends the node.
+"""The thread that moves the world, and what notices that it has failed or stands still.
 
-Where it stands still without a fault, because somebody's code keeps its lock, that is told.
+A world whose time silently stands still is worse than one that ends, so a fault in it ends the node. Where a
+plugin or controller never returns and keeps the world's lock, the log says whose code it is.
 """
 
+import sys
 import threading
 import time
 import traceback
-from types import TracebackType
+from collections.abc import Callable, Iterator
+from types import FrameType, TracebackType
 
 import rospy
 
-from bullet_gazebo.ros.node.stall import StallWatch, holder
+from bullet_gazebo.control.controllers.base import Controller
+from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
 from bullet_gazebo.simulator import Simulator
+from bullet_gazebo.timing import FairLock
 
 STOP_TIMEOUT = 5.0  # [s] for the tick in progress
-GRACE = 0.5  # [s] the same, where it was told that it doesn't come to its end
+GRACE = 0.5  # [s] the same where the tick was found to hang
+PATIENCE = 10.0  # [s of wall time] for whoever keeps the lock
+LONGEST_LOOK = 1.0  # [s] counted between two looks; a suspended process sees more pass
+DEPTH = 12  # innermost frames that are logged
 
 
 class Watchdog:
     """Moves the world in a thread of its own, and knows whether it goes on.
 
-    Whoever else moves it does that in a block of this one (``with watchdog:``). What is raised there, or
-    in the thread, is told in the log; the main thread looks at `barks` again and again, also for a thread
-    that has ended without a word.
+    Others move the world in a ``with watchdog:`` block. An exception there or in the thread is logged, and
+    `failed` returns true from then on.
     """
 
     def __init__(self, sim: Simulator) -> None:
@@ -35,7 +42,7 @@ class Watchdog:
         self._deadline: float | None = None  # of the end
 
     def start(self) -> None:
-        """Lets time run by itself."""
+        """Lets time pass."""
         self._began = True
         self._thread.start()
 
@@ -43,15 +50,15 @@ class Watchdog:
         try:
             self._sim.run()
         except BaseException as error:  # noqa: BLE001 - the end of a thread
-            self._tell(error)
+            self._report(error)
         finally:
             self._ended.set()
 
-    def barks(self) -> bool:
-        """Whether the world has failed; to be asked several times a second, once it was started."""
+    def failed(self) -> bool:
+        """Returns whether the world has failed; call it several times a second after `start`."""
         self._stall.look()
         if not (self._fault or self._stopped or self._thread.is_alive()):
-            self._fault = True
+            self._fault = True  # even the report of its fault failed
             rospy.logfatal("The thread that moves the world has ended, so the node ends.")
         return self._fault
 
@@ -65,10 +72,10 @@ class Watchdog:
         trace: TracebackType | None,
     ) -> None:
         if error is not None:
-            self._tell(error)
+            self._report(error)
 
-    def _tell(self, error: BaseException) -> None:
-        if rospy.is_shutdown():  # topics may be closed before a tick that is in progress is done
+    def _report(self, error: BaseException) -> None:
+        if rospy.is_shutdown():  # the tick in progress may meet closed topics
             return
         self._fault = True
         text = "".join(traceback.format_exception(error))
@@ -82,12 +89,81 @@ class Watchdog:
         self._stopped = True
         self._sim.stop()
         if self._deadline is None:
-            self._deadline = time.monotonic() + (GRACE if self._stall.told else STOP_TIMEOUT)
+            self._deadline = time.monotonic() + (GRACE if self._stall.reported else STOP_TIMEOUT)
         if self._began and threading.current_thread() is not self._thread:
             self._ended.wait(max(0.0, self._deadline - time.monotonic()))
 
     def left_hanging(self) -> str | None:
-        """Who keeps the world's lock for ever, if somebody does; to be asked once it was stopped."""
+        """Returns who still keeps the world's lock after `stop`, if anybody does."""
         lock = self._sim.lock
         ended = not self._began or self._ended.is_set()
-        return holder(lock) if self._stall.told or (lock.held and not ended) else None
+        return holder(lock) if self._stall.reported or (lock.held and not ended) else None
+
+
+class StallWatch:
+    """Notices that somebody has kept the world's lock for PATIENCE without a tick.
+
+    A paused, held or slow world doesn't count: its lock is free in between.
+    """
+
+    def __init__(
+        self,
+        sim: Simulator,
+        report: Callable[[str], None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """`report` gets one text for each stall; `clock` returns [s]."""
+        self._sim = sim
+        self._report = report
+        self._clock = clock
+        self._seen: tuple[int, int] | None = None
+        self._looked = clock()
+        self._waited = 0.0  # [s]
+        self.reported = False  # the current stall
+
+    def look(self) -> None:
+        """Looks once; call it several times a second, from a thread that never takes the lock."""
+        now = self._clock()
+        passed, self._looked = min(now - self._looked, LONGEST_LOOK), now
+        seen = (self._sim.lock.turns, self._sim.now) if self._sim.lock.held else None
+        if seen is None or seen != self._seen:
+            self._seen, self._waited, self.reported = seen, 0.0, False
+            return
+        self._waited += passed
+        if self._waited >= PATIENCE and not self.reported:
+            self.reported = True
+            self._report(
+                f"Time stands still and services wait: for {PATIENCE:g} s of wall time the world's lock has "
+                f"been kept by {holder(self._sim.lock)}"
+            )
+
+
+def holder(lock: FairLock) -> str:
+    """Says who holds the lock, with the innermost lines of the stack."""
+    thread = lock.holder
+    frame = sys._current_frames().get(thread) if thread is not None else None
+    if frame is None:
+        return "a thread that has ended without releasing it"
+    names = {each.ident: each.name for each in threading.enumerate()}
+    stack = traceback.StackSummary.extract(_outwards(frame), limit=DEPTH)
+    stack.reverse()
+    return f"{_culprit(frame)}, in thread '{names.get(thread, thread)}':\n{''.join(stack.format())}"
+
+
+def _culprit(innermost: FrameType) -> str:
+    """Returns the plugin or controller whose code runs; the place in the code if it is neither's."""
+    for frame, _ in _outwards(innermost):
+        owner = frame.f_locals.get("self")
+        if isinstance(owner, PluginContext):
+            return f"plugin {owner.plugin.filename} of model '{owner.model.name}'"
+        if isinstance(owner, Controller):
+            return f"controller '{owner.name}' ({owner.type_name})"
+    code = innermost.f_code
+    return f"{code.co_qualname} ({code.co_filename}, line {innermost.f_lineno})"
+
+
+def _outwards(innermost: FrameType) -> Iterator[tuple[FrameType, int]]:
+    frame: FrameType | None = innermost
+    while frame is not None:
+        yield frame, frame.f_lineno
+        frame = frame.f_back

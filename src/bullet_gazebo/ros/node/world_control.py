@@ -1,24 +1,23 @@
-"""What `gz world` needs of a running simulator, without a ROS name for it.
+"""The XML-RPC call `gazeboWorld` of the simulator's node, which `gz world` makes.
 
-Every ROS node answers XML-RPC calls of master and tools at the address that the master knows
-(getPid, shutdown and so on). The simulator's node answers one more there, `gazeboWorld`: found
-through its node's name, from any machine, and neither a topic nor a service, of which Gazebo's own
-must be the only ones (docs/contract/gazebo.md 7).
+Every ROS node answers XML-RPC calls of master and tools (getPid, shutdown and so on). The simulator answers
+one more: it is found by the node's name from any machine, and is neither a topic nor a service, of which
+there must be only Gazebo's own (docs/contract/gazebo.md 7).
 """
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 
-from bullet_gazebo.ros.clients.world_client import CHUNK, METHOD
-from bullet_gazebo.ros.wire.rospy_patches.node import answer_xmlrpc
+from bullet_gazebo.ros.clients.gz import CHUNK, METHOD
+from bullet_gazebo.ros.common.rospy_node import answer_xmlrpc
 from bullet_gazebo.simulator import Simulator
 
 Answer = tuple[int, str, int]
-LONGEST = 80  # of an unknown command that is told back
+LONGEST = 80  # of an unknown command in an answer
 
 
 class WorldControl:
-    """The side of the simulator; the clients' is world_client.py."""
+    """The simulator's side of `bullet_gazebo.ros.clients.gz.RemoteWorld`."""
 
     def __init__(
         self,
@@ -26,7 +25,7 @@ class WorldControl:
         watchdog: AbstractContextManager[object],
         show: Callable[[], None] | None = None,
     ) -> None:
-        """A fault in a block of `watchdog` ends the node. `show` offers the scene to a window."""
+        """A fault in a block of `watchdog` ends the node. `show` opens the scene for a window."""
         self._sim = sim
         self._watchdog = watchdog
         self._commands = {
@@ -40,11 +39,11 @@ class WorldControl:
             self._commands["show"] = show
 
     def offer(self) -> None:
-        """Has this process's node answer."""
+        """Makes this process's node answer the call."""
         answer_xmlrpc(METHOD, self.answer)
 
     def answer(self, *arguments: object) -> Answer:
-        """Carries out a command, and answers in ROS's way: code (1 is success), text, ticks done.
+        """Carries out a command; returns code (1 is success), text, ticks done.
 
         Args:
             arguments: the command; for "step" also the number of ticks, 1 by default. XML-RPC has no
@@ -61,7 +60,7 @@ class WorldControl:
             return _refused(f"{kinds}: a command is a string, a number of steps an integer")
         if command == "step":
             if not 1 <= count <= CHUNK:
-                return _refused(f"{count} steps: 1 to {CHUNK} can be done in one call")
+                return _refused(f"{count} steps: one call does 1 to {CHUNK}")
             with self._watchdog:
                 self._sim.step(count)
             return 1, "step", count

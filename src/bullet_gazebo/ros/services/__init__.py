@@ -1,1 +1,1 @@
-"""The services of the node `gazebo`, a module for each group."""
+"""The services of the node `gazebo`, grouped as in docs/contract/gazebo.md."""

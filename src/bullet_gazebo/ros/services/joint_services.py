@@ -1,12 +1,25 @@
-"""Joint properties and set_model_configuration (docs/contract/gazebo.md 2.10, 2.16 and 2.17)."""
+"""Joints, and forces on joints and links (docs/contract/gazebo.md 2.10 and 2.16 to 2.19)."""
 
 import math
 
+import genpy
 import rospy
 from gazebo_msgs.srv import (
+    ApplyBodyWrench,
+    ApplyBodyWrenchRequest,
+    ApplyBodyWrenchResponse,
+    ApplyJointEffort,
+    ApplyJointEffortRequest,
+    ApplyJointEffortResponse,
+    BodyRequest,
+    BodyRequestRequest,
+    BodyRequestResponse,
     GetJointProperties,
     GetJointPropertiesRequest,
     GetJointPropertiesResponse,
+    JointRequest,
+    JointRequestRequest,
+    JointRequestResponse,
     SetJointProperties,
     SetJointPropertiesRequest,
     SetJointPropertiesResponse,
@@ -15,13 +28,14 @@ from gazebo_msgs.srv import (
     SetModelConfigurationResponse,
 )
 
+from bullet_gazebo.applied_forces import AppliedEffort, AppliedWrench, Interval, in_world
 from bullet_gazebo.physics.properties import JointProperties, PropertyError, set_joint_properties
-from bullet_gazebo.ros.wire.checks import bad_number
+from bullet_gazebo.ros.common.messages import bad_number, to_vector
 from bullet_gazebo.simulator import Simulator
 
-LONGEST_NAME = 80  # of a joint that is told in the log
-MOST_NAMES = 10  # told there
-INFINITE = 1.7e308  # ODE's users write stops that are none as 1e16 and beyond
+LONGEST_NAME = 80  # of a joint in the log
+MOST_NAMES = 10  # in a line of the log
+INFINITE = 1.7e308  # ODE's users write 1e16 and beyond for a joint without stops
 
 
 class JointServices:
@@ -56,16 +70,19 @@ class JointServices:
         )
 
     def _set_properties(self, request: SetJointPropertiesRequest) -> SetJointPropertiesResponse:
+        def refused(fault: str) -> SetJointPropertiesResponse:
+            return SetJointPropertiesResponse(False, f"SetJointProperties: {fault}")
+
         with self._sim.lock:
             found = self._sim.world.joint(request.joint_name)
             if found is None:
-                return _not_set("joint not found")
+                return refused("joint not found")
             ode = request.ode_joint_config
             fault = bad_number(ode, INFINITE)
             if fault:
-                return _not_set(fault)
+                return refused(fault)
             # Element i is for axis i, and no joint here has a second one. An empty list changes nothing.
-            # What is left out (erp, cfm, stop_erp, stop_cfm, fudge_factor) has no getter and no effect.
+            # The other fields (erp, cfm, stop_erp, stop_cfm, fudge_factor) have no getter and no effect.
             wanted = JointProperties(
                 *(
                     next(iter(values), None)
@@ -75,38 +92,94 @@ class JointServices:
             try:
                 set_joint_properties(*found, wanted, self._sim.world.time_step)
             except PropertyError as error:
-                return _not_set(str(error))
+                return refused(str(error))
         return SetJointPropertiesResponse(True, "SetJointProperties: properties set")
 
     def _set_configuration(
         self, request: SetModelConfigurationRequest
     ) -> SetModelConfigurationResponse:
+        def refused(fault: str) -> SetModelConfigurationResponse:
+            return SetModelConfigurationResponse(False, f"SetModelConfiguration: {fault}")
+
         names, positions = request.joint_names, request.joint_positions
         with self._sim.lock:
             model = self._sim.world.model(request.model_name)
             if model is None:
-                return _not_configured("model does not exist")
+                return refused("model does not exist")
             if len(names) != len(positions):
-                return _not_configured("joint name and position list have different lengths")
+                return refused("joint name and position list have different lengths")
             if not all(math.isfinite(position) for position in positions):
-                return _not_configured(f"joint positions must be finite, not {list(positions)}")
+                return refused(f"joint positions must be finite, not {list(positions)}")
             plain = [name.removeprefix(f"{model.name}::") for name in names]
             self._sim.set_joint_positions(model, dict(zip(plain, positions, strict=True)))
-        _warn_of(set(plain) - set(model.joint_names), model.name)
+        unknown = sorted(set(plain) - set(model.joint_names))
+        if unknown:  # Gazebo ignores them without a word
+            some = [name[:LONGEST_NAME] for name in unknown[:MOST_NAMES]]
+            more = f" and {len(unknown) - MOST_NAMES} more" if len(unknown) > MOST_NAMES else ""
+            text = "SetModelConfiguration: model '%s' has no joint %s%s"
+            rospy.logwarn(text, model.name, some, more)
         return SetModelConfigurationResponse(True, "SetModelConfiguration: success")
 
 
-def _not_set(fault: str) -> SetJointPropertiesResponse:
-    return SetJointPropertiesResponse(False, f"SetJointProperties: {fault}")
+class ForceServices:
+    """Services that push joints and links for a time. They queue the force and answer at once."""
 
+    def __init__(self, sim: Simulator) -> None:
+        self._sim = sim
+        self._services = [
+            rospy.Service("~apply_joint_effort", ApplyJointEffort, self._apply_effort),
+            rospy.Service("~apply_body_wrench", ApplyBodyWrench, self._apply_wrench),
+            rospy.Service("~clear_joint_forces", JointRequest, self._clear_efforts),
+            rospy.Service("~clear_body_wrenches", BodyRequest, self._clear_wrenches),
+        ]
 
-def _not_configured(fault: str) -> SetModelConfigurationResponse:
-    return SetModelConfigurationResponse(False, f"SetModelConfiguration: {fault}")
+    def _apply_effort(self, request: ApplyJointEffortRequest) -> ApplyJointEffortResponse:
+        with self._sim.lock:
+            found = self._sim.world.joint(request.joint_name)
+            if found is None:
+                return ApplyJointEffortResponse(False, "ApplyJointEffort: joint not found")
+            fault = bad_number(request)
+            if fault:
+                return ApplyJointEffortResponse(False, f"ApplyJointEffort: {fault}")
+            interval = self._interval(request.start_time, request.duration)
+            self._sim.applied.add_effort(AppliedEffort(*found, request.effort, interval))
+        return ApplyJointEffortResponse(True, "ApplyJointEffort: effort set")
 
+    def _apply_wrench(self, request: ApplyBodyWrenchRequest) -> ApplyBodyWrenchResponse:
+        def refused(fault: str) -> ApplyBodyWrenchResponse:
+            return ApplyBodyWrenchResponse(False, f"ApplyBodyWrench: {fault}")
 
-def _warn_of(unknown: set[str], model: str) -> None:
-    """Gazebo ignores joints that the model lacks without a word."""
-    if unknown:
-        names = [name[:LONGEST_NAME] for name in sorted(unknown)[:MOST_NAMES]]
-        more = f" and {len(unknown) - MOST_NAMES} more" if len(unknown) > MOST_NAMES else ""
-        rospy.logwarn("SetModelConfiguration: model '%s' has no joint %s%s", model, names, more)
+        with self._sim.lock:
+            world = self._sim.world
+            found = world.link(request.body_name)
+            if found is None:
+                return refused("body does not exist")
+            frame = world.frame(request.reference_frame)
+            if frame is None:
+                return refused("reference_frame not found")
+            fault = bad_number(request)
+            if fault:
+                return refused(fault)
+            wrench = in_world(
+                (to_vector(request.wrench.force), to_vector(request.wrench.torque)),
+                to_vector(request.reference_point),
+                found[0].link_state(found[1])[0],
+                None if world.is_world_frame(request.reference_frame) else frame[0],
+            )
+            interval = self._interval(request.start_time, request.duration)
+            self._sim.applied.add_wrench(AppliedWrench(*found, wrench, interval))
+        return ApplyBodyWrenchResponse(True, "")
+
+    def _interval(self, start: genpy.Time, duration: genpy.Duration) -> Interval:
+        """A start in the past means now."""
+        return Interval(max(start.to_nsec(), self._sim.now), duration.to_nsec())
+
+    def _clear_efforts(self, request: JointRequestRequest) -> JointRequestResponse:
+        with self._sim.lock:
+            self._sim.applied.clear_efforts(request.joint_name)
+        return JointRequestResponse()
+
+    def _clear_wrenches(self, request: BodyRequestRequest) -> BodyRequestResponse:
+        with self._sim.lock:
+            self._sim.applied.clear_wrenches(request.body_name)
+        return BodyRequestResponse()

@@ -1,25 +1,56 @@
-"""get_model_state, get_model_properties, get_world_properties (docs/contract/gazebo.md 2.7 to 2.9)."""
+"""State and properties of models and links (docs/contract/gazebo.md 2.7 to 2.9 and 2.11 to 2.15)."""
 
 from collections import Counter
+from dataclasses import replace
 
 import genpy
 import rospy
+from gazebo_msgs.msg import LinkState, ModelState
 from gazebo_msgs.srv import (
+    GetLinkProperties,
+    GetLinkPropertiesRequest,
+    GetLinkPropertiesResponse,
+    GetLinkState,
+    GetLinkStateRequest,
+    GetLinkStateResponse,
     GetModelProperties,
     GetModelPropertiesRequest,
     GetModelPropertiesResponse,
     GetModelState,
     GetModelStateRequest,
     GetModelStateResponse,
-    GetWorldProperties,
-    GetWorldPropertiesRequest,
-    GetWorldPropertiesResponse,
+    SetLinkProperties,
+    SetLinkPropertiesRequest,
+    SetLinkPropertiesResponse,
+    SetLinkState,
+    SetLinkStateRequest,
+    SetLinkStateResponse,
+    SetModelState,
+    SetModelStateRequest,
+    SetModelStateResponse,
 )
 from std_msgs.msg import Header
 
-from bullet_gazebo.physics.world import seen_from
-from bullet_gazebo.ros.wire.conversions import to_pose_msg, to_time, to_twist_msg
+from bullet_gazebo.physics.description import DescriptionError
+from bullet_gazebo.physics.engine import Twist
+from bullet_gazebo.physics.model import AT_REST
+from bullet_gazebo.physics.pose import Pose, rotate, subtract
+from bullet_gazebo.physics.properties import PropertyError, link_inertia, set_link_properties
+from bullet_gazebo.physics.world import WORLD_FRAMES, seen_from
+from bullet_gazebo.ros.common.messages import (
+    bad_number,
+    from_pose_msg,
+    from_twist_msg,
+    to_pose_msg,
+    to_time,
+    to_twist_msg,
+    to_vector,
+)
 from bullet_gazebo.simulator import Simulator
+
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+SCOPE = "did you forget to scope the link by model name?"
+QUEUE = 10
 
 
 class _StateResponse(GetModelStateResponse):
@@ -29,7 +60,7 @@ class _StateResponse(GetModelStateResponse):
 
 
 class ModelServices:
-    """Services that tell where models are."""
+    """get_model_properties, get_model_state and set_model_state; the topic of the latter has no answer."""
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
@@ -37,18 +68,9 @@ class ModelServices:
         self._services = [
             rospy.Service("~get_model_state", GetModelState, self._get_state),
             rospy.Service("~get_model_properties", GetModelProperties, self._get_properties),
-            rospy.Service("~get_world_properties", GetWorldProperties, self._get_world),
+            rospy.Service("~set_model_state", SetModelState, self._set_state),
         ]
-
-    def _get_world(self, request: GetWorldPropertiesRequest) -> GetWorldPropertiesResponse:
-        with self._sim.lock:
-            return GetWorldPropertiesResponse(
-                sim_time=self._sim.sim_time,
-                model_names=list(self._sim.world.models),
-                rendering_enabled=False,  # no cameras here: who waits for pictures has to know
-                success=True,
-                status_message="GetWorldProperties: got properties",
-            )
+        self._topic = rospy.Subscriber("~set_model_state", ModelState, self._hear, queue_size=QUEUE)
 
     def _get_properties(self, request: GetModelPropertiesRequest) -> GetModelPropertiesResponse:
         with self._sim.lock:
@@ -94,6 +116,133 @@ class ModelServices:
         return response
 
     def _stamp(self) -> genpy.Time:
-        """The node's own time, as Gazebo stamps it: the wall's with use_sim_time:=false."""
+        """Returns the node's own time, as Gazebo does: the wall's with use_sim_time:=false."""
         # rospy's simulated time may lag behind where /clock is thinned.
         return rospy.get_rostime() if rospy.rostime.is_wallclock() else to_time(self._sim.now)
+
+    def _hear(self, state: ModelState) -> None:
+        self._set_state(SetModelStateRequest(state))
+
+    def _set_state(self, request: SetModelStateRequest) -> SetModelStateResponse:
+        wanted = request.model_state
+
+        def refused(fault: str) -> SetModelStateResponse:
+            return SetModelStateResponse(False, f"SetModelState: {fault}")
+
+        with self._sim.lock:
+            model = self._sim.world.model(wanted.model_name)
+            if model is None:
+                return refused("model does not exist")
+            frame = self._sim.world.frame(wanted.reference_frame)
+            if frame is None:
+                return refused("specified reference frame entity does not exist")
+            fault = bad_number(wanted)
+            if fault:
+                return refused(fault)
+            # The twist is turned with the frame; the frame's own velocity is not added.
+            linear, angular = (
+                rotate(frame[0].orientation, part) for part in from_twist_msg(wanted.twist)
+            )
+            pose = frame[0].compose(from_pose_msg(wanted.pose))
+            self._sim.place_model(model, pose, (linear, angular))
+        return SetModelStateResponse(True, "SetModelState: set model state done")
+
+
+class LinkServices:
+    """get_ and set_link_properties, get_ and set_link_state; the topic of the latter has no answer."""
+
+    def __init__(self, sim: Simulator) -> None:
+        self._sim = sim
+        self._services = [
+            rospy.Service("~get_link_properties", GetLinkProperties, self._get_properties),
+            rospy.Service("~set_link_properties", SetLinkProperties, self._set_properties),
+            rospy.Service("~get_link_state", GetLinkState, self._get_state),
+            rospy.Service("~set_link_state", SetLinkState, self._set_state),
+        ]
+        self._topic = rospy.Subscriber("~set_link_state", LinkState, self._hear, queue_size=QUEUE)
+
+    def _get_properties(self, request: GetLinkPropertiesRequest) -> GetLinkPropertiesResponse:
+        with self._sim.lock:
+            found = self._sim.world.link(request.link_name)
+            if found is None:
+                return GetLinkPropertiesResponse(
+                    status_message=f"GetLinkProperties: link not found, {SCOPE}"
+                )
+            inertia, gravity = link_inertia(*found), found[0].body.link_gravity(found[1])
+        return GetLinkPropertiesResponse(
+            com=to_pose_msg(Pose(inertia.com.position)),  # never its orientation
+            gravity_mode=gravity,
+            mass=inertia.mass,
+            success=True,
+            status_message="GetLinkProperties: got properties",
+            **{key: getattr(inertia, key) for key in TENSOR},
+        )
+
+    def _set_properties(self, request: SetLinkPropertiesRequest) -> SetLinkPropertiesResponse:
+        def refused(fault: str) -> SetLinkPropertiesResponse:
+            return SetLinkPropertiesResponse(False, f"SetLinkProperties: {fault}")
+
+        with self._sim.lock:
+            found = self._sim.world.link(request.link_name)
+            if found is None:
+                return refused(f"link not found, {SCOPE}")
+            fault = bad_number(request)
+            if fault:
+                return refused(fault)
+            old = link_inertia(*found)
+            inertia = replace(
+                old,
+                mass=request.mass,
+                com=old.com._replace(position=to_vector(request.com.position)),
+                **{key: getattr(request, key) for key in TENSOR},
+            )
+            try:
+                set_link_properties(self._sim.world, *found, inertia, request.gravity_mode)
+            except (PropertyError, DescriptionError) as error:
+                return refused(str(error))
+        return SetLinkPropertiesResponse(True, "SetLinkProperties: properties set")
+
+    def _get_state(self, request: GetLinkStateRequest) -> GetLinkStateResponse:
+        with self._sim.lock:
+            world = self._sim.world
+            found = world.link(request.link_name)
+            if found is None:
+                return GetLinkStateResponse(status_message=f"GetLinkState: link not found, {SCOPE}")
+            frame = world.frame(request.reference_frame)
+            if frame is None:
+                return GetLinkStateResponse(
+                    status_message=f"GetLinkState: reference reference_frame not found, {SCOPE}"
+                )
+            pose, twist = seen_from(found[0].link_state(found[1]), frame)
+        state = LinkState(
+            request.link_name, to_pose_msg(pose), to_twist_msg(twist), request.reference_frame
+        )
+        return GetLinkStateResponse(state, True, "GetLinkState: got state")
+
+    def _hear(self, state: LinkState) -> None:
+        self._set_state(SetLinkStateRequest(state))
+
+    def _set_state(self, request: SetLinkStateRequest) -> SetLinkStateResponse:
+        wanted = request.link_state
+        with self._sim.lock:
+            found = self._sim.world.link(wanted.link_name)
+            if found is None:
+                return SetLinkStateResponse(False, "SetLinkState: link does not exist")
+            frame = self._frame(wanted.reference_frame)
+            if frame is None:
+                return SetLinkStateResponse(False, "SetLinkState: failed")
+            fault = bad_number(wanted)
+            if fault:
+                return SetLinkStateResponse(False, f"SetLinkState: {fault}")
+            linear, angular = from_twist_msg(wanted.twist)
+            # Gazebo subtracts the frame's velocity, and doesn't turn the request's.
+            twist = (subtract(linear, frame[1][0]), subtract(angular, frame[1][1]))
+            self._sim.place_link(*found, frame[0].compose(from_pose_msg(wanted.pose)), twist)
+        return SetLinkStateResponse(True, "SetLinkState: success")
+
+    def _frame(self, name: str) -> tuple[Pose, Twist] | None:
+        """Returns the state of a link or the world; a model is no frame here."""
+        found = self._sim.world.link(name)
+        if found is not None:
+            return found[0].link_state(found[1])
+        return (Pose(), AT_REST) if name in WORLD_FRAMES else None

@@ -1,7 +1,10 @@
-"""spawn_urdf_model, spawn_sdf_model and delete_model (docs/contract/gazebo.md 2.3 to 2.5)."""
+"""What comes into the world: the world file, spawn_urdf_model, spawn_sdf_model, and delete_model
+(docs/contract/gazebo.md 2.3 to 2.5)."""
 
 import re
 import threading
+from collections.abc import Callable
+from dataclasses import replace
 
 import rospkg
 import rospy
@@ -17,12 +20,18 @@ from gazebo_msgs.srv import (
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
 from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.files.reading import Reading
-from bullet_gazebo.physics.files.world_file import UnknownFormat, read_entity
+from bullet_gazebo.physics.files.world_file import (
+    UnknownFormat,
+    WorldDescription,
+    empty_world,
+    load_world,
+    read_entity,
+)
 from bullet_gazebo.physics.pose import Pose, is_finite
 from bullet_gazebo.physics.world import NameTaken
-from bullet_gazebo.ros.plugins import PluginRegistry
-from bullet_gazebo.ros.services.resource_paths import resources
-from bullet_gazebo.ros.wire.conversions import from_pose_msg
+from bullet_gazebo.ros.common.messages import from_pose_msg
+from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
+from bullet_gazebo.ros.services.resource_paths import find_world, resources
 from bullet_gazebo.simulator import Simulator
 from files.content import MAX_BYTES
 
@@ -34,7 +43,7 @@ UNKNOWN_FORMAT = (
 )
 TAKEN = "SpawnModel: Failure - entity already exists."
 MOST_WARNINGS = 20  # of one model
-FURTHEST = 1e6  # [m] from the origin; the engine holds some figures as 32-bit floats
+FURTHEST = 1e6  # [m] from the origin; the engine keeps some figures as 32-bit floats
 
 
 class SpawnServices:
@@ -43,8 +52,8 @@ class SpawnServices:
     def __init__(self, sim: Simulator, plugins: PluginRegistry) -> None:
         self._sim = sim
         self._plugins = plugins
-        # Spawning and deleting take several steps each, with plugins between them: one at a time, as
-        # Gazebo serialises all its services (docs/contract/gazebo.md 1.1).
+        # Spawning and deleting take several steps, with plugins between them: one at a time, as Gazebo
+        # serialises all its services (docs/contract/gazebo.md 1.1).
         self._one_at_a_time = threading.Lock()
         self._services = [
             rospy.Service("~spawn_urdf_model", SpawnModel, self._spawn_urdf),
@@ -54,9 +63,7 @@ class SpawnServices:
 
     def _spawn_urdf(self, request: SpawnModelRequest) -> SpawnModelResponse:
         if len(request.model_xml) > MAX_BYTES:
-            return self._spawn(
-                request, request.model_xml
-            )  # which refuses it, before anything looks at it
+            return self._spawn(request, request.model_xml)  # refuses it before anything parses it
         text = without_comments(request.model_xml)
         root = ROOT_TAG.search(text)
         if root is None or root.group(1) != "robot":
@@ -70,12 +77,12 @@ class SpawnServices:
     def _spawn(self, request: SpawnModelRequest, text: str) -> SpawnModelResponse:
         try:
             self._checked_pose(request)  # before anything takes time
-            # A file may take long: spawns of others go on meanwhile.
+            # Reading may take long; others spawn meanwhile.
             reading = Reading(cancelled=rospy.is_shutdown)
             entity = read_entity(text, request.model_name, resources(), reading)
+            own = entity.pose if isinstance(entity, Light) else entity.initial_pose
             with self._one_at_a_time:
-                pose = self._checked_pose(request)
-                self._add(request, entity, pose.compose(entity_pose(entity)))
+                self._add(request, entity, self._checked_pose(request).compose(own))
         except NameTaken:
             return SpawnModelResponse(False, TAKEN)
         except UnknownFormat as error:
@@ -87,7 +94,7 @@ class SpawnServices:
         return SpawnModelResponse(True, "SpawnModel: Successfully spawned entity")
 
     def _checked_pose(self, request: SpawnModelRequest) -> Pose:
-        """The requested pose in the world."""
+        """Returns the requested pose in the world."""
         pose, name = from_pose_msg(request.initial_pose), request.model_name
         if not name:
             raise DescriptionError("the model needs a name")
@@ -121,7 +128,7 @@ class SpawnServices:
             with self._sim.lock:
                 model = world.spawn(name, entity, pose)
             self._plugins.load(model, request.robot_namespace)
-        warn(model.name, entity)
+        _warn(model.name, entity)
 
     def _delete(self, request: DeleteModelRequest) -> DeleteModelResponse:
         with self._one_at_a_time:
@@ -135,30 +142,77 @@ class SpawnServices:
         return DeleteModelResponse(True, "DeleteModel: successfully deleted model")
 
 
-def entity_pose(entity: ModelDescription | Light) -> Pose:
-    """Returns where the file puts it."""
-    return entity.pose if isinstance(entity, Light) else entity.initial_pose
+def read_world(name: str, interrupted: Callable[[], bool]) -> WorldDescription:
+    """Reads a world file. An unusable one is a message, and a world with just a ground plane.
 
-
-def warn(name: str, description: ModelDescription) -> None:
-    """Logs what a model's file asked for in vain."""
-    for warning in at_most(description.warnings):
-        rospy.logwarn("Model '%s': %s", shown(name), warning)
-    if description.left_out:
+    Reading ends early once `interrupted` returns true.
+    """
+    path = find_world(name)
+    if path is None:
         rospy.logwarn(
-            "Model '%s': not simulated here, so left out: %s",
-            shown(name), ", ".join(at_most(description.left_out)),
-        )  # fmt: skip
+            "World file '%s' is not found: the world is empty but for a ground plane", name
+        )
+        return empty_world()
+    try:
+        world = load_world(path, resources(), Reading(interrupted))
+    except DescriptionError as error:
+        rospy.logerr("%s. The world is empty but for a ground plane", error)
+        return empty_world()
+    _log(f"World '{path}'", world.warnings, world.left_out)
+    return world
 
 
-def at_most(texts: list[str]) -> list[str]:
-    """Returns the first of `texts`: a file may hold any number of the same fault."""
+def fill_world(sim: Simulator, world: WorldDescription, interrupted: Callable[[], bool]) -> None:
+    """Sets gravity and step, and adds lights and models; a model that the engine refuses is left out.
+
+    No more models are added once `interrupted` returns true.
+    """
+    with sim.lock:
+        sim.set_time_step(world.time_step)
+        sim.max_update_rate = world.update_rate
+        sim.world.set_gravity(world.gravity)
+        if world.iterations is not None:
+            sim.world.set_solver(replace(sim.world.solver, iterations=world.iterations))
+        sim.world.lights.update(world.lights)
+        for name, description in world.models.items():
+            if interrupted():
+                return
+            try:
+                sim.world.spawn(name, description, description.initial_pose)
+            except DescriptionError as error:
+                rospy.logwarn("Model '%s' is left out: %s", name, error)
+
+
+def load_plugins(sim: Simulator, plugins: PluginRegistry) -> None:
+    """Starts the plugins of the models in the world file."""
+    with plugins.time_held("the world"):
+        for model in list(sim.world.models.values()):
+            plugins.load(model, "")
+            _warn(model.name, model.description)
+
+
+def _warn(name: str, description: ModelDescription) -> None:
+    _log(f"Model '{shown(name)}'", description.warnings, description.left_out)
+
+
+def _log(what: str, warnings: list[str], left_out: list[str]) -> None:
+    """Logs what a file asked for in vain."""
+    for warning in _at_most(warnings):
+        rospy.logwarn("%s: %s", what, warning)
+    if left_out:
+        rospy.logwarn(
+            "%s: not simulated here, so left out: %s", what, ", ".join(_at_most(left_out))
+        )
+
+
+def _at_most(texts: list[str]) -> list[str]:
+    """Returns the first of `texts`: a file may have any number of the same fault."""
     rest = len(texts) - MOST_WARNINGS
     return texts if rest <= 0 else [*texts[:MOST_WARNINGS], f"and {rest} more of the kind"]
 
 
 def without_comments(text: str) -> str:
-    """Returns `text` without its first XML declaration and without comments; an open one stays."""
+    """Returns `text` without its first XML declaration and its comments; an open comment stays."""
     start = text.find("<?")
     end = text.find("?>", start) if start >= 0 else -1
     if end >= 0:

@@ -1,31 +1,252 @@
-"""All services that read and change what is in the world already, one object for each group."""
+"""Time, physics and lights of the world (docs/contract/gazebo.md 1.5, 2.1, 2.2, 2.6, 2.9, 2.20 and 2.21)."""
 
-from bullet_gazebo.ros.services.force_services import ForceServices
-from bullet_gazebo.ros.services.joint_services import JointServices
-from bullet_gazebo.ros.services.light_services import LightServices
-from bullet_gazebo.ros.services.link_services import LinkServices
-from bullet_gazebo.ros.services.model_services import ModelServices
-from bullet_gazebo.ros.services.motion_services import MotionServices
-from bullet_gazebo.ros.services.physics_services import PhysicsServices
-from bullet_gazebo.ros.services.reconfigure import PhysicsReconfigure
-from bullet_gazebo.ros.services.time_services import advertise_time_services
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from dynamic_reconfigure.encoding import Config
+from gazebo_msgs.msg import ODEPhysics
+from gazebo_msgs.srv import (
+    DeleteLight,
+    DeleteLightRequest,
+    DeleteLightResponse,
+    GetLightProperties,
+    GetLightPropertiesRequest,
+    GetLightPropertiesResponse,
+    GetPhysicsProperties,
+    GetPhysicsPropertiesRequest,
+    GetPhysicsPropertiesResponse,
+    GetWorldProperties,
+    GetWorldPropertiesRequest,
+    GetWorldPropertiesResponse,
+    SetLightProperties,
+    SetLightPropertiesRequest,
+    SetLightPropertiesResponse,
+    SetPhysicsProperties,
+    SetPhysicsPropertiesRequest,
+    SetPhysicsPropertiesResponse,
+)
+from geometry_msgs.msg import Vector3
+from std_msgs.msg import ColorRGBA
+from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+
+from bullet_gazebo.physics.world import SolverSettings
+from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
+from bullet_gazebo.ros.common.messages import bad_number, from_pose_msg, to_vector
+from bullet_gazebo.ros.services.joint_services import ForceServices, JointServices
+from bullet_gazebo.ros.services.model_services import LinkServices, ModelServices
 from bullet_gazebo.simulator import Simulator
+
+SHORTEST_STEP, LONGEST_STEP = 1e-9, 10.0  # [s]; time is counted in nanoseconds
+FIELDS = {  # ODEPhysics: our name
+    "auto_disable_bodies": "auto_disable_bodies",
+    "sor_pgs_precon_iters": "precon_iterations",
+    "sor_pgs_iters": "iterations",
+    "sor_pgs_w": "sor",
+    "contact_surface_layer": "contact_surface_layer",
+    "contact_max_correcting_vel": "contact_max_correcting_vel",
+    "cfm": "cfm",
+    "erp": "erp",
+    "max_contacts": "max_contacts",
+}
+PARAMETERS = [
+    Parameter("time_step", "double", 0.001, 0.0, 10.0),
+    Parameter("max_update_rate", "double", 60.0, 0.0, 1000.0),
+    Parameter("gravity_x", "double", 0.0, -100.0, 100.0),
+    Parameter("gravity_y", "double", 0.0, -100.0, 100.0),
+    Parameter("gravity_z", "double", -9.8, -100.0, 100.0),
+    Parameter("auto_disable_bodies", "bool", False, False, True),
+    Parameter("sor_pgs_precon_iters", "int", 0, 0, 10000),
+    Parameter("sor_pgs_iters", "int", 20, 0, 10000),
+    Parameter("sor_pgs_w", "double", 1.3, 0.0, 5.0),
+    Parameter("sor_pgs_rms_error_tol", "double", -1.0, -1.0, 10000.0),
+    Parameter("cfm", "double", 0.0, 0.0, 10.0),
+    Parameter("erp", "double", 0.2, 0.0, 10.0),
+    Parameter("contact_surface_layer", "double", 0.001, 0.0, 10.0),
+    Parameter("contact_max_correcting_vel", "double", 100.0, 0.0, 10_000_000.0),
+    Parameter("max_contacts", "int", 100, 0, 10_000_000),
+]
+ODE = list(ODEPhysics.__slots__)
+AXES = ("x", "y", "z")
 
 
 def advertise_world_services(sim: Simulator) -> list[object]:
-    """Offers them to ROS; returns what keeps them alive."""
+    """Offers all services that read and change what is in the world; returns what keeps them alive."""
     physics = PhysicsServices(sim)
-    groups = (
-        ModelServices,
-        LinkServices,
-        JointServices,
-        MotionServices,
-        ForceServices,
-        LightServices,
-    )
+    actions = {
+        "~unpause_physics": sim.unpause,
+        "~reset_world": sim.reset_world,
+        "~reset_simulation": sim.reset_simulation,
+        "~pause_physics": sim.pause,
+    }
     return [
-        *(group(sim) for group in groups),
+        ModelServices(sim),
+        LinkServices(sim),
+        JointServices(sim),
+        ForceServices(sim),
+        LightServices(sim),
         physics,
         PhysicsReconfigure(physics),
-        *advertise_time_services(sim),  # the last, see there
+        # The last ones: clients take the world for ready when there is pause_physics.
+        *(rospy.Service(name, Empty, _handler(action)) for name, action in actions.items()),
     ]
+
+
+def _handler(action: Callable[[], None]) -> Callable[[EmptyRequest], EmptyResponse]:
+    def handle(request: EmptyRequest) -> EmptyResponse:
+        action()
+        return EmptyResponse()
+
+    return handle
+
+
+class PhysicsServices:
+    """World properties, gravity, time step, update rate and the solver, which presents itself as ODE."""
+
+    def __init__(self, sim: Simulator) -> None:
+        self._sim = sim
+        self._services = [
+            rospy.Service("~get_world_properties", GetWorldProperties, self._get_world),
+            rospy.Service("~get_physics_properties", GetPhysicsProperties, self.get),
+            rospy.Service("~set_physics_properties", SetPhysicsProperties, self.set),
+        ]
+
+    def _get_world(self, request: GetWorldPropertiesRequest) -> GetWorldPropertiesResponse:
+        with self._sim.lock:
+            return GetWorldPropertiesResponse(
+                sim_time=self._sim.sim_time,
+                model_names=list(self._sim.world.models),
+                rendering_enabled=False,  # no cameras here: clients must not wait for their pictures
+                success=True,
+                status_message="GetWorldProperties: got properties",
+            )
+
+    def get(self, request: GetPhysicsPropertiesRequest) -> GetPhysicsPropertiesResponse:
+        with self._sim.lock:
+            world = self._sim.world
+            solver = {key: getattr(world.solver, ours) for key, ours in FIELDS.items()}
+            return GetPhysicsPropertiesResponse(
+                time_step=world.time_step,
+                pause=self._sim.paused,
+                max_update_rate=self._sim.max_update_rate,
+                gravity=Vector3(*world.gravity),
+                ode_config=ODEPhysics(**solver),  # sor_pgs_rms_error_tol stays 0, as in Gazebo
+                success=True,
+                status_message="GetPhysicsProperties: got properties",
+            )
+
+    def set(self, request: SetPhysicsPropertiesRequest) -> SetPhysicsPropertiesResponse:
+        """Sets all fields: none is optional. A bad one refuses the whole request."""
+        fault = bad_number(request)
+        if not fault and not SHORTEST_STEP <= request.time_step <= LONGEST_STEP:
+            fault = (
+                f"time_step is {request.time_step}; "
+                f"it must be between {SHORTEST_STEP:g} and {LONGEST_STEP:g} s"
+            )
+        if fault:
+            return SetPhysicsPropertiesResponse(False, f"SetPhysicsProperties: {fault}")
+        ode = request.ode_config
+        with self._sim.lock:
+            world = self._sim.world
+            world.set_gravity(to_vector(request.gravity))
+            self._sim.set_time_step(request.time_step)
+            self._sim.max_update_rate = request.max_update_rate
+            world.set_solver(SolverSettings(**{o: getattr(ode, k) for k, o in FIELDS.items()}))
+        return SetPhysicsPropertiesResponse(True, "physics engine updated")
+
+
+class PhysicsReconfigure(DynamicServer):
+    """A reconfigure server for the world's physics: set_parameters and its two topics.
+
+    It has a configuration of its own: set_physics_properties doesn't change it, so the next set_parameters
+    undoes what that has set, as in Gazebo.
+    """
+
+    def __init__(self, physics: PhysicsServices) -> None:
+        self._physics = physics
+        super().__init__(PARAMETERS, self._apply)
+
+    def _apply(self, config: Config, level: int) -> Config:
+        """Carries `config` out; returns the one in force if the world refuses it."""
+        if level == FIRST:
+            config.update(self._in_force())
+            return config
+        request = SetPhysicsPropertiesRequest(
+            time_step=config["time_step"],
+            max_update_rate=config["max_update_rate"],
+            gravity=Vector3(*(config[f"gravity_{axis}"] for axis in AXES)),
+            ode_config=ODEPhysics(**{name: config[name] for name in ODE}),
+        )
+        answer = self._physics.set(request)
+        if not answer.success:
+            rospy.logwarn("set_parameters: %s", answer.status_message)
+            config.update(self._in_force())
+        return config
+
+    def _in_force(self) -> dict[str, Any]:
+        now = self._physics.get(GetPhysicsPropertiesRequest())
+        gravity = {f"gravity_{axis}": getattr(now.gravity, axis) for axis in AXES}
+        ode = {name: getattr(now.ode_config, name) for name in ODE}
+        plain = {"time_step": now.time_step, "max_update_rate": now.max_update_rate}
+        return plain | gravity | ode
+
+
+class LightServices:
+    """get_light_properties, set_light_properties and delete_light; a window shows what they set."""
+
+    def __init__(self, sim: Simulator) -> None:
+        self._sim = sim
+        self._services = [
+            rospy.Service("~get_light_properties", GetLightProperties, self._get),
+            rospy.Service("~set_light_properties", SetLightProperties, self._set),
+            rospy.Service("~delete_light", DeleteLight, self._delete),
+        ]
+
+    def _get(self, request: GetLightPropertiesRequest) -> GetLightPropertiesResponse:
+        name = request.light_name
+        with self._sim.lock:
+            light = self._sim.world.lights.get(name)
+            if light is None:
+                text = f"getLightProperties: Requested light {name} not found!"
+                return GetLightPropertiesResponse(status_message=text)
+            return GetLightPropertiesResponse(
+                diffuse=ColorRGBA(*light.diffuse),
+                attenuation_constant=light.attenuation_constant,
+                attenuation_linear=light.attenuation_linear,
+                attenuation_quadratic=light.attenuation_quadratic,
+                success=True,
+            )
+
+    def _set(self, request: SetLightPropertiesRequest) -> SetLightPropertiesResponse:
+        name = request.light_name
+        with self._sim.lock:
+            light = self._sim.world.lights.get(name)
+            if light is None:
+                text = f"setLightProperties: Requested light {name} not found!"
+                return SetLightPropertiesResponse(False, text)
+            fault = bad_number(request)
+            if fault:
+                return SetLightPropertiesResponse(False, f"setLightProperties: {fault}")
+            light.diffuse, light.specular = _color(request.diffuse), _color(request.specular)
+            light.cast_shadows = request.cast_shadows
+            light.attenuation_constant = request.attenuation_constant
+            light.attenuation_linear = request.attenuation_linear
+            light.attenuation_quadratic = request.attenuation_quadratic
+            light.direction = to_vector(request.direction)
+            light.pose = from_pose_msg(request.pose)
+            self._sim.world.version += 1
+        return SetLightPropertiesResponse(True, "")
+
+    def _delete(self, request: DeleteLightRequest) -> DeleteLightResponse:
+        name = request.light_name
+        with self._sim.lock:
+            light = self._sim.world.lights.pop(name, None)
+            self._sim.world.version += 1
+        if light is None:  # Gazebo's text for a light that doesn't exist, after 10 s
+            text = f'DeleteLight: Timeout reached while removing light "{name}"'
+            return DeleteLightResponse(False, text)
+        return DeleteLightResponse(True, f"DeleteLight: {name} successfully deleted")
+
+
+def _color(msg: ColorRGBA) -> tuple[float, float, float, float]:
+    return (msg.r, msg.g, msg.b, msg.a)

@@ -22,20 +22,20 @@ from ros_utils.readiness import NotReady, Ready
 
 SIMULATOR_TIMEOUT = 60.0  # [s]
 READY_TIMEOUT = 30.0  # [s] for controllers that were started to run
-# Of a robot that comes without one.
+# For a robot that describes none.
 PUBLISHER = {"type": "joint_state_controller/JointStateController", "publish_rate": 1000}
 Say = Callable[[str], None]
 
 
 def bring_up(scene: Scene, say: Say) -> list[Undo]:
-    """Spawns robots and starts their controllers, each only if it isn't there.
+    """Spawns robots and starts their controllers, where they are missing.
 
     Args:
-        scene: the robots; its objects are for `Objects`.
-        say: is told what is done.
+        scene: the robots; `SharedWorld` spawns its objects.
+        say: is called with a line for each thing that is done.
 
     Returns:
-        What undoes the changes made, in the order in which they were made.
+        What undoes the changes, in the order in which they were made.
 
     Raises:
         RobotEnvError: if something can't be loaded, spawned or started.
@@ -53,12 +53,12 @@ def bring_up(scene: Scene, say: Say) -> list[Undo]:
 
 
 def full_name(robot: Robot, name: str) -> str:
-    """Of a controller, a topic or a parameter, with the robot's namespace."""
+    """The name of a controller, topic or parameter in the robot's namespace."""
     return str(rospy.names.ns_join(f"/{robot.namespace.strip('/')}", name))
 
 
 def ready(scene: Scene) -> Ready:
-    """What has to be there for robots to be used."""
+    """The models and controllers that have to exist before robots can be used."""
     wanted = [(robot, name) for robot in scene.robots for name in (robot.publisher, *robot.run)]
     models = [robot.model for robot in scene.robots]
     return Ready(models, list(dict.fromkeys(full_name(*each) for each in wanted)))
@@ -68,7 +68,8 @@ def _bring_model(robot: Robot, say: Say) -> list[Undo]:
     if robot.model in gazebo.models():
         return []
     say(f"spawning the robot '{robot.model}'")
-    # Before it comes: its drives read them. As text: packages of the user's may have the names of ours.
+    # Set before the robot is spawned, whose drives read them; as text, since a package of the user's may have
+    # the name of one of ours.
     for name, value in robot.parameters.items():
         _set_parameter(full_name(robot, name), value)
     _set_parameter(full_name(robot, robot.description), robot.xml)
@@ -97,19 +98,15 @@ def _bring_controllers(robot: Robot, say: Say) -> list[Undo]:
 
 
 def _set_parameter(name: str, value: Any) -> None:
-    """At the master that is asked now: rospy keeps to the one that it began with.
-
-    Raises:
-        RobotEnvError: if the master doesn't answer, or takes no such value.
-    """
+    """Sets a parameter at the current master; rospy always asks the first one of the process."""
     try:
         master.call("setParam", name, value)
-    except (NoAnswer, Refused, OverflowError) as error:  # a whole number that XML-RPC can't carry
+    except (NoAnswer, Refused, OverflowError) as error:  # an integer too large for XML-RPC
         raise RobotEnvError(f"the parameter {name} can't be set: {error}") from error
 
 
 def _describe(robot: Robot, names: Sequence[str]) -> None:
-    """Puts the parameters of controllers where they are looked for."""
+    """Sets the parameters of controllers where the controller manager looks for them."""
     for name in names:
         described = robot.parameters.get(name)
         if described is None and name == robot.publisher:

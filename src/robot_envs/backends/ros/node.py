@@ -1,4 +1,4 @@
-"""This process as a ROS node: its arguments, its parameters, its master; nothing waits for ever."""
+"""This process as a ROS node: its arguments, its parameters, its master; every wait has a bound."""
 
 import os
 from typing import Any
@@ -27,8 +27,8 @@ def master_is_up() -> bool:
     """Whether the ROS master answers.
 
     Raises:
-        RobotEnvError: if it neither answers nor could be started here: another machine's, or
-            the port belongs to something else.
+        RobotEnvError: if it doesn't answer and can't be started here: it is another machine's, or something
+            else uses its port.
     """
     try:
         return master.is_up_or_startable()
@@ -37,7 +37,7 @@ def master_is_up() -> bool:
 
 
 def service_is_registered(name: str) -> bool:
-    """Whether the master knows somebody who offers the service.
+    """Whether a node has registered the service.
 
     Raises:
         RobotEnvError: if the master doesn't answer.
@@ -46,7 +46,7 @@ def service_is_registered(name: str) -> bool:
 
 
 def private_parameters(name: str) -> dict[str, Any]:
-    """The parameters below a node's name; none if there are none, or no master.
+    """The private parameters of a node; empty if there are none, or no master.
 
     Raises:
         RobotEnvError: see `master_is_up`.
@@ -56,7 +56,7 @@ def private_parameters(name: str) -> dict[str, Any]:
 
 
 def _ask_master(method: str, name: str) -> Any:
-    """What the master knows of a name; None if nothing."""
+    """The master's answer; None if it doesn't know the name."""
     try:
         return master.call(method, name)
     except Refused:
@@ -79,11 +79,7 @@ def command_line_parameters(argv: list[str]) -> dict[str, Any]:
 
 
 def refuse_twin(name: str) -> None:
-    """Makes sure that no living node has this name: ROS would shut down the older one.
-
-    Raises:
-        RobotEnvError: if there is one, or the master doesn't answer.
-    """
+    """Raises RobotEnvError if a living node has this name: ROS would shut that one down."""
     try:
         if living_address(name) is None:
             return

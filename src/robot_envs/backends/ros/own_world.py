@@ -162,12 +162,7 @@ class OwnWorld:
         self._perform(lambda world: None)
 
     def look(self, query: StateQuery) -> None:
-        """See `RobotBackend.look`.
-
-        Raises:
-            ValueError: for a link that is named twice.
-            SimulatorError: for an unknown name, or if two simulators fail.
-        """
+        """See `RobotBackend.look`."""
         before, self._query = self._query, query
         if self._world is None and not self._failed:  # it is still starting, and `connect` asks
             return
@@ -184,35 +179,21 @@ class OwnWorld:
         self._journal.variation = self._journal.variation.merged(variation)
 
     def reset(self, initial: InitialState) -> WorldState:
-        """See `RobotBackend.reset`; the state reached is exactly the one asked for.
-
-        Raises:
-            ValueError: for an unknown joint.
-            SimulatorError: if the reset is refused, or two simulators fail.
-        """
+        """See `RobotBackend.reset`; the state reached is exactly the one asked for."""
         self._journal.forget_episode()
         state = self._perform(lambda world: checked(world.reset(initial), 0))
         self._journal.initial, self._journal.last = initial, state
         return state
 
     def begin(self, commands: Commands) -> None:
-        """See `RobotBackend.begin`; if the simulator fails, `act` replaces it.
-
-        Raises:
-            SimulatorError: if no episode has begun.
-            ValueError: if a step is under way.
-        """
+        """See `RobotBackend.begin`; if the simulator fails, `act` replaces it."""
         self._need_episode()
         if self._world is not None:
             with contextlib.suppress(SimulatorFault), master.using(self._simulator.uri):
                 self._world.begin(commands)
 
     def act(self, commands: Commands) -> WorldState:
-        """See `RobotBackend.act`.
-
-        Raises:
-            SimulatorError: if the step is refused, or two simulators fail.
-        """
+        """See `RobotBackend.act`."""
         self._need_episode()
         journal = self._journal
         then = (len(journal.commands) + 1) * self._step
@@ -221,11 +202,7 @@ class OwnWorld:
         return journal.last
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
-        """See `RobotBackend.poses`.
-
-        Raises:
-            SimulatorError: if there is no such link, or two simulators fail.
-        """
+        """See `RobotBackend.poses`."""
         return self._perform(lambda world: world.poses(links))
 
     def _need_episode(self) -> None:

@@ -219,10 +219,6 @@ class RealtimeWorld:
 
         Waits for the joint state that the reset publishes. If the simulator publishes none while it is
         paused, the joints are taken to be where they were put.
-
-        Raises:
-            ValueError: for an unknown joint.
-            SimulatorError: if the simulator refuses, or doesn't answer.
         """
         positions = {name: at for name, (at, _) in self.scene.placed_joints(initial).items()}
         with self._simulator:
@@ -259,12 +255,7 @@ class RealtimeWorld:
         """See `RobotBackend.begin`; does nothing."""
 
     def act(self, commands: Commands) -> WorldState:
-        """See `RobotBackend.act`.
-
-        Raises:
-            SimulatorError: if joint states stop coming, the simulator doesn't answer, or another environment
-                has moved the robot since the reset.
-        """
+        """See `RobotBackend.act`."""
         self._world.check_holder(self)
         with self._simulator:
             self._unpause()
@@ -277,11 +268,7 @@ class RealtimeWorld:
         return WorldState(max(0.0, now - self._begin), joints, self._held)
 
     def look(self, query: StateQuery) -> None:
-        """See `RobotBackend.look`.
-
-        Raises:
-            RobotEnvError: for any query that isn't empty.
-        """
+        """See `RobotBackend.look`."""
         if query != StateQuery():
             raise RobotEnvError(f"{_ONLY_JOINTS}: links, models and contacts aren't told")
 
@@ -296,11 +283,7 @@ class RealtimeWorld:
         self._variation.undo()
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
-        """See `RobotBackend.poses`; makes a call for each.
-
-        Raises:
-            SimulatorError: if the simulator doesn't answer, or has no such link.
-        """
+        """See `RobotBackend.poses`; makes a call for each."""
         found = []
         with self._simulator:
             for link in links:

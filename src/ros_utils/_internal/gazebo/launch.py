@@ -9,17 +9,19 @@ from collections.abc import Mapping
 from ros_calls import master as _master
 from ros_calls.waiting import service_answers
 from ros_utils._internal import log as _log
+from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import packages as _packages
-from ros_utils._internal.processes import nodes as _nodes
-from ros_utils._internal.processes import processes as _processes
-from ros_utils._internal.processes import roslaunch as _roslaunch
-from ros_utils._internal.processes.program import CannotStart, Handle
-from ros_utils._internal.processes.readiness import (
+from ros_utils._internal import processes as _processes
+from ros_utils._internal import programs as _programs
+from ros_utils._internal import roslaunch as _roslaunch
+from ros_utils._internal.programs import (
+    CannotStart,
+    Handle,
     Readiness,
+    Started,
     wait_for_world,
     wait_until_ready,
 )
-from ros_utils._internal.processes.started import Started
 from ros_utils.readiness import Ready
 
 LABEL = "Gazebo"
@@ -153,7 +155,7 @@ def close_Gazebo(*, master_uri: str | None = None) -> bool:
     """
     with _master.using(master_uri):
         nodes = {name: address for name in NODES if (address := _nodes.node_uri(name))}
-        gone = _processes.end([entry for entry in _processes.started() if entry.label == LABEL])
+        gone = _programs.end([entry for entry in _processes.started() if entry.label == LABEL])
         left = _nodes.shut_down_nodes(nodes)
     if left:
         _log.warn(f"close_Gazebo: still registered: {', '.join(left)}")
@@ -191,6 +193,6 @@ def _report(handle: Handle, readiness: Readiness, answering: str, timeout: float
         what = f"ended with exit code {handle.exit_code()} before it answered"
     else:
         what = f"service {answering} doesn't answer after {timeout:g} s; ended it"
-    _processes.end([handle.entry])
+    handle.end()
     _log.error(f"{LABEL}: {what}: {handle.reason()}{handle.where()}")
     return False

@@ -6,8 +6,8 @@ import rospy
 
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
+from ros_utils._internal import nodes as _nodes
 from ros_utils._internal.gazebo.calls import GAZEBO, TIMEOUT, empty_call
-from ros_utils._internal.processes import nodes as _nodes
 
 STEP = "gazeboWorld"  # XML-RPC method of the stand-in's node; Gazebo has no service for steps
 CHUNK = 1000  # steps in one call

@@ -52,7 +52,7 @@ class Recording(unittest.TestCase):
         self.await_line("starting joint_state_controller")
         launch.send_signal(signal.SIGINT)
         launch.wait(BOUND)
-        told = self.await_line(r"recording: .*video\.mp4: (\d+) pictures, [0-9.]+ s")
+        told = self.await_line(r"recording: .*video\.mp4: (\d+) frames, [0-9.]+ s")
         self.assertGreater(int(told[1]), 0)
         read = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(video), "-f", "null", "-"]
         self.assertEqual(subprocess.run(read, check=False, timeout=BOUND).returncode, 0)

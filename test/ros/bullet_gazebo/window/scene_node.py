@@ -20,7 +20,7 @@ from gazebo_msgs.srv import (
     SpawnModelRequest,
 )
 
-from bullet_gazebo.ros.clients.world_client import RemoteWorld
+from bullet_gazebo.ros.clients.gz import RemoteWorld
 
 BOUND = 60.0  # [s of wall time]
 BALL = """<robot name="ball"><link name="ball">

@@ -16,10 +16,10 @@ from support.pages.window_page import BLUE, INERTIAL, RED, YELLOW, WindowCase, c
 
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.pictures.camera import Camera
-from bullet_gazebo.pictures.scene import Scene
-from bullet_gazebo.pictures.solids import visible_shapes
-from bullet_gazebo.ros.clients.window.opened import CAMERA, LOOK_AT
-from bullet_gazebo.ros.wire.conversions import from_pose_msg
+from bullet_gazebo.pictures.renderer import Renderer
+from bullet_gazebo.pictures.visuals import visible_shapes
+from bullet_gazebo.ros.common.messages import from_pose_msg
+from bullet_gazebo.ros.window.window import CAMERA, LOOK_AT
 
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>
@@ -207,7 +207,7 @@ class WindowTest(WindowCase):
             name: from_pose_msg(link(f"cartpole::{name}", "world").link_state.pose)
             for name in ("stand", "cart", "pole")
         }
-        scene = Scene()
+        scene = Renderer()
         self.addCleanup(scene.close)
         scene.add("cartpole", visible_shapes(model))
         scene.place("cartpole", poses)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from support.pages.pictures import pixel
 
-from bullet_gazebo.pictures.camera import Camera, overview
-from bullet_gazebo.pictures.ground import SKY, background
+from bullet_gazebo.pictures.camera import SKY, Camera, background, overview
 
 CORNERS = np.array([(x, y, z) for x in (-1.0, 2.0) for y in (0.0, 0.5) for z in (0.0, 3.0)])
 

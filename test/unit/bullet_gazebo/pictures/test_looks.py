@@ -11,7 +11,7 @@ from bullet_gazebo.physics.description import DescriptionError, Shape
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
 from bullet_gazebo.pictures.looks import read_look
-from bullet_gazebo.pictures.scene import Scene
+from bullet_gazebo.pictures.renderer import Renderer
 
 WIDTH, HEIGHT = 120, 120
 CAMERA = Camera(target=(0.0, 0.0, 5.0), distance=4.0, yaw=0.0, pitch=0.0)  # looks along +y
@@ -45,16 +45,16 @@ f 2 5 6 3
 
 @pytest.fixture
 def scene():
-    made = Scene()
+    made = Renderer()
     yield made
     made.close()
 
 
-def seen(scene: Scene) -> np.ndarray:
+def seen(scene: Renderer) -> np.ndarray:
     return scene.picture(CAMERA, WIDTH, HEIGHT).astype(int)
 
 
-def put(scene: Scene, name: str, shape: Shape, y: float = 0.0) -> None:
+def put(scene: Renderer, name: str, shape: Shape, y: float = 0.0) -> None:
     scene.add(name, [("link", shape)])
     scene.place(name, {"link": Pose((0.0, y, 5.0))})
 
@@ -165,7 +165,7 @@ def test_light_passes_through_what_is_half_transparent(scene):
     assert through[60, edge + 2] == pytest.approx((whole[60, edge + 2] + sky) / 2.0, abs=2.0)
 
 
-def seen_without(scene: Scene) -> np.ndarray:
+def seen_without(scene: Renderer) -> np.ndarray:
     scene.remove("clear")
     scene.remove("behind")
     return seen(scene)

@@ -13,7 +13,7 @@ from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.pictures import recording
-from bullet_gazebo.pictures.recording import Recorder, RecordingError, RecordingOptions
+from bullet_gazebo.pictures.recording import RecordingError, RecordingOptions, SimulationRecorder
 from bullet_gazebo.simulator import Simulator
 
 LIMIT = 120.0  # [s] for the other process to end
@@ -49,7 +49,7 @@ def options(path: Path, **changed: object) -> RecordingOptions:
 
 
 def test_pictures_come_at_simulated_times_and_show_who_comes_and_goes(sim, tmp_path):
-    recorder = Recorder(sim, options(tmp_path))
+    recorder = SimulationRecorder(sim, options(tmp_path))
     sim.advance(200)
     sim.world.spawn("ball", parse_urdf(BALL), Pose((0.0, 0.0, 1.0)))
     sim.advance(200)
@@ -62,7 +62,7 @@ def test_pictures_come_at_simulated_times_and_show_who_comes_and_goes(sim, tmp_p
 
 
 def test_time_that_begins_anew_is_recorded_on(sim, tmp_path):
-    recorder = Recorder(sim, options(tmp_path))
+    recorder = SimulationRecorder(sim, options(tmp_path))
     for _ in range(3):
         sim.advance(100)
         sim.reset(everything=True)
@@ -77,7 +77,7 @@ def test_recording_changes_no_bit_of_the_simulation(tmp_path):
         sim = Simulator(World(make_engine()), lockstep=True)
         model = sim.world.spawn("it", parse_urdf(cartpole_urdf()), Pose())
         model.set_joint_positions({"cart_pole": 0.1})
-        recorder = Recorder(sim, options(tmp_path)) if looking else None
+        recorder = SimulationRecorder(sim, options(tmp_path)) if looking else None
         sim.advance(300)
         finals.append(model.joint_states())
         sim.world.close()
@@ -93,11 +93,11 @@ def test_a_simulator_that_is_killed_leaves_a_video(tmp_path):
 import os, signal
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.pictures.recording import Recorder, RecordingOptions
+from bullet_gazebo.pictures.recording import RecordingOptions, SimulationRecorder
 from bullet_gazebo.simulator import Simulator
 from pathlib import Path
 sim = Simulator(World(make_engine()), lockstep=True)
-recorder = Recorder(sim, RecordingOptions(Path({str(tmp_path / "a.mp4")!r}), 20.0, 64, 48))
+recorder = SimulationRecorder(sim, RecordingOptions(Path({str(tmp_path / "a.mp4")!r}), 20.0, 64, 48))
 sim.advance(500)
 while recorder._waiting:
     pass
@@ -112,12 +112,12 @@ os.kill(os.getpid(), signal.SIGKILL)
         timeout=LIMIT,
         check=False,
     )  # returns once nobody has its standard output any more: the other process neither
-    assert done.returncode == -signal.SIGKILL and " pictures, " in done.stdout
+    assert done.returncode == -signal.SIGKILL and " frames, " in done.stdout
     assert 9 <= len(frames(tmp_path / "a.mp4")) <= 11
 
 
 def test_the_other_process_may_end_first(sim, tmp_path, caplog):
-    recorder = Recorder(sim, options(tmp_path))
+    recorder = SimulationRecorder(sim, options(tmp_path))
     sim.advance(100)
     recorder._process.kill()
     recorder._process.wait(LIMIT)
@@ -130,11 +130,11 @@ def test_the_other_process_may_end_first(sim, tmp_path, caplog):
 
 def test_what_the_other_process_cannot_take_in_time_is_left_out(sim, tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(recording, "MOST_WAITING", -1)
-    recorder = Recorder(sim, options(tmp_path))
+    recorder = SimulationRecorder(sim, options(tmp_path))
     sim.advance(200)
     recorder.close(LIMIT)
     assert recorder._process.wait(LIMIT) == 0
-    assert "5 pictures of the recording were left out" in caplog.text
+    assert "4 frames of the recording were dropped" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -142,8 +142,8 @@ def test_what_the_other_process_cannot_take_in_time_is_left_out(sim, tmp_path, m
     [
         ({"path": Path("a.avi")}, r"ends in \.mp4"),
         ({"path": Path("/nowhere/a.mp4")}, "can't be written"),
-        ({"rate": 0.0}, "pictures a second"),
-        ({"rate": float("nan")}, "pictures a second"),
+        ({"rate": 0.0}, "frames a second"),
+        ({"rate": float("nan")}, "frames a second"),
         ({"width": 1}, "pixels"),
         ({"height": 100_000}, "pixels"),
     ],

@@ -6,9 +6,9 @@ import time
 import pytest
 from rospy.impl import tcpros_pubsub
 
-from bullet_gazebo.ros.wire import mailboxes as module
-from bullet_gazebo.ros.wire.mailboxes import Mailbox, Mailboxes
-from bullet_gazebo.ros.wire.rospy_patches.topics import publish_without_yielding
+from bullet_gazebo.ros.common import mailboxes as module
+from bullet_gazebo.ros.common.mailboxes import Mailbox, Mailboxes
+from bullet_gazebo.ros.common.rospy_topics import publish_without_yielding
 
 
 @pytest.fixture

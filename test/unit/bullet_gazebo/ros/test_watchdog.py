@@ -1,17 +1,28 @@
-"""Whatever ends the thread that moves the world is told, and ends the node."""
+"""A world that fails ends the node; whoever keeps its lock is named."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import pytest
 import rospy
 
+from bullet_gazebo.control.controllers.base import Controller
+from bullet_gazebo.physics.description import Plugin
+from bullet_gazebo.physics.engines import make_engine
+from bullet_gazebo.physics.world import World
+from bullet_gazebo.ros.node import watchdog as module
 from bullet_gazebo.ros.node.gzserver import GazeboNode
-from bullet_gazebo.ros.node.watchdog import Watchdog
+from bullet_gazebo.ros.node.watchdog import StallWatch, Watchdog
+from bullet_gazebo.ros.plugins.plugin_loader import PluginContext
+from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.timing import FairLock
 
 BOUND = 60.0  # [s]
@@ -67,7 +78,7 @@ def test_whatever_is_raised_in_the_thread_is_a_fault_and_told(error, told) -> No
     watchdog = Watchdog(FakeSimulator(raises(error)))
     watchdog.start()
     watchdog._thread.join(BOUND)
-    assert watchdog.barks()
+    assert watchdog.failed()
     assert len(told) == 1
     assert type(error).__name__ in told[0] and "Traceback" in told[0]
 
@@ -76,7 +87,7 @@ def test_a_thread_that_ends_without_a_word_is_a_fault_too(told) -> None:
     watchdog = Watchdog(FakeSimulator(lambda: None))
     watchdog.start()
     watchdog._thread.join(BOUND)
-    assert watchdog.barks() and watchdog.barks()
+    assert watchdog.failed() and watchdog.failed()
     assert len(told) == 1
 
 
@@ -94,16 +105,16 @@ def test_so_is_one_that_can_not_even_tell(monkeypatch) -> None:
     watchdog = Watchdog(FakeSimulator(raises(ValueError())))
     watchdog.start()
     watchdog._thread.join(BOUND)
-    assert watchdog.barks()
+    assert watchdog.failed()
 
 
 def test_a_fault_of_somebody_else_who_moves_the_world_counts(told) -> None:
     watchdog = Watchdog(FakeSimulator())
     watchdog.start()
-    assert not watchdog.barks()
+    assert not watchdog.failed()
     with pytest.raises(SystemExit), watchdog:
         raise SystemExit("in a step")
-    assert watchdog.barks() and "in a step" in told[0]
+    assert watchdog.failed() and "in a step" in told[0]
     watchdog.stop()
 
 
@@ -114,7 +125,7 @@ def test_a_world_that_is_stopped_has_not_failed(told) -> None:
     assert sim.running.wait(BOUND)
     watchdog.stop()
     assert not watchdog._thread.is_alive()
-    assert not watchdog.barks() and not told
+    assert not watchdog.failed() and not told
 
 
 def test_a_tick_that_meets_closed_topics_at_the_end_is_no_fault(told, monkeypatch) -> None:
@@ -123,7 +134,7 @@ def test_a_tick_that_meets_closed_topics_at_the_end_is_no_fault(told, monkeypatc
     watchdog.start()
     watchdog.stop()
     watchdog._thread.join(BOUND)
-    assert not watchdog.barks() and not told
+    assert not watchdog.failed() and not told
 
 
 def test_it_may_be_stopped_before_it_was_started_and_from_its_own_thread() -> None:
@@ -132,13 +143,13 @@ def test_it_may_be_stopped_before_it_was_started_and_from_its_own_thread() -> No
     watchdog.stop()
     watchdog.start()
     watchdog._thread.join(BOUND)
-    assert not watchdog.barks()
+    assert not watchdog.failed()
     sim = FakeSimulator()
     own = Watchdog(sim)
     sim._run = own.stop
     own.start()
     own._thread.join(BOUND)
-    assert not own.barks()
+    assert not own.failed()
 
 
 def test_no_time_passes_once_a_signal_has_come(monkeypatch) -> None:
@@ -152,7 +163,7 @@ def test_no_time_passes_once_a_signal_has_come(monkeypatch) -> None:
 
 def test_a_process_whose_threads_do_not_end_ends_all_the_same_with_its_exit_code() -> None:
     code = (
-        "import threading; from bullet_gazebo.ros.wire.signals import end_within;"
+        "import threading; from bullet_gazebo.ros.common.node_process import end_within;"
         "threading.Thread(target=threading.Event().wait).start(); end_within(0.1, 7)"
     )
     result = subprocess.run(
@@ -160,3 +171,146 @@ def test_a_process_whose_threads_do_not_end_ends_all_the_same_with_its_exit_code
     )
     assert result.returncode == 7
     assert b"doesn't end" in result.stderr
+
+
+class Stalled:
+    """A watch over a world that nothing moves, and the clock that it reads."""
+
+    def __init__(self) -> None:
+        self.sim = SimpleNamespace(lock=FairLock(), now=0)
+        self.time = 0.0
+        self.told: list[str] = []
+        self.watch = StallWatch(self.sim, self.told.append, lambda: self.time)
+
+    def look(self, seconds: float, pause: float = 0.1) -> None:
+        """Looks for so long, with so much time between two looks."""
+        for _ in range(round(seconds / pause)):
+            self.time += pause
+            self.watch.look()
+
+
+@pytest.fixture
+def setting() -> Stalled:
+    return Stalled()
+
+
+@contextmanager
+def held(lock: FairLock) -> Iterator[None]:
+    """By a thread of its own, in `keeps_it`."""
+    taken, enough = threading.Event(), threading.Event()
+
+    def keeps_it() -> None:
+        with lock:
+            taken.set()
+            enough.wait(BOUND)
+
+    thread = threading.Thread(target=keeps_it, name="rude")
+    thread.start()
+    assert taken.wait(BOUND)
+    yield
+    enough.set()
+    thread.join(BOUND)
+
+
+def test_a_lock_that_is_kept_is_told_once_with_its_holder(setting) -> None:
+    with held(setting.sim.lock):
+        setting.look(9.0)
+        assert not setting.told
+        setting.look(300.0)
+    assert len(setting.told) == 1
+    assert "in thread 'rude'" in setting.told[0] and "in keeps_it" in setting.told[0]
+    assert "Time stands still" in setting.told[0].splitlines()[0]
+    setting.look(1.0)
+    with held(setting.sim.lock):
+        setting.look(20.0)
+    assert len(setting.told) == 2
+
+
+def test_one_that_is_free_or_taken_again_and_again_is_in_order(setting) -> None:
+    setting.look(100.0)
+    for _ in range(100):
+        with held(setting.sim.lock):
+            setting.look(5.0)
+    assert not setting.told
+
+
+def test_one_under_which_time_passes_is_too(setting) -> None:
+    with held(setting.sim.lock):
+        for _ in range(100):
+            setting.sim.now += 1
+            setting.look(5.0)
+    assert not setting.told
+
+
+def test_time_in_which_this_process_was_suspended_does_not_count(setting) -> None:
+    with held(setting.sim.lock):
+        setting.look(3600.0, pause=720.0)
+        assert not setting.told
+        setting.look(10.0)
+    assert len(setting.told) == 1
+
+
+def test_a_thread_that_ended_with_the_lock_is_named_as_that(setting) -> None:
+    thread = threading.Thread(target=setting.sim.lock.__enter__)
+    thread.start()
+    thread.join(BOUND)
+    setting.look(20.0)
+    assert "a thread that has ended without releasing it" in setting.told[0]
+
+
+class Stuck:
+    """A user's code that waits for what never comes, until the test has seen enough."""
+
+    def __init__(self) -> None:
+        self.enough = threading.Event()
+
+    def update(self, now: int) -> None:
+        self.enough.wait(BOUND)
+
+
+class StuckController(Controller):
+    type_name, interface = "mine/Stuck", "hardware_interface/EffortJointInterface"
+
+    @classmethod
+    def create(cls, name, params, hardware):
+        raise NotImplementedError
+
+    def update(self, now: int, dt: float) -> None:
+        self.code.update(now)
+
+
+def add_plugin(sim: Simulator, code: Stuck) -> str:
+    plugin = Plugin("librude.so", "rude", ElementTree.Element("plugin"))
+    context = PluginContext(sim, SimpleNamespace(name="robot"), plugin, "robot", None)
+    context.on_update(code.update)
+    return "plugin librude.so of model 'robot'"
+
+
+def add_controller(sim: Simulator, code: Stuck) -> str:
+    controller = StuckController("arm")
+    controller.code = code
+    sim.listeners.append(lambda now: controller.update(now, 0.001))
+    return "controller 'arm' (mine/Stuck)"
+
+
+@pytest.mark.parametrize("add", [add_plugin, add_controller])
+def test_in_a_world_plugin_and_controller_are_named_and_the_end_does_not_wait_for_them(
+    add: Callable[[Simulator, Stuck], str], monkeypatch
+) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(rospy, "logwarn", told.append)
+    monkeypatch.setattr(module, "PATIENCE", 0.5)
+    sim, code = Simulator(World(make_engine())), Stuck()
+    name = add(sim, code)
+    watchdog = Watchdog(sim)
+    watchdog.start()
+    deadline = time.monotonic() + BOUND
+    while not told and time.monotonic() < deadline:
+        assert not watchdog.failed()
+        time.sleep(0.05)
+    watchdog.stop()
+    hanging = watchdog.left_hanging()
+    code.enough.set()
+    watchdog._thread.join(BOUND)
+    assert name in told[0] and "in thread 'simulation'" in told[0] and "in update" in told[0]
+    assert hanging is not None and name in hanging

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.ros.clients.world_client import CHUNK
+from bullet_gazebo.ros.clients.gz import CHUNK
 from bullet_gazebo.ros.node.world_control import WorldControl
 from bullet_gazebo.simulator import Simulator
 

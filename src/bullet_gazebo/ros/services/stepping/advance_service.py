@@ -7,12 +7,12 @@ import genpy
 import rospy
 from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldRequest, AdvanceWorldResponse
 
+from bullet_gazebo.ros.common.mailboxes import Mailboxes
+from bullet_gazebo.ros.common.messages import to_time
+from bullet_gazebo.ros.common.node_process import seed_random_numbers
+from bullet_gazebo.ros.common.publishing import Thinner
+from bullet_gazebo.ros.common.rospy_topics import deliver
 from bullet_gazebo.ros.services.stepping.step_requests import MAX_TICKS
-from bullet_gazebo.ros.wire.conversions import to_time
-from bullet_gazebo.ros.wire.mailboxes import Mailboxes
-from bullet_gazebo.ros.wire.rospy_patches.topics import deliver
-from bullet_gazebo.ros.wire.seeding import seed_random_numbers
-from bullet_gazebo.ros.wire.thinning import Thinner
 from bullet_gazebo.simulator import Simulator
 
 SLICE = 500  # ticks between which other services get their turn

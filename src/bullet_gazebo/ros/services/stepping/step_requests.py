@@ -9,9 +9,8 @@ from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import AT_REST, Model
 from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.ros.common.messages import LARGEST, bad_number, from_pose_msg, from_twist_msg
 from bullet_gazebo.ros.services.stepping.addresses import Addresses
-from bullet_gazebo.ros.wire.checks import LARGEST, bad_number
-from bullet_gazebo.ros.wire.conversions import from_pose_msg, from_twist_msg
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import NOTHING, LinkQuery, StateQuery, find_model
 

@@ -26,6 +26,13 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.ros.common.messages import (
+    to_contact_state,
+    to_pose_msg,
+    to_time,
+    to_twist_msg,
+)
+from bullet_gazebo.ros.common.node_process import seed_random_numbers
 from bullet_gazebo.ros.services.stepping.addresses import Addresses
 from bullet_gazebo.ros.services.stepping.step_requests import (
     MAX_TICKS,
@@ -33,13 +40,6 @@ from bullet_gazebo.ros.services.stepping.step_requests import (
     check_numbers,
     query_of,
 )
-from bullet_gazebo.ros.wire.conversions import (
-    to_contact_state,
-    to_pose_msg,
-    to_time,
-    to_twist_msg,
-)
-from bullet_gazebo.ros.wire.seeding import seed_random_numbers
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import NOTHING, StateQuery, StateReader, UnknownName
 

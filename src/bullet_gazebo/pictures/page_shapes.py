@@ -1,0 +1,234 @@
+"""Draws visuals, collision shapes and joint frames on a page, most of them as instances in batches."""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import cache, lru_cache
+
+import numpy as np
+import viser
+from trimesh import creation
+
+from bullet_gazebo.physics.description import Color, DescriptionError, Shape
+from bullet_gazebo.physics.files.elements import shown
+from bullet_gazebo.physics.pose import Pose, Vector, rotate
+from bullet_gazebo.pictures.looks import MeshLook, read_look
+from bullet_gazebo.pictures.page_batches import (
+    Appearance,
+    Batches,
+    Geometry,
+    GlbFile,
+    Instance,
+    Singles,
+)
+from bullet_gazebo.pictures.visuals import GREY, ROUNDS, SIDES, VisibleJoint
+
+COLLISION = (1.0, 0.5, 0.0, 0.35)
+UNSHOWN = (1.0, 0.0, 1.0, 1.0)  # a box in place of a shape that can't be shown
+SMALLEST = 1e-6  # [m]; a size of 0 would break the page
+BOX = 0.1  # [m] of an unshown mesh
+AXES = 0.15  # [m] of a joint's frame
+AXIS_COLOR = (250, 200, 0)
+OWN_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+AXES_COLORS = ((225, 0, 0), (0, 190, 0), (0, 0, 225))
+MOST_NAMES = 200  # of joints; each is a node of its own
+MOST_FILES = 32
+
+Where = tuple[int, int]
+"""A model's number and the index of one of its links."""
+
+
+class ShapeMaker:
+    """Draws shapes. A shape that can't be shown is reported once.
+
+    Args:
+        scene: of the page.
+        batches: gets most shapes.
+        singles: gets the others.
+        warn: takes a line that says what can't be shown.
+    """
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        batches: Batches,
+        singles: Singles,
+        warn: Callable[[str], None],
+    ) -> None:
+        self._scene, self._batches, self._singles = scene, batches, singles
+        self._warn = warn
+        self._complained: set[str] = set()
+        self._names = 0
+        self._geometry_of = lru_cache(MOST_FILES)(_geometry_of)
+        self._glb_of = lru_cache(MOST_FILES)(_glb_of)
+
+    def add(self, where: Where, shape: Shape, what: str, collision: bool) -> None:
+        """Adds a shape of a link; `what` it is, for the log."""
+        rgba = COLLISION if collision else shape.rgba or GREY
+        size = [max(abs(each), SMALLEST) for each in shape.size]
+        if shape.kind == "box" and len(size) == 3:
+            scale = (size[0], size[1], size[2])
+            self._add_part(where, _box(), shape.pose, scale, rgba, collision)
+        elif shape.kind == "cylinder" and len(size) == 2:
+            scale = (size[0], size[0], size[1])
+            self._add_part(where, _cylinder(), shape.pose, scale, rgba, collision)
+        elif shape.kind == "sphere" and len(size) == 1:
+            scale = (size[0], size[0], size[0])
+            self._add_part(where, _ball(), shape.pose, scale, rgba, collision)
+        elif shape.kind == "plane":
+            self._add_plane(where, shape.pose)
+        elif shape.kind == "mesh":
+            self._add_mesh(where, shape, what, rgba, collision)
+        else:
+            complaint = f"{what}: a shape '{shown(shape.kind)}' is not known"
+            self._add_unshown(where, complaint, shape.pose)
+
+    def add_joint(self, where: Where, joint: VisibleJoint) -> None:
+        """Adds a joint's frame, axis and name; `where` is the link that it moves."""
+        self._names += 1
+        corner, turn = joint.frame
+        for own, color in zip(OWN_AXES, AXES_COLORS, strict=True):
+            self._add_rod(where, corner, rotate(turn, own), (0.0, AXES), AXES / 25, color)
+        axis = rotate(turn, joint.axis)
+        self._add_rod(where, corner, axis, (-AXES, 2.0 * AXES), AXES / 20, AXIS_COLOR)
+        if self._names <= MOST_NAMES:
+            end = np.array(corner) + 2.0 * AXES * np.array(axis)
+            label = self._scene.add_label(self._singles.name(), shown(joint.name))
+            self._singles.add(*where, np.array([*end, 0.0, 0.0, 0.0, 1.0]), label)
+
+    def clear(self) -> None:
+        """Begins anew, after everything was removed."""
+        self._names = 0
+
+    def _add_part(
+        self,
+        where: Where,
+        solid: Geometry,
+        pose: Pose,
+        scale: tuple[float, float, float],
+        rgba: Color,
+        collision: bool = False,
+    ) -> None:
+        opacity = min(max(rgba[3], 0.0), 1.0)
+        look = Appearance(solid, math.prod(scale) < 0.0, opacity < 1.0, not collision)
+        self._batches.add(*where, look, Instance(pose, scale, color_bytes(rgba), opacity))
+
+    def _add_plane(self, where: Where, pose: Pose) -> None:
+        plane = self._scene.add_grid(
+            self._singles.name(), infinite_grid=True, cell_size=1.0, section_size=10.0, fade_distance=60.0,
+            cell_color=(205, 205, 205), section_color=(170, 170, 170), plane_color=(235, 235, 235),
+            plane_opacity=1.0,
+        )  # fmt: skip
+        self._singles.add(*where, _numbers(pose), plane)
+
+    def _add_mesh(
+        self, where: Where, shape: Shape, what: str, rgba: Color, collision: bool
+    ) -> None:
+        try:
+            mesh = read_look(shape.mesh)
+        except DescriptionError as error:
+            self._add_unshown(where, f"{what}: {error}", shape.pose)
+            return
+        x, y, z = shape.size if len(shape.size) == 3 else (1.0, 1.0, 1.0)
+        if mesh.glb is not None and not collision:
+            if x * y * z < 0.0:  # mirrored: in a batch it would show its back
+                whole = self._scene.add_glb(self._singles.name(), mesh.glb, scale=(x, y, z))
+                self._singles.add(*where, _numbers(shape.pose), whole)
+            else:
+                part = Instance(shape.pose, (x, y, z), color_bytes(rgba))
+                self._batches.add(*where, Appearance(self._glb_of(mesh)), part)
+            return
+        self._add_part(where, self._geometry_of(mesh), shape.pose, (x, y, z), rgba, collision)
+
+    def _add_unshown(self, where: Where, complaint: str, pose: Pose) -> None:
+        if complaint not in self._complained:
+            self._complained.add(complaint)
+            self._warn(f"The page shows a box instead of {complaint}")
+        self._add_part(where, _box(), pose, (BOX, BOX, BOX), UNSHOWN)
+
+    def _add_rod(
+        self,
+        where: Where,
+        corner: Vector,
+        way: Vector,
+        ends: tuple[float, float],
+        radius: float,
+        color: tuple[int, int, int],
+    ) -> None:
+        """Adds a thin cylinder along `way`, between two distances [m] from `corner`."""
+        low, high = ends
+        x, y, z = np.array(corner) + (low + high) / 2.0 * np.array(way)
+        part = Instance(Pose((x, y, z), _turned(way)), (radius, radius, high - low), color)
+        self._batches.add(*where, Appearance(_cylinder(), shadow=False), part)
+
+
+def _glb_of(mesh: MeshLook) -> GlbFile:
+    assert mesh.glb is not None
+    return GlbFile(mesh.glb)
+
+
+@cache
+def _box() -> Geometry:
+    """Returns a cube with sides of 1 m."""
+    cube = creation.box((1.0, 1.0, 1.0))
+    return Geometry(_singles(cube.vertices), _indices(cube.faces))
+
+
+@cache
+def _ball() -> Geometry:
+    """Returns a ball with a radius of 1 m."""
+    found = creation.icosphere(subdivisions=ROUNDS)
+    return Geometry(_singles(found.vertices), _indices(found.faces), flat=False)
+
+
+@cache
+def _cylinder() -> Geometry:
+    """Returns a cylinder along z, radius and length 1 m. Its flat ends have vertices of their own."""
+    angles = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    low, high = (np.column_stack([circle, np.full(SIDES, z)]) for z in (-0.5, 0.5))
+    here = np.arange(SIDES)
+    following = np.roll(here, -1)
+    vertices = np.concatenate([low, high, low, high, [(0.0, 0.0, -0.5), (0.0, 0.0, 0.5)]])
+    middles = np.full(SIDES, 4 * SIDES)
+    triangles = [
+        (here, following, SIDES + following),
+        (here, SIDES + following, SIDES + here),
+        (middles, 2 * SIDES + following, 2 * SIDES + here),
+        (middles + 1, 3 * SIDES + here, 3 * SIDES + following),
+    ]
+    faces = np.concatenate([np.column_stack(corners) for corners in triangles])
+    return Geometry(_singles(vertices), _indices(faces), flat=False)
+
+
+def _geometry_of(mesh: MeshLook) -> Geometry:
+    """Returns the triangles of a file, visible from both sides."""
+    return Geometry(_singles(mesh.vertices), _indices(mesh.faces), side="double")
+
+
+def _singles(vertices: np.ndarray) -> np.ndarray:
+    return np.asarray(vertices, dtype=np.float32)
+
+
+def _indices(faces: np.ndarray) -> np.ndarray:
+    return np.asarray(faces, dtype=np.uint32)
+
+
+def _turned(way: Vector) -> tuple[float, float, float, float]:
+    """Returns a quaternion that turns z to a direction of length 1."""
+    x, y, z = way
+    if z < -0.999999:
+        return (1.0, 0.0, 0.0, 0.0)
+    length = math.sqrt(2.0 * (1.0 + z))
+    return (-y / length, x / length, 0.0, length / 2.0)
+
+
+def _numbers(pose: Pose) -> np.ndarray:
+    return np.array([*pose.position, *pose.orientation])
+
+
+def color_bytes(rgba: Sequence[float]) -> tuple[int, int, int]:
+    """Returns red, green and blue as the page takes them; invalid values are clipped."""
+    red, green, blue = (
+        round(255.0 * min(max(each, 0.0), 1.0)) if math.isfinite(each) else 0 for each in rgba[:3]
+    )
+    return red, green, blue

@@ -1,0 +1,273 @@
+"""Draws models by PyBullet's software renderer: no display, no OpenGL.
+
+A renderer has a world of its own, in which nothing moves by itself: it is given poses. So a picture never
+changes a simulation, whatever its engine, and the same poses give the same picture everywhere.
+"""
+
+import hashlib
+import logging
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from PIL import Image
+
+from bullet_gazebo.physics.description import DescriptionError, Shape
+from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
+from bullet_gazebo.physics.pose import IDENTITY, Pose, Vector, is_finite
+from bullet_gazebo.pictures.camera import Background, Camera, background
+from bullet_gazebo.pictures.visuals import Piece, Solid, box_around, moved, pieces_of
+from bullet_gazebo.scratch import scratch_folder
+
+MOST_CORNERS = 90_000  # of a body: PyBullet refuses more than 131072
+FARTHEST = 1e6  # [m]; beyond it nothing is drawn
+FINER = 2  # the renderer's pixels across one of the picture: smooth edges
+LIGHT = (1.0, -2.0, 4.0)  # direction that it comes from
+NOTHING = 0.9999  # depth, as OpenGL measures it, beyond which nothing is visible
+
+Region = tuple[int, int, int, int]
+"""Left, top, right and bottom [pixels]."""
+
+logger = logging.getLogger(__name__)
+
+
+class Textures:
+    """Images in PyBullet, each loaded once, because PyBullet keeps it until the end."""
+
+    def __init__(self, client: int) -> None:
+        self._client = client
+        self._numbers: dict[bytes, int] = {}
+
+    def number(self, image: Image.Image) -> int:
+        """Returns PyBullet's number of an RGB image."""
+        digest = hashlib.sha256(repr(image.size).encode() + image.tobytes()).digest()
+        if digest not in self._numbers:
+            with scratch_folder() as folder:
+                path = folder / "texture.png"
+                image.save(path, compress_level=1)
+                self._numbers[digest] = pybullet.loadTexture(
+                    str(path), physicsClientId=self._client
+                )
+        return self._numbers[digest]
+
+
+class DrawnPart:
+    """Some triangles of one shape of a link."""
+
+    def __init__(
+        self, client: int, link: str, shape: Shape, piece: Piece, textures: Textures
+    ) -> None:
+        self.link, self.alpha = link, piece.rgba[3]
+        self._client, self._pose = client, shape.pose
+        self._box = box_around(piece.solid)
+        looks = {} if piece.uvs is None else {"uvs": piece.uvs.tolist()}
+        visual = pybullet.createVisualShape(
+            pybullet.GEOM_MESH,
+            vertices=piece.solid.corners.tolist(),
+            normals=piece.solid.normals.tolist(),
+            indices=list(range(len(piece.solid.corners))),
+            rgbaColor=piece.rgba,
+            physicsClientId=client,
+            **looks,
+        )
+        self.body: int = pybullet.createMultiBody(0.0, -1, visual, physicsClientId=client)
+        if piece.texture is not None:
+            pybullet.changeVisualShape(
+                self.body,
+                -1,
+                textureUniqueId=textures.number(piece.texture),
+                physicsClientId=client,
+            )
+        self.place(Pose())
+
+    def place(self, link: Pose) -> None:
+        """Moves it with its link; beyond FARTHEST it stays at its last position."""
+        pose = link.compose(self._pose)
+        if is_finite(pose) and max(map(abs, pose.position)) < FARTHEST:
+            self._seen = pose
+            self.show()
+
+    def show(self) -> None:
+        """Puts it to its own place."""
+        self._put(self._seen)
+
+    def hide(self, place: Vector) -> None:
+        """Puts it to a place [m] out of sight until `show`."""
+        self._put(Pose(place, IDENTITY))
+
+    def _put(self, pose: Pose) -> None:
+        pybullet.resetBasePositionAndOrientation(self.body, *pose, physicsClientId=self._client)
+
+    def corners(self) -> np.ndarray:
+        """Returns the corners of the box around it, in the world [m]: (8, 3)."""
+        return moved(self._box, self._seen)
+
+    def remove(self) -> None:
+        pybullet.removeBody(self.body, physicsClientId=self._client)
+
+
+def drawn_parts(client: int, link: str, shape: Shape, textures: Textures) -> list[DrawnPart]:
+    """Adds a shape to PyBullet's renderer.
+
+    Raises:
+        DescriptionError: a mesh file can't be read.
+    """
+    return [
+        DrawnPart(client, link, shape, small, textures)
+        for piece in pieces_of(shape)
+        for small in _small(piece)
+    ]
+
+
+def _small(piece: Piece) -> Iterator[Piece]:
+    """Splits a piece into sizes that PyBullet takes."""
+    for start in range(0, len(piece.solid.corners), MOST_CORNERS):
+        some = slice(start, start + MOST_CORNERS)
+        solid = Solid(*(each[some] for each in piece.solid))
+        yield piece._replace(solid=solid, uvs=None if piece.uvs is None else piece.uvs[some])
+
+
+class Layer(NamedTuple):
+    """A region as PyBullet draws it: colours (h, w, 3), depths and numbers of bodies (h, w)."""
+
+    colours: np.ndarray
+    depths: np.ndarray
+    bodies: np.ndarray
+
+
+class Renderer:
+    """Models by name. A picture is (height, width, 3) of uint8."""
+
+    def __init__(self) -> None:
+        self._client = pybullet.connect(pybullet.DIRECT)
+        pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self._client)
+        self._models: dict[str, list[DrawnPart]] = {}
+        self._textures = Textures(self._client)
+        self._background = lru_cache(maxsize=2)(background)
+
+    def add(self, name: str, shapes: Iterable[tuple[str, Shape]]) -> None:
+        """Adds a model of these shapes, each with its link (see `visuals.visible_shapes`).
+
+        All links are at the origin; a mesh that can't be read is left out.
+        """
+        self.remove(name)
+        self._models[name] = parts = []
+        for link, shape in shapes:
+            try:
+                parts += drawn_parts(self._client, link, shape, self._textures)
+            except DescriptionError as error:
+                logger.warning("model '%s', link '%s' isn't drawn whole: %s", name, link, error)
+
+    def remove(self, name: str) -> None:
+        """Takes a model out, if there is one of that name."""
+        for part in self._models.pop(name, []):
+            part.remove()
+
+    def place(self, name: str, poses: Mapping[str, Pose]) -> None:
+        """Places the links of a model in the world; other links stay."""
+        for part in self._models[name]:
+            if part.link in poses:
+                part.place(poses[part.link])
+
+    def corners(self, name: str) -> np.ndarray:
+        """Returns the corners of boxes around a model's shapes, in the world [m]: (8 n, 3)."""
+        found = [part.corners() for part in self._models[name]]
+        return np.concatenate([np.zeros((0, 3)), *found])
+
+    def picture(self, camera: Camera, width: int, height: int) -> np.ndarray:
+        """Draws what the camera sees."""
+        behind: Background = self._background(camera, FINER * width, FINER * height)
+        fine = Image.fromarray(behind.colours)
+        whole = np.asarray(fine.reduce(FINER)).copy()
+        region = self._region(camera, width, height)
+        left, top, right, bottom = (FINER * edge for edge in region)
+        if left >= right or top >= bottom:
+            return whole
+        clear = [part for parts in self._models.values() for part in parts if part.alpha < 1.0]
+        nowhere = camera.eye + 2.0 * camera.far * camera.axes[2]
+        for part in clear:
+            part.hide(tuple(nowhere.tolist()))
+        try:
+            layer = self._layer(camera, width, height, region)
+        finally:
+            for part in clear:
+                part.show()
+        limit = np.minimum(behind.depth[top:bottom], NOTHING)
+        nearer = layer.depths < limit
+        colours = behind.colours[top:bottom, left:right]
+        drawn = np.where(nearer[..., np.newaxis], layer.colours, colours)
+        if clear:
+            limit = np.where(nearer, layer.depths, limit)
+            layer = self._layer(camera, width, height, region, bodies=True)
+            drawn = _through(drawn, limit, layer, clear)
+        left, top, right, bottom = region
+        whole[top:bottom, left:right] = np.asarray(Image.fromarray(drawn).reduce(FINER))
+        return whole
+
+    def _layer(
+        self, camera: Camera, width: int, height: int, region: Region, bodies: bool = False
+    ) -> Layer:
+        """Draws a region; numbers of `bodies` only on request, because they take time."""
+        left, top, right, bottom = (FINER * edge for edge in region)
+        size = (right - left, bottom - top)
+        colours, depths, numbers = pybullet.getCameraImage(
+            *size,
+            viewMatrix=camera.view_matrix().T.ravel().tolist(),
+            projectionMatrix=camera.projection_matrix(width, height, region).T.ravel().tolist(),
+            lightDirection=LIGHT,
+            shadow=0,
+            flags=0 if bodies else pybullet.ER_NO_SEGMENTATION_MASK,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=self._client,
+        )[2:5]
+        pixels = np.reshape(colours, (*size[::-1], 4))[..., :3].astype(np.uint8)
+        shape = size[::-1]
+        found = np.reshape(numbers, shape) if bodies else np.zeros((0, 0), int)
+        return Layer(pixels, np.reshape(depths, shape), found)
+
+    def _region(self, camera: Camera, width: int, height: int) -> Region:
+        """Returns the region with all models [pixels]: the time to draw grows with its size."""
+        boxes = [part.corners() for parts in self._models.values() for part in parts]
+        if not boxes:
+            return (0, 0, 0, 0)
+        seen = (np.array(boxes) - camera.eye) @ camera.axes.T  # (n, 8, 3): right, up, ahead
+        ahead = seen[..., 2] > camera.near
+        whole, some = ahead.all(axis=1), ahead.any(axis=1)
+        if (some & ~whole).any():  # the camera is beside or inside a box
+            return (0, 0, width, height)
+        if not some.any():
+            return (0, 0, 0, 0)
+        x, y, depth = seen[whole].reshape(-1, 3).T
+        scale = height / (2.0 * camera.slope * depth)
+        across, down = width / 2.0 + scale * x, height / 2.0 - scale * y
+        left, right = np.clip([across.min() - 1.0, across.max() + 2.0], 0, width).astype(int)
+        top, bottom = np.clip([down.min() - 1.0, down.max() + 2.0], 0, height).astype(int)
+        return (int(left), int(top), int(right), int(bottom))
+
+    def close(self) -> None:
+        """Frees everything; may be called twice."""
+        self._models.clear()
+        if pybullet.isConnected(self._client):
+            pybullet.disconnect(self._client)
+
+
+def _through(
+    colours: np.ndarray, limit: np.ndarray, layer: Layer, clear: Sequence[DrawnPart]
+) -> np.ndarray:
+    """Draws the nearest transparent parts over colours (h, w, 3).
+
+    Args:
+        colours: of everything else.
+        limit: depths of everything else (h, w).
+        layer: all bodies.
+        clear: the transparent parts.
+    """
+    alphas = np.ones(layer.bodies.max() + 2)  # the last one stands for no body
+    for part in clear:
+        if part.body < len(alphas):
+            alphas[part.body] = part.alpha
+    alpha = alphas[layer.bodies][..., np.newaxis]
+    seen = (layer.depths < limit)[..., np.newaxis] & (alpha < 1.0)
+    mixed = alpha * layer.colours + (1.0 - alpha) * colours
+    return np.where(seen, np.rint(mixed), colours).astype(np.uint8)

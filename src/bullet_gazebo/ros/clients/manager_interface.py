@@ -1,0 +1,188 @@
+"""Clients of a controller manager (docs/contract/ros_control.md 2).
+
+The functions are the Python module `controller_manager.controller_manager_interface`. They print what they
+did, in the words of the script `controller_manager`, and those that change something return whether the
+manager did it. They talk to the manager in the namespace of the program, need no initialised node, and wait
+for its services without limit. rospy.ServiceException says that the manager went away during a call.
+
+`ManagerClient` is the same with a time limit on each call, for spawner and unspawner.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import rospy
+from controller_manager_msgs.msg import ControllerState
+from controller_manager_msgs.srv import (
+    ListControllers,
+    ListControllerTypes,
+    LoadController,
+    ReloadControllerLibraries,
+    SwitchController,
+    SwitchControllerRequest,
+    UnloadController,
+)
+
+from ros_calls.service import ServiceClient
+from ros_calls.waiting import service_comes_up
+
+BEST_EFFORT = SwitchControllerRequest.BEST_EFFORT
+STRICT = SwitchControllerRequest.STRICT
+
+
+def list_controller_types() -> None:
+    """Prints the types that the manager can load."""
+    for kind in _call("list_controller_types", ListControllerTypes).types:
+        print(kind)
+
+
+def list_controllers() -> None:
+    """Prints name, hardware interfaces and state of each controller, in the manager's order."""
+    controllers = loaded_controllers()
+    if not controllers:
+        print("No controllers are loaded in mechanism control")
+    for each in controllers:
+        # A dict keeps the order, and each interface once.
+        interfaces = "+".join(dict.fromkeys(c.hardware_interface for c in each.claimed_resources))
+        print(f"'{each.name}' - '{interfaces}' ( {each.state} )")
+
+
+def reload_libraries(force_kill: bool, restore: bool = False) -> bool:
+    """Makes the manager look for its controller types anew.
+
+    Args:
+        force_kill: stop and unload all controllers first; without it the manager refuses if there
+            are any.
+        restore: load them again afterwards, and start those that ran.
+    """
+    print(f"Restore: {restore}")
+    before = loaded_controllers() if restore else []
+    reloaded = bool(_call("reload_controller_libraries", ReloadControllerLibraries, force_kill).ok)
+    if reloaded:
+        print("Successfully reloaded libraries")
+    else:
+        print("Failed to reload libraries. Do you still have controllers loaded?")
+    if restore:
+        for each in before:
+            _call("load_controller", LoadController, each.name)
+        _switch([each.name for each in before if each.state == "running"], [], BEST_EFFORT)
+        print("Controllers restored to original state")
+    return reloaded
+
+
+def load_controller(name: str) -> bool:
+    """Loads a controller whose parameters are on the parameter server."""
+    loaded = bool(_call("load_controller", LoadController, name).ok)
+    print(f"Loaded '{name}'" if loaded else f"Error when loading '{name}'")
+    return loaded
+
+
+def unload_controller(name: str) -> bool:
+    """Unloads a controller, which must not be running."""
+    unloaded = bool(_call("unload_controller", UnloadController, name).ok)
+    print(f"Unloaded '{name}' successfully" if unloaded else f"Error when unloading '{name}'")
+    return unloaded
+
+
+def start_controller(name: str) -> bool:
+    """Starts one controller, strictly: it must be loaded and not running."""
+    return switch_controllers([name], [])
+
+
+def start_controllers(names: Sequence[str]) -> bool:
+    """Starts all of the controllers or none. See `start_controller`."""
+    return switch_controllers(names, [])
+
+
+def stop_controller(name: str) -> bool:
+    """Stops one controller, strictly: it must be running."""
+    return switch_controllers([], [name])
+
+
+def stop_controllers(names: Sequence[str]) -> bool:
+    """Stops all of the controllers or none. See `stop_controller`."""
+    return switch_controllers([], names)
+
+
+def switch_controllers(start: Sequence[str], stop: Sequence[str]) -> bool:
+    """Starts and stops controllers as one act, strictly, and without a time limit for the manager."""
+    switched = _switch(start, stop, STRICT)
+    given = [each for each in (("start", start), ("stop", stop)) if each[1]]
+    if switched:
+        done = {"start": "Started", "stop": "Stopped"}
+        for what, names in given:
+            print(f"{done[what]} {list(names)} successfully")
+    else:
+        doing = {"start": "starting", "stop": "stopping"}
+        print("Error when " + " and ".join(f"{doing[what]} {list(names)}" for what, names in given))
+    return switched
+
+
+def loaded_controllers() -> list[ControllerState]:
+    """Returns what the manager lists."""
+    return list(_call("list_controllers", ListControllers).controller)
+
+
+def _switch(start: Sequence[str], stop: Sequence[str], strictness: int) -> bool:
+    request = (list(start), list(stop), strictness, False, 0.0)
+    return bool(_call("switch_controller", SwitchController, *request).ok)
+
+
+def _call(service: str, kind: Any, *request: Any) -> Any:
+    name = f"controller_manager/{service}"
+    rospy.wait_for_service(name)
+    return rospy.ServiceProxy(name, kind)(*request)
+
+
+class ManagerClient:
+    """The services of the controller manager in one namespace. A call raises ServiceFailed."""
+
+    def __init__(self, namespace: str = "", user: str = "Controller Spawner") -> None:
+        """`user` is who waits, for the log."""
+        self._user = user
+        self._prefix = (
+            f"{namespace.rstrip('/')}/controller_manager" if namespace else "controller_manager"
+        )
+
+    def wait(self, services: Sequence[str], timeout: float) -> str | None:
+        """Waits until all of the services are offered.
+
+        Args:
+            services: names without the manager's.
+            timeout: bound for each of them [wall-clock s], or infinity.
+
+        Returns:
+            The first one that didn't come up in time; None if all did.
+        """
+        for service in services:
+            name = str(rospy.resolve_name(f"{self._prefix}/{service}"))
+            rospy.loginfo("%s: Waiting for service %s/%s", self._user, self._prefix, service)
+            if not service_comes_up(name, timeout):
+                return name
+        return None
+
+    def load(self, name: str, timeout: float = math.inf) -> bool:
+        return bool(self._call("load_controller", LoadController, name, timeout=timeout).ok)
+
+    def unload(self, name: str, timeout: float = math.inf) -> bool:
+        return bool(self._call("unload_controller", UnloadController, name, timeout=timeout).ok)
+
+    def switch(
+        self,
+        start: Sequence[str],
+        stop: Sequence[str],
+        strictness: int,
+        timeout: float = math.inf,
+    ) -> bool:
+        """Starts and stops controllers in one step; no time limit for the manager itself."""
+        request = (list(start), list(stop), strictness, False, 0.0)
+        return bool(self._call("switch_controller", SwitchController, *request, timeout=timeout).ok)
+
+    def running(self, timeout: float = math.inf) -> list[str]:
+        """Returns the names of the running controllers."""
+        answer = self._call("list_controllers", ListControllers, timeout=timeout)
+        return [each.name for each in answer.controller if each.state == "running"]
+
+    def _call(self, service: str, kind: Any, *request: Any, timeout: float) -> Any:
+        return ServiceClient(f"{self._prefix}/{service}", kind, timeout=timeout)(*request)

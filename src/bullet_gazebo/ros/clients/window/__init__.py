@@ -1,1 +1,0 @@
-"""The simulator's window: a page that this process serves to a browser."""

@@ -1,0 +1,108 @@
+"""Conversions between our records and ROS messages, and the check of numbers in requests."""
+
+import math
+
+import genpy
+from control_msgs.msg import JointControllerState
+from gazebo_msgs.msg import ContactState
+from geometry_msgs.msg import Point, Quaternion, Twist, Vector3, Wrench
+from geometry_msgs.msg import Pose as PoseMsg
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from bullet_gazebo.control.controllers.joint_state import JointStateSample
+from bullet_gazebo.control.controllers.pid_controllers import JointControllerSample
+from bullet_gazebo.physics import pose as poses
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.state import ContactPair
+
+NANOSECONDS = 1_000_000_000
+LARGEST = 1e12  # in any SI unit; beyond it the engine's arithmetic ends in infinities
+
+
+def to_time(now: int) -> genpy.Time:
+    """Returns the ROS time of `now` [ns]."""
+    return genpy.Time(now // NANOSECONDS, now % NANOSECONDS)
+
+
+def to_pose_msg(pose: Pose) -> PoseMsg:
+    return PoseMsg(Point(*pose.position), Quaternion(*pose.orientation))
+
+
+def to_twist_msg(twist: tuple[poses.Vector, poses.Vector]) -> Twist:
+    return Twist(Vector3(*twist[0]), Vector3(*twist[1]))
+
+
+def from_pose_msg(msg: PoseMsg) -> Pose:
+    """Returns the pose with a unit quaternion; an all-zero one means no rotation."""
+    p, q = msg.position, msg.orientation
+    return Pose((p.x, p.y, p.z), poses.normalized((q.x, q.y, q.z, q.w)))
+
+
+def from_twist_msg(msg: Twist) -> tuple[poses.Vector, poses.Vector]:
+    return to_vector(msg.linear), to_vector(msg.angular)
+
+
+def to_vector(msg: Point | Vector3) -> poses.Vector:
+    return (msg.x, msg.y, msg.z)
+
+
+def to_joint_state(sample: JointStateSample) -> JointState:
+    return JointState(
+        header=Header(stamp=to_time(sample.stamp)),
+        name=sample.names,
+        position=sample.positions,
+        velocity=sample.velocities,
+        effort=sample.efforts,
+    )
+
+
+def to_joint_controller_state(sample: JointControllerSample) -> JointControllerState:
+    return JointControllerState(Header(stamp=to_time(sample.stamp)), *sample[1:])
+
+
+def to_contact_state(pair: ContactPair) -> ContactState:
+    return ContactState(
+        collision1_name=pair.first,
+        collision2_name=pair.second,
+        wrenches=[to_wrench_msg(*wrench) for wrench in pair.wrenches],
+        total_wrench=to_wrench_msg(*pair.total),
+        contact_positions=[Vector3(*point) for point in pair.points],
+        contact_normals=[Vector3(*normal) for normal in pair.normals],
+        depths=pair.depths,
+    )
+
+
+def to_wrench_msg(force: poses.Vector, torque: poses.Vector) -> Wrench:
+    return Wrench(Vector3(*force), Vector3(*torque))
+
+
+def bad_number(message: genpy.Message, largest: float = LARGEST) -> str:
+    """Finds a number that the world can't take, before a request changes anything.
+
+    Returns:
+        The field and what is wrong with it, as "pose.position.x is nan; it must be finite". Empty if all
+        numbers are finite and not beyond `largest`.
+    """
+    for name, kind in zip(message.__slots__, message._slot_types, strict=True):
+        fault = _fault(getattr(message, name), kind, largest)
+        if fault:
+            return f"{name}{fault}"
+    return ""
+
+
+def _fault(value: object, kind: str, largest: float) -> str:
+    if isinstance(value, genpy.Message):
+        fault = bad_number(value, largest)
+        return fault and f".{fault}"
+    if isinstance(value, (list, tuple)):
+        for index, item in enumerate(value):
+            fault = _fault(item, kind.partition("[")[0], largest)
+            if fault:
+                return f"[{index}]{fault}"
+    if kind in ("float32", "float64") and isinstance(value, float):
+        if not math.isfinite(value):
+            return f" is {value}; it must be finite"
+        if abs(value) > largest:
+            return f" is {value}; it can't be beyond {largest:g}"
+    return ""

@@ -1,0 +1,145 @@
+"""Topics whose messages are made only for subscribers, and thinned when the world outruns the clock.
+
+A subscriber can follow some thousand messages a second. In real time every message is sent at once. Faster
+than that, a topic sends one message per millisecond of wall time; the newest one is always sent.
+"""
+
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+
+from bullet_gazebo.simulator import Simulator
+
+PERIOD = 0.001  # [s of wall time] between two messages of a thinned topic
+STOP_TIMEOUT = 1.0  # [s]
+REPEAT = 1.0  # [s] between two logs of the same complaint
+
+
+class SubscriberCount(rospy.SubscribeListener):
+    """Counts a topic's subscribers, so that no message is made for nobody."""
+
+    def __init__(self, changed: Callable[[], None] = lambda: None) -> None:
+        """Calls `changed` after each change, from a thread of rospy's."""
+        super().__init__()
+        self.size = 0
+        self._changed = changed
+
+    def peer_subscribe(
+        self,
+        topic_name: str,
+        topic_publish: Callable[[Any], None],
+        peer_publish: Callable[[Any], None],
+    ) -> None:
+        self.size += 1
+        self._changed()
+
+    def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
+        self.size = num_peers
+        self._changed()
+
+
+class ThinnedTopic:
+    """One topic. It calls `publish` with the samples that it sends, in order."""
+
+    def __init__(self, thinner: "Thinner", name: str, publish: Callable[[Any], None]) -> None:
+        """`name` is the topic's, resolved."""
+        self._thinner = thinner
+        self._name = name
+        self._publish = publish
+        self._guard = threading.Lock()
+        self._waiting = False  # for the thinner, which will send the kept sample
+        self._kept: Any = None
+        self._newest: Any = None  # the last sample that was published
+        self._sent = 0.0  # [s of wall time]
+
+    def send(self, sample: Any) -> None:
+        """Publishes the sample, or keeps it until its turn or a newer one comes; called by the tick."""
+        # Beyond real time nearly every call ends here, so this path takes no lock. When the world has just
+        # been slowed down, the thinner may not have come round yet; then the sample doesn't wait for it.
+        if self._waiting and self._thinned():
+            self._kept = sample
+            if self._waiting:  # still: flush() clears this before it takes the kept sample
+                return
+        with self._guard:
+            if sample is self._newest:  # flush() was quicker
+                return
+            if self._thinned() and time.monotonic() - self._sent < PERIOD:
+                self._kept = sample
+                self._waiting = True
+            else:
+                self._waiting = False
+                self._send_now(sample)
+        if self._waiting:
+            self._thinner.remember(self)
+
+    def _thinned(self) -> bool:
+        return self._thinner.active and not self._thinner.is_whole(self._name)
+
+    def _send_now(self, sample: Any) -> None:
+        self._kept, self._newest = None, sample
+        self._sent = time.monotonic()
+        self._publish(sample)
+
+    def flush(self) -> None:
+        """Publishes the kept sample."""
+        with self._guard:
+            self._waiting = False
+            if self._kept is not None:
+                self._send_now(self._kept)
+
+    def close(self) -> None:
+        """Drops the kept sample and publishes nothing from now on."""
+        with self._guard:
+            self._kept = None
+            self._publish = lambda sample: None
+
+
+class Thinner:
+    """Sends the samples that thinned topics kept, from a thread of its own."""
+
+    def __init__(self, sim: Simulator) -> None:
+        self._sim = sim
+        self._guard = threading.Lock()
+        self._waiting: set[ThinnedTopic] = set()
+        self._news = threading.Event()
+        self._ending = threading.Event()
+        self._sender = threading.Thread(target=self._send, name="thinned topics", daemon=True)
+        self._sender.start()
+        # Whether somebody needs every message of a topic.
+        self.is_whole: Callable[[str], bool] = lambda name: False
+        rospy.on_shutdown(self._stop)
+
+    @property
+    def active(self) -> bool:
+        """Whether the world runs, or is stepped, faster than real time."""
+        return self._sim.outruns_the_clock
+
+    def remember(self, topic: ThinnedTopic) -> None:
+        """Flushes a topic in a moment."""
+        with self._guard:
+            self._waiting.add(topic)
+        self._news.set()
+
+    def _send(self) -> None:
+        while not self._ending.wait(PERIOD):
+            self._news.wait()
+            self._news.clear()
+            with self._guard:
+                waiting, self._waiting = self._waiting, set()
+            for topic in waiting:
+                try:
+                    topic.flush()
+                except Exception:  # noqa: BLE001 - a message that can't be sent silences no other topic
+                    if not rospy.is_shutdown():
+                        rospy.logerr_throttle(
+                            REPEAT, f"a message is lost:\n{traceback.format_exc()}"
+                        )
+
+    def _stop(self) -> None:
+        self._ending.set()
+        self._news.set()
+        self._sender.join(STOP_TIMEOUT)

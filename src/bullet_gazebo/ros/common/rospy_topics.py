@@ -1,0 +1,150 @@
+"""Changes of rospy's topics: closing them, and diverting their messages in lock-step.
+
+- `free_polls_at_once`: file descriptors of closed topics pile up (test_rospy_topics.py)
+- `wait_until_sent`: a message published just before its topic closes is lost (test_rospy_topics.py)
+- `divert_messages`, `divert_connections`, `deliver`, `is_connected`, `on_topics_changed`: the messages of a
+  node in lock-step go with its calls (scripts.test)
+- `publish_without_yielding`: a step in lock-step would spend most of its time there (test_mailboxes.py)
+"""
+
+import select
+import time
+import types
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import rospy
+import rospy.impl.registration
+from rospy.impl import tcpros_pubsub
+from rospy.impl.tcpros_pubsub import QueuedConnection
+from rospy.topics import Poller, _PublisherImpl, _SubscriberImpl, _TopicImpl
+
+Sink = Callable[[str, bytes], None]
+"""Takes a topic and a message as it goes over the wire, its length in front."""
+
+
+def free_polls_at_once() -> None:
+    """Closes a topic's poller together with the topic.
+
+    rospy's poller refers to itself, so its file descriptor stays until some later garbage collection: robots
+    with controllers that come and go leave dozens.
+    """
+
+    def make(poller: Poller) -> None:
+        poller.poller = select.epoll()
+
+    Poller.__init__ = make
+    Poller.add_fd, Poller.remove_fd = Poller.add_epoll, Poller.remove_epoll
+    Poller.error_iter = Poller.error_epoll_iter
+
+
+def wait_until_sent(publisher: rospy.Publisher, bound: float = 1.0) -> None:
+    """Waits until rospy's threads have written all messages, so that closing the topic loses none.
+
+    Args:
+        publisher: of the topic.
+        bound: of the wait [s of wall time], for a client that doesn't read.
+    """
+    deadline = time.monotonic() + bound
+    for connection in list(publisher.impl.connections):
+        while not _has_sent(connection) and time.monotonic() < deadline:
+            time.sleep(0.002)
+
+
+def _has_sent(connection: Any) -> bool:
+    """Returns whether the connection's thread waits for a message to write."""
+    if not isinstance(connection, QueuedConnection):
+        return True
+    with connection._lock:
+        waits = bool(connection._cond_data_available._waiters)  # else it is still writing
+        return bool(connection.done) or (waits and not connection._queue)
+
+
+def divert_messages(sink_of: Callable[[str], Sink | None]) -> None:
+    """Passes messages for some nodes to a sink instead of their connections; once for a process.
+
+    Args:
+        sink_of: returns the sink of a node, or None if its messages are sent as usual; called for each new
+            connection. `divert_connections` is for the existing ones.
+    """
+    add_connection = _TopicImpl.add_connection
+
+    def diverting(topic: _TopicImpl, connection: Any) -> bool:
+        if isinstance(topic, _PublisherImpl):
+            sink = sink_of(connection.endpoint_id)
+            if sink is not None:
+                connection.write_data = partial(sink, topic.resolved_name)
+        return bool(add_connection(topic, connection))
+
+    _TopicImpl.add_connection = diverting
+
+
+def publish_without_yielding() -> None:
+    """Lets a publisher go on at once: rospy yields the processor after each message to each connection.
+
+    For a world that moves only at a request: the threads that send run between two requests.
+    """
+    module = types.ModuleType("time")
+    vars(module).update(vars(time), sleep=_sleep_unless_zero)
+    tcpros_pubsub.time = module
+
+
+def _sleep_unless_zero(seconds: float) -> None:
+    if seconds > 0:
+        time.sleep(seconds)
+
+
+def divert_connections(node: str, sink: Sink) -> None:
+    """Does the same as `divert_messages` for the connections that a node has already."""
+    for topic in list(_topics().pubs.values()):
+        for connection in list(topic.connections):
+            if connection.endpoint_id == node:
+                connection.write_data = partial(sink, topic.resolved_name)
+
+
+def deliver(topic: str, data: bytes, node: str) -> None:
+    """Passes a message of a node to this process's subscribers, if there are any, in this thread.
+
+    Raises:
+        genpy.DeserializationError: if it can't be read.
+    """
+    subscription: _SubscriberImpl | None = _topics().get_subscriber_impl(topic)
+    if subscription is None:
+        return
+    connections = [each for each in subscription.connections if each.callerid_pub == node]
+    if connections:  # without a connection rospy would have lost the message, too
+        message = subscription.data_class().deserialize(data[4:])
+        message._connection_header = connections[-1].header
+        subscription.receive_callback([message], connections[-1])
+
+
+def is_connected(topic: str, node: str, publishes: bool) -> bool | None:
+    """Returns whether a node is connected to a topic; None if this process doesn't have the topic.
+
+    Args:
+        topic: resolved name.
+        node: full name.
+        publishes: whether this process publishes and the node subscribes, or the other way round.
+    """
+    if publishes:
+        publication = _topics().get_publisher_impl(topic)
+        return publication and any(each.endpoint_id == node for each in publication.connections)
+    subscription = _topics().get_subscriber_impl(topic)
+    return subscription and any(each.callerid_pub == node for each in subscription.connections)
+
+
+def on_topics_changed(call: Callable[[], None]) -> None:
+    """Calls a function when this process begins or ends to publish or subscribe to a topic."""
+
+    class Listener(rospy.impl.registration.RegistrationListener):
+        def reg_added(self, _name: str, _kind: str, _way: str) -> None:
+            call()
+
+        reg_removed = reg_added
+
+    rospy.impl.registration.get_registration_listeners().add_listener(Listener())
+
+
+def _topics() -> Any:
+    return rospy.impl.registration.get_topic_manager()

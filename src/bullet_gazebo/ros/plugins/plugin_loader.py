@@ -1,0 +1,190 @@
+"""Finds, starts and ends the plugins that a model file names by their shared libraries.
+
+A user's plugin is registered by a parameter (docs/plugins.md). Its exceptions are caught wherever it is
+called, SystemExit and KeyboardInterrupt included: a Ctrl-C raises nothing in this process
+(common/node_process.py).
+"""
+
+import importlib
+import os
+import traceback
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Protocol
+
+import rospy
+
+from bullet_gazebo.physics.description import Plugin
+from bullet_gazebo.physics.model import Model
+from bullet_gazebo.ros.common.publishing import Thinner
+from bullet_gazebo.simulator import Simulator
+
+BUILT_IN = {  # library's file name: "module:Factory"
+    "libgazebo_ros_control.so": "bullet_gazebo.ros.plugins.control_plugin:ControlPlugin",
+    "libgazebo_ros_joint_state_publisher.so": "bullet_gazebo.ros.plugins.joint_state_plugin:JointStatePlugin",
+}  # fmt: skip
+PARAMETER = "~plugins"  # the same table for users' plugins
+PATIENCE = 10.0  # [s of wall time]
+Update = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class PluginContext:
+    """What a plugin gets: its element in the file, its model, and the namespace to work in.
+
+    Publish fast topics as a `ThinnedTopic` of `thinner`.
+    """
+
+    sim: Simulator
+    model: Model
+    plugin: Plugin
+    namespace: str
+    thinner: Thinner
+    _updates: list[Update] = field(default_factory=list, repr=False)
+
+    def text(self, tag: str, default: str) -> str:
+        """Returns the text of the plugin's child element `tag`."""
+        return (self.plugin.element.findtext(tag) or "").strip() or default
+
+    def on_update(self, update: Update) -> None:
+        """Calls `update` before each physics step with the simulated time after it [ns].
+
+        The call is under the simulator's lock: it may touch the model, and must not wait for anything.
+        An update that raises is reported, and not called again. Updates end with the plugin.
+        """
+
+        def guarded(now: int) -> None:
+            try:
+                update(now)
+            except BaseException:  # noqa: BLE001 - a user's code must not stop the world
+                self.report("is not called any more, because it raised")
+                self.sim.listeners = [each for each in self.sim.listeners if each is not guarded]
+
+        self._updates.append(guarded)
+        with self.sim.lock:
+            # A new list: the old one may be in use by the tick that removes an update.
+            self.sim.listeners = [*self.sim.listeners, guarded]
+
+    def release(self) -> None:
+        """Ends the updates."""
+        with self.sim.lock:
+            self.sim.listeners = [each for each in self.sim.listeners if each not in self._updates]
+
+    def report(self, what: str) -> None:
+        """Logs the current exception; `what` says what became of the plugin."""
+        rospy.logerr(
+            "Plugin %s of model '%s' %s:\n%s",
+            self.plugin.filename, self.model.name, what, traceback.format_exc(),
+        )  # fmt: skip
+
+
+class LoadedPlugin(Protocol):
+    """A plugin at work."""
+
+    def shutdown(self) -> None:
+        """Ends it before its model is deleted. Not called under the simulator's lock."""
+
+
+Factory = Callable[[PluginContext], LoadedPlugin | None]
+
+
+class PluginRegistry:
+    """Starts and ends plugins by the file names of their libraries: built-in ones, then users'."""
+
+    def __init__(self, sim: Simulator, thinner: Thinner) -> None:
+        self._sim = sim
+        self._thinner = thinner
+        # Imported now, so that no spawn waits for it.
+        self._built_in = {library: _import(place) for library, place in BUILT_IN.items()}
+        self._loaded: dict[Model, list[tuple[PluginContext, LoadedPlugin | None]]] = {}
+
+    def time_held(self, models: str) -> AbstractContextManager[None]:
+        """Holds time while a model comes and its plugins start: as in Gazebo, it has its drives before its
+        first step.
+
+        If a plugin waits for time to pass, time goes on after PATIENCE.
+        """
+        return self._sim.holds.hold(PATIENCE, partial(_warn_late, models))
+
+    def load(self, model: Model, robot_namespace: str) -> None:
+        """Starts the plugins of `model`. An unknown one and one that fails is logged and left out
+        (docs/contract/gazebo.md 2.4)."""
+        loaded = self._loaded.setdefault(model, [])
+        places = _registered() if model.description.plugins else {}
+        for plugin in model.description.plugins:
+            factory = self._find(plugin, model, places)
+            if factory is None:
+                continue
+            own = (plugin.element.findtext("robotNamespace") or "").strip()
+            namespace = own or robot_namespace or model.name
+            context = PluginContext(self._sim, model, plugin, namespace, self._thinner)
+            try:
+                loaded.append((context, factory(context)))
+            except BaseException:  # noqa: BLE001 - a user's code must not leave the model half loaded
+                context.report("is left out, because it raised")
+                context.release()
+
+    def unload(self, model: Model) -> None:
+        """Ends the plugins of `model`."""
+        for context, plugin in self._loaded.pop(model, []):
+            context.release()
+            try:
+                if plugin is not None:
+                    plugin.shutdown()
+            except BaseException:  # noqa: BLE001 - a user's code must not keep a model from going
+                context.report("raised when it was ended")
+
+    def _find(self, plugin: Plugin, model: Model, places: dict[str, object]) -> Factory | None:
+        """Returns the plugin's factory; None, after a message, if there is none."""
+        library = os.path.basename(plugin.filename)
+        if library in self._built_in:
+            return self._built_in[library]
+        place = places.get(library)
+        if place is None:
+            # spawn_services.warn logs it together with the sensors.
+            unknown = f"plugin {plugin.filename or 'without a filename'}"
+            model.description.left_out.append(unknown)
+            return None
+        try:
+            return _import(place)
+        except BaseException as error:  # noqa: BLE001 - importing runs a user's code
+            rospy.logerr(
+                "Model '%s': the plugin %s is left out: %s of the parameter %s can't be imported: %r",
+                model.name, library, place, rospy.resolve_name(PARAMETER), error,
+            )  # fmt: skip
+            return None
+
+
+def _warn_late(models: str) -> None:
+    rospy.logwarn(
+        "The plugins of %s have been loading for %g s; time goes on without them", models, PATIENCE
+    )
+
+
+def _registered() -> dict[str, object]:
+    """Reads users' plugins, for each model anew, so that one can be added while the simulator runs."""
+    try:
+        places = rospy.get_param(PARAMETER, {})
+    except OSError as error:  # the master; the model is in the world already
+        rospy.logerr("The parameter %s can't be read: %s", rospy.resolve_name(PARAMETER), error)
+        return {}
+    if isinstance(places, dict):
+        return places
+    rospy.logwarn(
+        "The parameter %s is no table of libraries and plugins: %r",
+        rospy.resolve_name(PARAMETER), places,
+    )  # fmt: skip
+    return {}
+
+
+def _import(place: object) -> Factory:
+    """Imports the factory `module:name`."""
+    module, _, name = str(place).partition(":")
+    if not name:
+        raise ImportError("it must be 'module:Name'")
+    factory: Factory = getattr(importlib.import_module(module), name)
+    if not callable(factory):
+        raise TypeError(f"{place} can't be called")
+    return factory

@@ -1,0 +1,185 @@
+"""The scene for windows: what the world looks like, where its links are, and where they touch.
+
+An empty world offers exactly what Gazebo's does (docs/contract/gazebo.md 7), so the service and the topics
+come when a window asks for them through the node's XML-RPC server (node/world_control.py).
+"""
+
+import secrets
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterable, Sequence
+from copy import copy
+from functools import partial
+
+import numpy as np
+import rospy
+from bullet_gazebo_msgs.msg import SceneContacts, SceneModel, ScenePoses
+from bullet_gazebo_msgs.srv import GetScene, GetSceneRequest, GetSceneResponse
+
+from bullet_gazebo.physics.engine import Contact
+from bullet_gazebo.ros.common.messages import to_time
+from bullet_gazebo.ros.common.publishing import SubscriberCount
+from bullet_gazebo.ros.scene_messages import to_light, to_model
+from bullet_gazebo.simulator import Simulator
+
+PERIOD = 1.0 / 30.0  # [s of wall time] between two messages of a topic
+PATIENCE = PERIOD / 4  # [s] to wait for a tick, before a resting world is copied without one
+STOP_TIMEOUT = 1.0  # [s]
+REPEAT = 1.0  # [s] between two logs of the same complaint
+
+
+class SceneOffer:
+    """Opens the scene's service and topics once."""
+
+    def __init__(self, sim: Simulator) -> None:
+        self._sim = sim
+        self._one_at_a_time = threading.Lock()
+        self._opened: tuple[object, ...] = ()
+
+    def show(self) -> None:
+        """Offers the scene, if it isn't offered yet."""
+        with self._one_at_a_time:
+            if not self._opened:
+                # A window may outlive its simulator: the next one counts from another number.
+                first = secrets.randbits(31)
+                self._opened = (SceneTopics(self._sim, first), SceneService(self._sim, first))
+
+
+def _number(first: int, number: int) -> int:
+    """Returns the world's version or a model's number as clients see it."""
+    return (first + number) % 2**32
+
+
+class SceneService:
+    """~get_scene: all models and lights that a window doesn't know yet."""
+
+    def __init__(self, sim: Simulator, first: int) -> None:
+        self._sim = sim
+        self._first = first
+        self._service = rospy.Service("~get_scene", GetScene, self._get)
+
+    def _get(self, request: GetSceneRequest) -> GetSceneResponse:
+        world, known = self._sim.world, frozenset(request.known)
+        with self._sim.lock:  # converting a large model takes long, and is done without it
+            version = _number(self._first, world.version)
+            models = list(world.models.values())
+            lights = [copy(light) for light in world.lights.values()]
+        found = []
+        for model in models:
+            number = _number(self._first, model.number)
+            if number in known:
+                found.append(SceneModel(number=number, name=model.name, known=True))
+            else:
+                found.append(to_model(model, number, request.collisions))
+        return GetSceneResponse(version, found, [to_light(light) for light in lights])
+
+
+class SceneTopics:
+    """~scene_poses and ~scene_contacts, thirty times a second of wall time, while somebody subscribes.
+
+    A thread of its own publishes them. The world is copied within a tick, so that the thread neither waits
+    for the end of a long request in lock-step nor delays ticks.
+    """
+
+    def __init__(self, sim: Simulator, first: int) -> None:
+        self._sim = sim
+        self._first = first
+        self._news = threading.Event()  # a subscriber comes or goes, or the end
+        self._ending = threading.Event()
+        self._due = False  # whether the next tick copies; cleared under the world's lock
+        self._copied = threading.Event()
+        self._copies: list[Callable[[], None]] = []
+        self._poses = self._advertise("~scene_poses", ScenePoses)
+        self._contacts = self._advertise("~scene_contacts", SceneContacts)
+        self._thread = threading.Thread(target=self._run, name="scene", daemon=True)
+        self._thread.start()
+        rospy.on_shutdown(self._stop)
+
+    def _advertise(self, name: str, kind: type) -> tuple[rospy.Publisher, SubscriberCount]:
+        count = SubscriberCount(self._news.set)
+        # A slow subscriber misses some: with a queue, a thread of rospy's sends.
+        publisher = rospy.Publisher(name, kind, subscriber_listener=count, queue_size=1)
+        return publisher, count
+
+    @property
+    def _watched(self) -> bool:
+        return bool(self._poses[1].size or self._contacts[1].size)
+
+    def _run(self) -> None:
+        while not self._ending.is_set():
+            self._news.wait()
+            self._news.clear()
+            if self._watched and not self._ending.is_set():
+                with self._sim.lock:
+                    self._sim.listeners.append(self._on_tick)
+                try:
+                    self._publish_until_unwatched()
+                finally:
+                    with self._sim.lock:
+                        self._sim.listeners.remove(self._on_tick)
+
+    def _publish_until_unwatched(self) -> None:
+        due = time.monotonic()
+        while self._watched and not self._ending.wait(max(0.0, due - time.monotonic())):
+            try:
+                self._copied.clear()
+                self._due = True
+                if not self._copied.wait(PATIENCE):
+                    with self._sim.lock:
+                        self._on_tick(self._sim.now)
+                for publish in self._copies:
+                    publish()
+            except Exception:  # noqa: BLE001 - the simulation goes on, and the next message comes
+                if not rospy.is_shutdown():
+                    rospy.logerr_throttle(REPEAT, f"a scene is lost:\n{traceback.format_exc()}")
+            due = max(due + PERIOD, time.monotonic())  # missed messages aren't made up for
+
+    def _on_tick(self, now: int) -> None:
+        """Copies what is to be published; the caller holds the lock."""
+        if not self._due:
+            return
+        self._due = False
+        copies: list[Callable[[], None]] = []
+        if self._poses[1].size:
+            copies.append(self._copy_poses(now))
+        if self._contacts[1].size:
+            contacts = self._sim.world.engine.contacts()
+            copies.append(partial(self._publish_contacts, contacts))
+        self._copies = copies
+        self._copied.set()
+
+    def _copy_poses(self, now: int) -> Callable[[], None]:
+        models = self._sim.world.models.values()
+        poses = [pose for model in models for pose in model.link_poses()]
+        joints = [model.joint_states() for model in models if model.joint_names]
+        version, paused = _number(self._first, self._sim.world.version), self._sim.paused
+
+        def publish() -> None:
+            message = ScenePoses(
+                version=version,
+                now=to_time(now),
+                paused=paused,
+                lockstep=self._sim.lockstep,
+                poses=_singles((*pose.position, *pose.orientation) for pose in poses),
+                positions=_singles([position for position, _ in states] for states in joints),
+            )
+            self._poses[0].publish(message)
+
+        return publish
+
+    def _publish_contacts(self, contacts: list[Contact]) -> None:
+        points = _singles(each.point for each in contacts)
+        forces = _singles(each.force for each in contacts)
+        self._contacts[0].publish(SceneContacts(points, forces))
+
+    def _stop(self) -> None:
+        self._ending.set()
+        self._news.set()
+        self._thread.join(STOP_TIMEOUT)
+
+
+def _singles(rows: Iterable[Sequence[float]]) -> np.ndarray:
+    """Returns all numbers in a row as 32-bit floats; too large ones become infinite."""
+    with np.errstate(over="ignore"):
+        return np.array([number for row in rows for number in row]).astype(np.float32)

@@ -1,1 +1,0 @@
-"""What a window needs of the world: the scene once, and where its links are."""

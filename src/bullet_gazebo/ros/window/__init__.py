@@ -1,0 +1,1 @@
+"""The simulator's window: a page that this process serves to browsers."""

@@ -1,1 +1,0 @@
-"""Between rospy and the rest: messages, connections, signals, thinning."""

@@ -1,0 +1,156 @@
+"""The nodes registered at a ROS master, each question with a time limit."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from urllib.parse import urlsplit
+
+import psutil
+import rospy
+
+from ros_calls import master as _master
+from ros_calls.master import NoAnswer, NobodyListens, Refused, call_node, call_plain
+from ros_calls.waiting import POLL
+
+CORE_NODES = ("/rosout",)  # lives and dies with the master
+
+
+def node_names() -> list[str]:
+    """Names of all registered nodes, sorted; empty without a master."""
+    try:
+        state = _master.call("getSystemState")
+    except (NoAnswer, Refused):
+        return []
+    return sorted({node for kind in state for _, nodes in kind for node in nodes})
+
+
+def node_uri(name: str) -> str | None:
+    """The XML-RPC address of a node, or None if the master doesn't know it (or is down)."""
+    try:
+        return str(_master.call("lookupNode", name))
+    except (NoAnswer, Refused):
+        return None
+
+
+def node_uris() -> dict[str, str]:
+    """Name and XML-RPC address of all registered nodes."""
+    found = {name: node_uri(name) for name in node_names()}
+    return {name: address for name, address in found.items() if address}
+
+
+def node_pid(address: str) -> int | None:
+    """The process id of the node at an XML-RPC address, or None if it doesn't answer."""
+    try:
+        return int(call_node(address, "getPid", timeout=1.0))
+    except (NoAnswer, Refused):
+        return None
+
+
+def is_own(address: str) -> bool:
+    """True if the XML-RPC address is the calling process's own node."""
+    return bool(rospy.core.is_initialized()) and address == rospy.core.get_node_uri()
+
+
+def _master_of(address: str) -> str | None:
+    """The address of a node's master, or None if there is no way to know.
+
+    roscpp nodes don't offer the question: what their process was started with answers it.
+    """
+    try:
+        return str(call_node(address, "getMasterUri", timeout=1.0))
+    except (NoAnswer, Refused):
+        pass
+    host = urlsplit(address).hostname
+    pid = node_pid(address) if host and _master.host_is_local(host) else None
+    return _started_with(pid) if pid else None
+
+
+def _started_with(pid: int) -> str | None:
+    """Returns the master that a process was started with; None if it wasn't, or is another user's."""
+    try:
+        process = psutil.Process(pid)
+        given = [each for each in process.cmdline() if each.startswith("__master:=")]
+        if given:
+            return given[0].removeprefix("__master:=")
+        return process.environ().get("ROS_MASTER_URI")
+    except psutil.Error:
+        return None
+
+
+def ask_to_shut_down(address: str) -> bool:
+    """Ask the node at an XML-RPC address to shut itself down, as rosnode kill does.
+
+    Returns:
+        False if nobody listens there, or somebody whose master is another one: a dead node's port
+        may have been given to a node of somebody else's.
+    """
+    theirs = _master_of(address)
+    if theirs is not None and not _master.is_at(theirs):
+        return False
+    try:
+        call_node(address, "shutdown", "asked by ros_utils")
+    except (NobodyListens, Refused):
+        return False
+    except NoAnswer:
+        pass  # a node may close the connection before it has answered
+    return True
+
+
+def shut_down_nodes(nodes: dict[str, str], timeout: float = 5.0) -> list[str]:
+    """Ask nodes to shut down and wait until the master has forgotten them.
+
+    The caller's own node and rosout are left alone.
+
+    Args:
+        nodes: name and XML-RPC address.
+        timeout: bound of the wait for all of them [s].
+
+    Returns:
+        The names that are still registered afterwards.
+    """
+    asked = {
+        name: address
+        for name, address in nodes.items()
+        if name not in CORE_NODES and not is_own(address)
+    }
+    for address in asked.values():
+        ask_to_shut_down(address)
+    deadline = time.monotonic() + timeout
+    # Also once the caller's own node is shut down, which ends wait_until().
+    while asked and time.monotonic() < deadline:
+        for name, address in list(asked.items()):
+            if _is_dead(address):
+                _unregister(name, address)
+        # lookupNode isn't asked: it also knows nodes of which nothing but a parameter watch is left
+        asked = {name: asked[name] for name in node_names() if name in asked}
+        if asked:
+            time.sleep(POLL)
+    return list(asked)
+
+
+def _is_dead(address: str) -> bool:
+    """True if nobody listens at a node's XML-RPC address any more."""
+    try:
+        call_node(address, "getPid", timeout=1.0)
+    except NobodyListens:
+        return True
+    except (NoAnswer, Refused):
+        pass
+    return False
+
+
+def _unregister(name: str, address: str) -> None:
+    """Have the master forget a dead node, as rosnode cleanup does.
+
+    A rospy node that is asked to shut down often exits before it has taken its leave of the master.
+    """
+    with contextlib.suppress(NoAnswer, Refused):
+        publishers, subscribers, services = _master.call("getSystemState")
+        kinds = (("unregisterPublisher", publishers), ("unregisterSubscriber", subscribers))
+        for method, topics in kinds:
+            for topic in (topic for topic, nodes in topics if name in nodes):
+                call_plain(_master.uri(), method, name, topic, address)
+        for service in (service for service, nodes in services if name in nodes):
+            location = _master.call("lookupService", service)
+            call_plain(_master.uri(), "unregisterService", name, service, location)

@@ -1,1 +1,0 @@
-"""Processes and nodes: started, found, ended."""

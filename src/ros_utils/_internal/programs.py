@@ -1,0 +1,385 @@
+"""Starts programs, waits until they are ready, and ends them when this process exits.
+
+Every program gets its own session, so that Ctrl-C in the terminal reaches only the caller, whose exit then
+ends the programs in order. Should the caller be killed outright, the kernel sends them SIGTERM (needs
+setpriv of util-linux, and a start from the main thread); what survives even that is ended by the next
+`ros_kill_all_processes`.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import enum
+import os
+import re
+import secrets
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+
+import rospkg
+
+from ros_calls import master as _master
+from ros_calls.waiting import wait_until
+from ros_utils._internal import log as _log
+from ros_utils._internal import processes as _processes
+from ros_utils.readiness import Ready
+
+COLLECTED = 5.0  # [s] from the end of a process's main thread to its exit code, at most
+# A caller that a shell put into the background ignores Ctrl-C, and so would all that it starts.
+LISTENING = ("env", "--default-signal=INT")
+
+_handles: list[Handle] = []
+_owner = os.getpid()
+_lock = threading.Lock()
+
+
+class CannotStart(Exception):
+    """The program can't be started; the text says why."""
+
+
+@dataclass
+class Handle:
+    """A program that this process started."""
+
+    start: _processes.Start
+    process: subprocess.Popen[bytes]
+    status_file: str | None = None  # where a terminal window leaves the program's exit code
+
+    def exit_code(self) -> int | None:
+        """Returns the program's exit code, or None while it runs."""
+        code = self.process.poll()
+        if code is None or self.status_file is None:
+            return code
+        try:
+            with open(self.status_file, encoding="ascii") as file:
+                return int(file.read())
+        except (OSError, ValueError):
+            return code or 1  # the window was closed before the program ended
+
+    def owns(self, pid: int | None) -> bool:
+        """Returns whether the process id is the program's or one of its descendants'."""
+        return any(each.pid == pid for each in _processes.family(self.start.token))
+
+    def lines(self, part: str = "") -> list[str]:
+        """Returns the log's lines that contain a text; none if the output went to a terminal."""
+        if self.start.log is None:
+            return []
+        with open(self.start.log, encoding="utf-8", errors="replace") as file:
+            plain = [re.sub(r"\x1b[\[\]][0-9;]*[A-Za-z]?", "", line).strip() for line in file]
+        return [line for line in plain if line and part in line]
+
+    def reason(self) -> str:
+        """Returns the reason of a failure: the last error of the log, or else its last lines."""
+        lines = self.lines()
+        errors = [line for line in lines if re.search(r"(Error|Exception|ERROR|error):", line)]
+        return " | ".join(errors[-1:] or lines[-3:]) or "it said nothing"
+
+    def where(self) -> str:
+        """Returns where to read on, for the end of a message."""
+        return f" (log: {self.start.log})" if self.start.log else ""
+
+    def end(self) -> bool:
+        """Ends the program with all that came from it; returns whether nothing is left."""
+        return end([self.start])
+
+
+class Started(int):
+    """A program that was started. It is true and equal to True, so ``if ros_launch_…(…):`` works.
+
+    Ends with `close` or at the end of a ``with`` block; in any case when this Python process exits.
+    """
+
+    _handle: Handle | None
+    master_uri: str
+
+    def __new__(cls, handle: Handle | None = None) -> Started:
+        """Without a handle: something that ran already, and that `close` leaves alone."""
+        self = super().__new__(cls, 1)
+        self._handle = handle
+        self.master_uri = _master.uri()
+        return self
+
+    @property
+    def pid(self) -> int | None:
+        """Process id; None if it wasn't started here."""
+        return self._handle.start.pid if self._handle else None
+
+    @property
+    def log_file(self) -> str | None:
+        """Where its output goes; None for a terminal."""
+        return self._handle.start.log if self._handle else None
+
+    @property
+    def running(self) -> bool:
+        """True while the program runs."""
+        return self._handle is None or self._handle.exit_code() is None
+
+    def exit_code(self) -> int | None:
+        """Returns the program's exit code; None while it runs."""
+        return self._handle.exit_code() if self._handle else None
+
+    def close(self) -> bool:
+        """Ends the program with all that came from it: SIGINT, then SIGTERM, then SIGKILL.
+
+        Returns:
+            True if nothing of it is left.
+        """
+        if self._handle is None:
+            return True
+        with _master.using(self.master_uri):
+            return self._handle.end()
+
+    def __enter__(self) -> Started:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        what = f"{self._handle.start.label}, process {self.pid}" if self._handle else "runs already"
+        return f"<Started: {what}>"
+
+
+def start(
+    command: Sequence[str],
+    kind: str,
+    label: str,
+    *,
+    window: bool = False,
+    screen: bool = False,
+    log_file: str | None = None,
+    env: Mapping[str, str] | None = None,
+) -> Handle:
+    """Starts a program in its own session.
+
+    Args:
+        command: the program and its arguments.
+        kind: "master", "launch" or "node"; programs are ended in the order node, launch, master.
+        label: what the user knows it by.
+        window: run it in an xterm if there is a display and xterm is installed; otherwise its
+            output goes to a file.
+        screen: its output goes to the caller's terminal instead of a file.
+        log_file: the file for its output; None for one of its own in ROS's log folder.
+        env: variables on top of the caller's.
+
+    Raises:
+        CannotStart: no such program, or the log file can't be written.
+    """
+    if shutil.which(command[0]) is None:
+        raise CannotStart(f"{command[0]}: no such program, or not executable")
+    token = secrets.token_hex(8)
+    log = log_file or (None if screen else _log_path(label, token))
+    status_file = None
+    bound = _dying_with_caller()
+    full = [*bound, *LISTENING, *command]
+    if window and not log_file and os.environ.get("DISPLAY") and shutil.which("xterm"):
+        log, status_file, bound = None, _log_path(label, token) + ".status", []
+        # xterm keeps exit codes to itself. The command comes as arguments, so nothing of it is parsed.
+        keep_code = '"$@"; echo $? > "$0"'
+        full = ["xterm", "-T", label, "-e", "/bin/sh", "-c", keep_code, status_file, *full]
+    elif window and not log_file:
+        _log.info(
+            f"{label}: no display or no xterm, so its output goes to {log or 'this terminal'}"
+        )
+    process = _spawn(full, {**_environment(token), **(env or {})}, log)
+    caller = os.getpid() if bound else 0
+    handle = Handle(
+        _processes.Start(process.pid, token, kind, label, log, caller), process, status_file
+    )
+    with _lock:
+        _handles.append(handle)
+    _processes.add(handle.start)
+    return handle
+
+
+def end(starts: Sequence[_processes.Start]) -> bool:
+    """Ends starts. See `processes.end`."""
+    gone = _processes.end(starts, _reap)
+    with _lock:
+        _handles[:] = [handle for handle in _handles if handle.process.poll() is None]
+    return gone
+
+
+def end_orphans() -> bool:
+    """Ends the launches and masters of killed callers. See `processes.end_orphans`."""
+    return _processes.end_orphans(_reap)
+
+
+def _reap(tokens: set[str]) -> bool:
+    """Collects exit codes of ended children, which stay zombies until then.
+
+    On a busy machine other threads of a process may take a while after its main thread has ended, and
+    until then it has no exit code.
+
+    Returns:
+        False if the exit code of one with these tokens doesn't come.
+    """
+    with _lock:
+        ours = [handle.process for handle in _handles if handle.start.token in tokens]
+        for handle in _handles:
+            handle.process.poll()
+    try:
+        for process in ours:
+            process.wait(COLLECTED)
+    except subprocess.TimeoutExpired:
+        return False
+    return True
+
+
+def _log_path(label: str, token: str) -> str:
+    folder = os.path.join(rospkg.get_log_dir(), "ros_utils")
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError as fault:
+        raise CannotStart(
+            f"{folder}: {fault.strerror}: set ROS_LOG_DIR to a folder that can be written"
+        ) from fault
+    return os.path.join(folder, f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', label).strip('-')}-{token}.log")
+
+
+def _dying_with_caller() -> list[str]:
+    """Returns a prefix that has the kernel end the program when the caller is killed outright."""
+    # The kernel looks at the thread that started the program: a short-lived one would end it too early.
+    if threading.current_thread() is not threading.main_thread() or shutil.which("setpriv") is None:
+        return []
+    return ["setpriv", "--pdeathsig", "TERM", "--"]
+
+
+def _environment(token: str) -> dict[str, str]:
+    """Returns the caller's environment, marked, and with the caller's Python first on PATH.
+
+    Many ROS scripts begin with ``#!/usr/bin/env python3``, and the first one on PATH often has no
+    rospy; ours has.
+    """
+    outer = os.environ.get(_processes.MARK)
+    path = os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", os.defpath)])
+    return {
+        **os.environ,
+        _processes.MARK: f"{outer}:{token}" if outer else token,
+        "PATH": path,
+        "PYTHONUNBUFFERED": "1",
+        "ROS_MASTER_URI": _master.uri(),
+    }
+
+
+def _spawn(
+    command: Sequence[str], environment: Mapping[str, str], log: str | None
+) -> subprocess.Popen[bytes]:
+    with contextlib.ExitStack() as stack:
+        try:
+            output = stack.enter_context(open(log, "wb")) if log else None
+            return subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT if output else None,
+                env=environment,
+                start_new_session=True,
+            )
+        except (OSError, ValueError) as fault:
+            raise CannotStart(
+                f"{command[0]}: {getattr(fault, 'strerror', None) or fault}"
+            ) from fault
+
+
+@atexit.register
+def _end_own() -> None:
+    """Ends what this process started when it exits; a second Ctrl-C makes it quick."""
+    if os.getpid() != _owner or not _handles:  # a forked child has inherited the list, not the duty
+        return
+    with contextlib.suppress(ValueError):  # not the main thread
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: _processes.hurry.set())
+    end([handle.start for handle in _handles])
+
+
+class Readiness(enum.Enum):
+    """How a wait ended."""
+
+    READY = "ready"
+    ENDED = "ended"
+    LATE = "late"
+
+
+def wait_until_ready(ready: Callable[[], bool], handle: Handle, timeout: float) -> Readiness:
+    """Look at the program again and again.
+
+    Args:
+        ready: tells whether what is waited for is there.
+        handle: the program.
+        timeout: bound [s].
+
+    Raises:
+        rospy.ROSInterruptException: the caller's node was shut down meanwhile.
+    """
+
+    def look() -> Readiness | None:
+        # First: what it did before it ended must not be missed.
+        ended = handle.exit_code() is not None
+        if ready():
+            return Readiness.READY
+        return Readiness.ENDED if ended else None
+
+    return wait_until(look, timeout, handle.start.label) or Readiness.LATE
+
+
+def wait_for_world(
+    started: Started | bool,
+    ready: Ready | None,
+    handle: Handle | None,
+    begin: float,
+    timeout: float,
+) -> Started | bool:
+    """Wait until a world is ready after something was started; if it isn't, end what was started.
+
+    Args:
+        started: what is returned if all is well.
+        ready: what has to be there; None for nothing.
+        handle: what was started; None if it ran before.
+        begin: when it was started, by time.monotonic() [s].
+        timeout: bound of the wait, from then on [s].
+
+    Returns:
+        `started`, or False, with what is missing as an error in the log.
+
+    Raises:
+        rospy.ROSInterruptException: the caller's node was shut down meanwhile.
+    """
+    if ready is None:
+        return started
+    missing = ""
+    ended = False
+
+    def look() -> bool:
+        nonlocal missing, ended
+        # A node may have done its work and end before the rest is ready.
+        code = handle.exit_code() if handle else None
+        ended = bool(code) or (code == 0 and handle is not None and handle.start.kind == "launch")
+        missing = ready.missing()
+        return ended or not missing
+
+    left = begin + timeout - time.monotonic()
+    wait_until(look, max(0.0, left), "a world that is ready")
+    if not missing:
+        return started
+    label = handle.start.label if handle else "the world"
+    what = f"not ready after {timeout:g} s"
+    if handle and ended:
+        what = f"ended with exit code {handle.exit_code()} before it was ready: {handle.reason()}"
+    _log.error(f"{label}: {what}: {missing}{handle.where() if handle else ''}")
+    if handle:
+        handle.end()
+    return False

@@ -1,0 +1,95 @@
+"""Start roslaunch, and ask a running one about its processes. Part of `ros_launch` and `ros_gazebo`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+
+from ros_calls import master as _master
+from ros_calls.master import NoAnswer, Refused, call_plain
+from ros_calls.waiting import POLL
+from ros_utils._internal import log as _log
+from ros_utils._internal import nodes as _nodes
+from ros_utils._internal import programs as _programs
+from ros_utils._internal.programs import Handle
+
+SETTLE = 5.0  # [s] at most, for the nodes of a launch file to register after their processes run
+STABLE = 0.3  # [s] without a further process: roslaunch has started them all
+STABLE_EMPTY = 1.5  # [s] without any process: the launch file sets parameters only
+CORE = ("master", "rosout-1")  # roslaunch's names for what belongs to the master that it brought up
+
+
+def start(
+    arguments: Sequence[str],
+    label: str,
+    window: bool,
+    screen: bool,
+    log_file: str | None = None,
+    env: Mapping[str, str] | None = None,
+) -> Handle:
+    """Start roslaunch without waiting for anything.
+
+    Raises:
+        MasterDown: there is no master and roslaunch couldn't start one there.
+        CannotStart: roslaunch can't be run.
+    """
+    _programs.end_orphans()  # or their master would be taken for one that stays
+    _master.is_up_or_startable()
+    return _programs.start(
+        ["roslaunch", *arguments],
+        "launch",
+        label,
+        window=window,
+        screen=screen,
+        log_file=log_file,
+        env=env,
+    )
+
+
+def list_processes(handle: Handle) -> tuple[list[str], list[str]] | None:
+    """Processes of the launch, running and dead, without master and rosout; None as long as
+    roslaunch doesn't tell."""
+    try:
+        addresses = _master.call("getParam", "/roslaunch/uris")
+    except (NoAnswer, Refused):
+        return None
+    for address in addresses.values():  # one for each roslaunch under this master, also ended ones
+        try:
+            if handle.owns(call_plain(address, "get_pid")):
+                running, dead = call_plain(address, "list_processes")
+                return [name for name, _ in running if name not in CORE], [name for name, _ in dead]
+        except (NoAnswer, Refused):
+            continue
+    return None
+
+
+def let_settle(handle: Handle) -> None:
+    """Wait until the launch's processes have registered as nodes, but not for long: not every
+    program is a node."""
+    deadline = time.monotonic() + SETTLE
+    seen: tuple[list[str], list[str]] = ([], [])
+    since = time.monotonic()
+    while time.monotonic() < deadline and handle.exit_code() is None:
+        processes = list_processes(handle) or ([], [])
+        if processes != seen:
+            seen, since = processes, time.monotonic()
+        quiet = STABLE if any(seen) else STABLE_EMPTY
+        if time.monotonic() - since > quiet and _own_nodes(handle) >= len(seen[0]):
+            break
+        time.sleep(POLL)
+    if seen[1]:
+        _warn(handle, f"ended already: {', '.join(seen[1])}")
+    for line in handle.lines("cannot launch node"):  # roslaunch goes on with the other nodes
+        _warn(handle, line)
+
+
+def _warn(handle: Handle, text: str) -> None:
+    _log.warn(f"{handle.start.label}: {text}{handle.where()}")
+
+
+def _own_nodes(handle: Handle) -> int:
+    """How many registered nodes came from the launch."""
+    nodes = [
+        address for name, address in _nodes.node_uris().items() if name not in _nodes.CORE_NODES
+    ]
+    return sum(handle.owns(_nodes.node_pid(address)) for address in nodes)

@@ -1,0 +1,101 @@
+"""What is published just before a topic is closed is sent; a topic that is gone leaves no file open."""
+
+from __future__ import annotations
+
+import gc
+import os
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import pytest
+import rospy.topics
+from rospy.impl.tcpros_pubsub import QueuedConnection
+
+from bullet_gazebo.ros.common.rospy_topics import free_polls_at_once, wait_until_sent
+
+
+class SlowTransport:
+    """Writes only when it may."""
+
+    def __init__(self) -> None:
+        self.done = False
+        self.written: list[bytes] = []
+        self.may_write = threading.Event()
+        self._closed = lambda connection: None
+
+    def set_cleanup_callback(self, callback) -> None:
+        self._closed = callback
+
+    def write_data(self, data: bytes) -> None:
+        self.may_write.wait(10)
+        self.written.append(data)
+
+    def close(self) -> None:
+        self.done = True
+        self._closed(self)
+
+
+def publisher(*transports: SlowTransport) -> SimpleNamespace:
+    connections = [QueuedConnection(transport, 10) for transport in transports]
+    return SimpleNamespace(impl=SimpleNamespace(connections=connections))
+
+
+def test_it_waits_until_all_is_written() -> None:
+    slow, quick = SlowTransport(), SlowTransport()
+    quick.may_write.set()
+    topic = publisher(slow, quick)
+    for connection in topic.impl.connections:
+        connection.write_data(b"result")
+    threading.Timer(0.2, slow.may_write.set).start()
+    wait_until_sent(topic, bound=10)
+    assert slow.written == quick.written == [b"result"]
+    for transport in (slow, quick):
+        transport.close()
+
+
+def test_a_client_that_does_not_read_holds_nobody_up() -> None:
+    stuck = SlowTransport()
+    topic = publisher(stuck)
+    topic.impl.connections[0].write_data(b"result")
+    began = time.monotonic()
+    wait_until_sent(topic, bound=0.1)
+    assert not stuck.written and time.monotonic() - began >= 0.1
+    stuck.may_write.set()
+    stuck.close()
+
+
+def test_without_clients_there_is_nothing_to_wait_for() -> None:
+    wait_until_sent(publisher())
+
+
+@pytest.fixture
+def no_collection() -> Iterator[None]:
+    """What refers to itself stays, as it may for long."""
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.mark.usefixtures("no_collection")
+def test_a_topic_that_is_gone_leaves_no_file_open(monkeypatch) -> None:
+    class Poller(rospy.topics.Poller):
+        """One of its own, to be changed."""
+
+    monkeypatch.setattr("bullet_gazebo.ros.common.rospy_topics.Poller", Poller)
+    free_polls_at_once()
+    before = os.listdir("/proc/self/fd")
+    for _ in range(20):
+        poller = Poller()
+    one, other = socket.socketpair()
+    with one:
+        poller.add_fd(one.fileno())
+        assert list(poller.error_iter()) == []
+        other.close()
+        assert list(poller.error_iter()) == [one.fileno()]
+        poller.remove_fd(one.fileno())
+        assert list(poller.error_iter()) == []
+    del poller
+    assert len(os.listdir("/proc/self/fd")) == len(before)
