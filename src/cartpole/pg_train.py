@@ -16,7 +16,7 @@ from rl_workbench.starting import Interrupt, reader_may_go
 from rl_workbench.training.command_line import USAGE, choose_training, flag
 from rl_workbench.training.options import TrainingOptions
 from rl_workbench.training.progress import tell
-from rl_workbench.training.train import shown, train
+from rl_workbench.training.train import run_training, shown
 from robot_envs.backends import has_ros, need_ros
 from robot_envs.errors import RobotEnvError
 
@@ -99,7 +99,7 @@ def main(argv: list[str] | None = None) -> int:
 def _train(options: TrainingOptions, interrupt: Interrupt, begin: Callable[[Path], None]) -> int:
     """Tells of a failure before the session is closed: a simulator that hangs takes its time."""
     try:
-        train(options, interrupt, begin)
+        run_training(options, interrupt, begin)
         return interrupt.exit_code
     except WorkbenchError as error:
         return _failed(error, interrupt)

@@ -1,1 +1,1 @@
-"""Learners: they know networks and episodes, neither ROS nor an environment."""
+"""Agents in torch and NumPy. They know no environment and no files."""

@@ -1,1 +1,1 @@
-"""Running agents in environments: the loop, what it writes, and the command line."""
+"""Trainings: one frame for all algorithms, and an adapter for each."""

@@ -62,7 +62,7 @@ class Checkpoints:
             moved = "the folder was moved or removed"
             raise FileNotFoundError(errno.ENOENT, moved, str(self._run))
 
-    def save(self, step: int, content: dict[str, Any], best: bool = False) -> None:
+    def save(self, step: int, content: dict[str, Any], best: bool = False) -> Path:
         """Writes a checkpoint, and makes it the last one and, if so told, the best one.
 
         Raises:
@@ -79,6 +79,7 @@ class Checkpoints:
             for old in _numbered(self._run)[self._keep :]:
                 if old != path:
                     old.unlink()
+        return path
 
     def save_failure(self, content: dict[str, Any]) -> None:
         """Writes `failure.pt`: what was learned until something failed, in the midst of a step.

@@ -1,4 +1,4 @@
-"""What a training has seen so far, as its record and its checkpoints hold it."""
+"""What a training has seen so far, and what it reports of that at its end."""
 
 import contextlib
 import math
@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import torch
 
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, replaying, watching
-from rl_workbench.plotting import as_png, learning_curve
 from rl_workbench.states import array, number, sequence, whole
 from rl_workbench.storage import as_json, write_atomically
 from rl_workbench.training.checkpoints import candidates
@@ -20,8 +19,9 @@ from rl_workbench.training.folder import versions
 from rl_workbench.training.options import RunOptions, TrainingOptions
 from rl_workbench.training.progress import tell
 
-WINDOW = 20  # [episodes] over which a mean length counts
-LAST = 100  # [episodes] over which successes and the summary's mean return count
+WINDOW = 20  # [episodes] of the mean length
+LAST = 100  # [episodes] of the success rate and of the summary's mean return
+TRACEBACK = "failure.txt"
 
 
 @dataclass
@@ -30,17 +30,10 @@ class History:
 
     returns: list[float] = field(default_factory=list)
     lengths: list[int] = field(default_factory=list)
-    successes: list[bool] = field(
-        default_factory=list
-    )  # of the episodes that say whether they are one
+    successes: list[bool] = field(default_factory=list)  # of the episodes that say so
     evaluations: list[tuple[int, float]] = field(default_factory=list)  # step, mean return
     best: tuple[int, float] | None = None  # of the evaluations
-    seconds: float = 0.0  # of wall time until it was last resumed
-
-    @property
-    def steps(self) -> int:
-        """Of all finished episodes."""
-        return sum(self.lengths)
+    seconds: float = 0.0  # of wall time
 
     @property
     def best_return(self) -> float:
@@ -49,20 +42,20 @@ class History:
 
     @property
     def success_rate(self) -> float:
-        """Of the last 100 episodes that say it; there is one at least."""
+        """The share of successes in the last 100 episodes that say so; there is at least one."""
         recent = self.successes[-LAST:]
         return sum(recent) / len(recent)
 
     def was_evaluated(self, steps: int) -> bool:
-        """Whether the last evaluation was at this step."""
+        """Returns whether the last evaluation was at this step."""
         return bool(self.evaluations) and self.evaluations[-1][0] == steps
 
     def is_complete(self, run: RunOptions, steps: int) -> bool:
-        """Whether what the user asked for is reached.
+        """Returns whether the training has reached its end.
 
         Args:
-            run: what they asked for.
-            steps: done so far, those of an unfinished episode included.
+            run: Its options.
+            steps: So far, those of an unfinished episode included.
         """
         recent = self.lengths[-WINDOW:]
         return (
@@ -77,7 +70,7 @@ class History:
         )
 
     def state_dict(self) -> dict[str, Any]:
-        """Plain numbers and tensors."""
+        """Returns plain numbers and tensors."""
         return {
             "returns": torch.tensor(self.returns, dtype=torch.float64),
             "lengths": torch.tensor(self.lengths, dtype=torch.int64),
@@ -88,16 +81,15 @@ class History:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Takes over what `state_dict` gave.
+        """Loads what `state_dict` returned.
 
         Raises:
-            TypeError, ValueError, LookupError: if it gave something else.
+            TypeError, ValueError, LookupError: If it is something else.
         """
         self.returns = array(state["returns"], torch.float64, (None,)).tolist()
         lengths = array(state["lengths"], torch.int64, (len(self.returns),))
         self.lengths = [whole(each) for each in lengths.tolist()]
-        if "successes" in state:  # earlier versions didn't count them
-            self.successes = array(state["successes"], torch.bool, (None,)).tolist()
+        self.successes = array(state["successes"], torch.bool, (None,)).tolist()
         self.evaluations = [evaluation_of(each) for each in sequence(state["evaluations"])]
         self.best = None if state["best"] is None else evaluation_of(state["best"])
         self.seconds = number(state["seconds"])
@@ -106,19 +98,16 @@ class History:
 
 
 def evaluation_of(state: Any) -> tuple[int, float]:
-    """Step and mean return, from a checkpoint.
+    """Returns step and mean return from a checkpoint.
 
     Raises:
-        ValueError: if it holds something else.
+        ValueError: If it holds something else.
     """
     step, mean = sequence(state, 2)
     return whole(step), number(mean)
 
 
-TRACEBACK = "failure.txt"  # of an environment that failed
-
-
-class TrainingOutcome(NamedTuple):
+class Outcome(NamedTuple):
     """A training at its end, whatever ended it."""
 
     options: TrainingOptions
@@ -128,19 +117,15 @@ class TrainingOutcome(NamedTuple):
     is_complete: bool
     is_interrupted: bool
     evaluation: Evaluation | None  # the last one
-    is_in_place: bool = True  # else another folder is where its own was
+    is_in_place: bool  # else the run folder was moved or removed
 
-    def write(self, failure: str | None) -> None:
-        """Writes learning_curve.png and summary.json.
+    def write_summary(self, failure: str | None) -> None:
+        """Writes summary.json.
 
         Raises:
-            OSError: if the disk refuses.
+            OSError: If it can't be written.
         """
-        history, run = self.history, self.options.run
-        if history.returns:
-            title = f"{self.options.kind.name}, {run.env_id}, seed {run.seed}"
-            figure = learning_curve(history.lengths, history.returns, title, history.successes)
-            write_atomically(self.folder / "learning_curve.png", as_png(figure))
+        history = self.history
         summary = {
             **self.options.record(),
             "versions": versions(),
@@ -162,8 +147,8 @@ class TrainingOutcome(NamedTuple):
         }
         write_atomically(self.folder / "summary.json", as_json(summary))
 
-    def tell(self) -> None:
-        """Says how far it came, what it is worth, and what can be done with it."""
+    def report(self) -> None:
+        """Prints how far it came, how good the policy is, and what to do with it."""
         history, evaluation = self.history, self.evaluation
         line = f"trained {len(history.returns)} episodes, {self.steps} steps in "
         line += f"{history.seconds:.1f} s"
@@ -177,35 +162,39 @@ class TrainingOutcome(NamedTuple):
         tell(line)
         if not self.is_in_place:
             return
-        tell(f"everything lies in {self.folder}")
+        tell(f"all results are in {self.folder}")
         if self.is_interrupted:
-            tell(f"interrupted{self._how_to_go_on()}")
+            tell(f"interrupted{self._how_to_resume()}")
         tell(f"watch: {replaying(self.folder)}")
         tell(f"curves: {watching(self.folder)}")
 
-    def what_is_left(self, is_written: bool) -> str:
-        """Of a training that failed.
+    def failure_text(self, failure: WorkbenchError, is_written: bool) -> str:
+        """Returns the line for a training that failed.
 
         Args:
-            is_written: whether all could be written.
+            failure: What ended it.
+            is_written: Whether everything could be saved.
         """
-        text = f"stopped after {self.steps} steps, {len(self.history.returns)} episodes"
+        text = (
+            f"{failure}{_write_traceback(self.folder, failure)}; stopped after {self.steps} steps, "
+        )
+        text += f"{len(self.history.returns)} episodes"
         if is_written:
             text += f", what was learned is saved in {self.folder}"
-        return text + self._how_to_go_on()
+        return text + self._how_to_resume()
 
-    def _how_to_go_on(self) -> str:
+    def _how_to_resume(self) -> str:
         if not self.is_in_place or not candidates(self.folder):
             return ""
         return f"; --resume {shlex.quote(str(self.folder))} goes on from the last checkpoint"
 
 
-def write_traceback(folder: Path, failure: WorkbenchError) -> str:
-    """Writes that of an environment's own code into the folder; returns the words for it."""
+def _write_traceback(folder: Path, failure: WorkbenchError) -> str:
+    """Writes the traceback of an environment's or a callback's own code into the folder."""
     if not isinstance(failure, EnvironmentFailure):
         return ""
     path, text = folder / TRACEBACK, "".join(traceback.format_exception(failure.__cause__))
-    with contextlib.suppress(OSError):  # what can't be written isn't what the user has to hear of
+    with contextlib.suppress(OSError):  # the user needs to hear of the failure, not of this
         write_atomically(path, lambda stream: stream.write(text.encode(errors="replace")))
         return f"; the traceback is in {path}"
     return ""

@@ -5,66 +5,40 @@ import io
 import os
 import sys
 import time
-from collections.abc import Sequence
 from typing import Any, TextIO
 
-from tqdm import tqdm
+from rl_workbench.training.callbacks import Callback, EpisodeResult
 
 LINE_EVERY = 20  # [episodes]
 REFRESH = 0.1  # [s]
-WIDTH = 100  # [columns] of the bar on a terminal that doesn't tell its size
+WIDTH = 100  # [columns] of the bar on a terminal that doesn't report its size
 
 
 def tell(text: str, stream: TextIO | None = None) -> None:
-    """Tells the user, at once also when the output is a pipe; one that is gone costs no training.
-
-    Nor does a sign that the output's encoding doesn't have: it comes as its number.
-    """
+    """Prints a line at once. A stream that is closed doesn't matter, nor does its encoding."""
     with contextlib.suppress(OSError):
         print(writable(text, stream or sys.stdout), file=stream, flush=True)
 
 
 def writable(text: str, stream: TextIO | None) -> str:
-    """`text` with backslashes for what the stream can't write, as the path of a folder may hold."""
+    """Returns a text with backslashes for what the stream can't encode, as a path may hold."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def warn(text: str) -> None:
-    """Tells the user beside the results."""
+    """Prints a line to standard error."""
     tell(text, sys.stderr)
 
 
-def _has_size(stream: TextIO) -> bool:
-    """Whether the terminal tells its size: tqdm would draw a bar of no width on one that doesn't."""
-    try:
-        return os.get_terminal_size(stream.fileno()).columns > 0
-    except (OSError, ValueError):
-        return False
-
-
-def _terminal_bar(total: int, unit: str, stream: TextIO, done: int) -> tqdm:
-    """An empty bar that suits the terminal."""
-    sized = _has_size(stream)
-    return tqdm(
-        total=total,
-        initial=done,
-        unit=unit,
-        file=stream,
-        dynamic_ncols=sized,
-        ncols=None if sized else WIDTH,
-        nrows=None if sized else 2,
-    )
-
-
-class Progress:
-    """A bar over what the training's length is counted in, and lines.
+class Progress(Callback):
+    """A bar over the training's length, and lines.
 
     Args:
-        total: steps or episodes of the whole training.
-        unit: which of them, "step" or "episode".
-        done: of these, what was done before.
-        stream: where it goes; standard error unless told otherwise.
+        total: Steps or episodes of the whole training.
+        unit: "step" or "episode".
+        done: How many of them were done before.
+        stream: By default standard error.
     """
 
     def __init__(self, total: int, unit: str, done: int, stream: TextIO | None = None) -> None:
@@ -74,12 +48,34 @@ class Progress:
         self._time = time.monotonic()
         self._bar: Any = None
         if self._stream.isatty():
-            self._bar = _terminal_bar(total, unit, self._stream, done)
+            from tqdm import tqdm
 
-    def step_done(self, steps: int) -> None:
-        """Moves a bar of steps, now and then."""
+            # tqdm would draw a bar of no width on a terminal that doesn't report its size.
+            size: dict[str, int] = {"dynamic_ncols": True}
+            if not _has_size(self._stream):
+                size = {"ncols": WIDTH, "nrows": 2}
+            self._bar = tqdm(total=total, initial=done, unit=unit, file=self._stream, **size)
+
+    def on_step(self, training: Any) -> None:
         if self._counts_steps:
-            self._advance(steps)
+            self._advance(training.steps)
+
+    def on_episode(self, training: Any, episode: EpisodeResult) -> None:
+        if not self._counts_steps:
+            self._advance(episode.number)
+        returns, speed = training.history.returns, f"{episode.speed:.0f} steps/s"
+        rate = f"success: {training.history.success_rate:.0%}" if training.history.successes else ""
+        note = ", ".join(filter(None, [rate, episode.note]))
+        if self._bar is not None:
+            last = f"return {episode.total_reward:.0f}, length {episode.length}"
+            parts = [last, note.replace(":", ""), speed]
+            self._bar.set_postfix_str(", ".join(filter(None, parts)), refresh=False)
+        if episode.number % LINE_EVERY == 0:
+            mean = sum(returns[-LINE_EVERY:]) / LINE_EVERY
+            self.say(
+                f"Episode {episode.number:4d} | Reward: {episode.total_reward:3.0f} | "
+                f"Avg({LINE_EVERY}): {mean:6.1f} | {note or speed}"
+            )
 
     def _advance(self, done: int) -> None:
         self._done = done
@@ -90,36 +86,22 @@ class Progress:
         self._bar.update(self._done - self._shown)
         self._shown, self._time = self._done, time.monotonic()
 
-    def episode_done(self, returns: Sequence[float], length: int, speed: str, note: str) -> None:
-        """Puts an episode's figures beside the bar; of every 20th one there is a line.
-
-        Args:
-            returns: of all episodes so far.
-            length: of the last one [steps].
-            speed: in steps a second, as a text.
-            note: what the algorithm says of itself; the speed if it is empty.
-        """
-        if not self._counts_steps:
-            self._advance(len(returns))
-        if self._bar is not None:
-            parts = [f"return {returns[-1]:.0f}", f"length {length}", note.replace(":", ""), speed]
-            self._bar.set_postfix_str(", ".join(filter(None, parts)), refresh=False)
-        if len(returns) % LINE_EVERY == 0:
-            mean = sum(returns[-LINE_EVERY:]) / LINE_EVERY
-            self.say(
-                f"Episode {len(returns):4d} | Reward: {returns[-1]:3.0f} | "
-                f"Avg({LINE_EVERY}): {mean:6.1f} | {note or speed}"
-            )
-
     def say(self, text: str) -> None:
-        """A line of its own, above the bar."""
+        """Prints a line above the bar."""
         if self._bar is not None:
             self._bar.write(writable(text, self._stream), file=self._stream)
         else:
             tell(text, self._stream)
 
     def close(self) -> None:
-        """Ends the bar, where the training has come to."""
+        """Ends the bar where the training is."""
         if self._bar is not None:
             self._move()
             self._bar.close()
+
+
+def _has_size(stream: TextIO) -> bool:
+    try:
+        return os.get_terminal_size(stream.fileno()).columns > 0
+    except (OSError, ValueError):
+        return False

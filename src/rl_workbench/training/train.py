@@ -10,14 +10,38 @@ from typing import Any
 from rl_workbench import starting
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt, reader_may_go
-from rl_workbench.training.command_line import PROG, algorithm_parser, choose_training
+from rl_workbench.training.algorithms import algorithm
+from rl_workbench.training.callbacks import Callback, load_callbacks
+from rl_workbench.training.command_line import PROG, algorithm_parser, choose, choose_training
 from rl_workbench.training.options import TrainingOptions
 
 PROGRAM = starting.program("rl_workbench")
 
 
-def train(
-    options: TrainingOptions, interrupt: Interrupt, begin: Callable[[Path], object] = lambda _: None
+def train(algo: str, callbacks: Sequence[Callback] = (), **options: Any) -> Path:
+    """Trains an agent from Python, like `rl-workbench train`.
+
+        folder = train("dqn", env_id="CartPole-v1", total_timesteps=5000, callbacks=[Mine()])
+
+    Args:
+        algo: The algorithm, as `--algo` names it.
+        callbacks: Called at the events of the training, see `Callback`.
+        options: Options by name, as the flags with underscores; also `config`, `preset` and `resume`.
+
+    Returns:
+        The run folder.
+
+    Raises:
+        WorkbenchError: If an option is wrong, or the training fails. What was learned is saved.
+    """
+    return run_training(choose(algorithm(algo), [], options), Interrupt(), callbacks=callbacks)
+
+
+def run_training(
+    options: TrainingOptions,
+    interrupt: Interrupt,
+    begin: Callable[[Path], object] = lambda _: None,
+    callbacks: Sequence[Callback] = (),
 ) -> Path:
     """Trains into the options' folder, or a new one below runs/.
 
@@ -25,6 +49,7 @@ def train(
         options: Of a new training, or of one to resume.
         interrupt: Says when to stop.
         begin: Is called with the folder before the training begins, to start what goes beside it.
+        callbacks: Further ones than those that the options name.
 
     Returns:
         The folder.
@@ -38,6 +63,7 @@ def train(
 
         import_module(options.kind.implementation)
 
+    callbacks = [*callbacks, *load_callbacks(options.session.callback)]
     run = options.run
     try:
         with ExitStack() as holding:
@@ -48,7 +74,7 @@ def train(
                 place = (run.run_dir, run.env_id, run.exp_name, run.seed)
                 folder = holding.enter_context(run_folder.opened(*place))
             begin(folder)
-            training = Training(options, folder, interrupt)
+            training = Training(options, folder, interrupt, callbacks)
             interrupt.defer()
             training.run()
     finally:
@@ -86,7 +112,7 @@ def main(
             def begin(folder: Path) -> None:
                 beside.enter_context(shown(options, folder, tuple(program)))
 
-            train(options, interrupt, begin)
+            run_training(options, interrupt, begin)
         return interrupt.exit_code
     except WorkbenchError as error:
         print(f"{prog}: {error}", file=sys.stderr, flush=True)

@@ -5,7 +5,6 @@ import importlib.util
 import unittest
 from pathlib import Path
 
-import rospkg
 import rostest
 from support.ros.pg_train_runs import Place
 
@@ -13,7 +12,7 @@ from support.ros.pg_train_runs import Place
 @unittest.skipUnless(importlib.util.find_spec("stable_baselines3"), "./ws extras isn't installed")
 class ReadmePpo(unittest.TestCase):
     def test_it_trains_over_ros_and_leaves_nothing(self):
-        root = Path(rospkg.RosPack().get_path("cartpole"))
+        root = Path(__file__).resolve().parents[3]
         code = (root / "examples/ppo_over_ros.py").read_text()
         self.assertIn("60_000", code)
         self.assertIn("n_eval_episodes=5", code)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import rosgraph
 import rostest
-from support.robots.pendulum import MOTOR, PENDULUM, hanging, make_pendulum
+from support.robots.pendulum import MOTOR, PENDULUM, make_pendulum
 
 from robot_envs.backends.in_process import InProcessWorld
 from robot_envs.backends.ros.session import RosSession
@@ -107,18 +107,6 @@ class Lockstep(SecondRobot):
         self.assertEqual(runs[0], runs[1])
         self.assertEqual(runs[0][-1].time, 0.2)
 
-    def test_a_question_is_answered_from_then_on_and_taken_back(self):
-        robot = self.session.connect(self.scene, 0.01)
-        self.addCleanup(robot.close)
-        for query, links in (
-            (StateQuery(), []),
-            (StateQuery(links=(LinkQuery("rod"),)), ["rod"]),
-            (StateQuery(), []),
-        ):
-            robot.look(query)
-            states = [robot.reset(hanging(0.3)), robot.act({})]
-            self.assertEqual([list(state.links) for state in states], [links, links])
-
     def test_an_episode_that_another_environment_has_ended_goes_no_further(self):
         first, second = (make_pendulum("ros", self.scene.robots[0]) for _ in range(2))
         self.addCleanup(first.close)
@@ -130,15 +118,6 @@ class Lockstep(SecondRobot):
         with self.assertRaisesRegex(SimulatorError, "another environment .* has moved the same"):
             first.step(action)
         second.step(action)
-
-    def test_wrong_names_are_refused_at_once(self):
-        robot = self.session.connect(self.scene, 0.01)
-        self.addCleanup(robot.close)
-        with self.assertRaisesRegex(SimulatorError, "no link 'rood'; did you mean 'rod'"):
-            robot.look(StateQuery(links=(LinkQuery("rood"),)))
-        with self.assertRaisesRegex(SimulatorError, "no model 'ball'"):
-            robot.reset(InitialState(models={"ball": Pose()}))
-        robot.reset(InitialState())
 
     def test_what_one_environment_varies_is_taken_back_for_another_one(self):
         """Also where the first one is closed while the other one's episode is under way."""
@@ -157,20 +136,6 @@ class Lockstep(SecondRobot):
         again = make_pendulum("ros", robot, varied=True)
         self.addCleanup(again.close)
         self.assertTrue(np.array_equal(again.reset(seed=2)[1]["variation"], told))
-
-    def test_it_is_given_back_with_its_own_friction(self):
-        def spun_down():
-            robot = self.session.connect(self.scene, 0.01)
-            robot.reset(hanging(0.0, 10.0))
-            state = robot.act({MOTOR: 0.0})
-            robot.close()
-            return state
-
-        before = spun_down()
-        env = make_pendulum("ros", self.scene.robots[0], varied=True)
-        env.reset(seed=0)
-        env.close()
-        self.assertEqual(spun_down(), before)
 
 
 @unittest.skipUnless(REALTIME, "time moves when asked to")

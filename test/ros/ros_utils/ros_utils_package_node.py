@@ -91,11 +91,6 @@ class Package(unittest.TestCase):
         self.assertIn("x", ros_gazebo.gazebo_get_model_names())
         self.assertEqual(ros_gazebo.gazebo_get_gravity().z, -1.5)
 
-    def test_a_world_by_its_path(self):
-        path = self.path("worlds/light.world")
-        with Simulation(custom_world_path=path, verbose=True, recording=True) as other:
-            self.assertIn("x", other.model_names())
-
     def test_urdf(self):
         expanded = ros_urdf.urdf_parse_from_pkg("my_robot", "robot.xacro", args_xacro=["mass:=7"])
         self.assertIn('<mass value="7"/>', expanded)

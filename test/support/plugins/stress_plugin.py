@@ -1,4 +1,4 @@
-"""Options and the table of the stress tests (test/stress).
+"""The options of the stress tests (test/stress) and the table of their results.
 
     ./ws test -m stress                                     # all of it, up to an hour; another seed each time
     ./ws test -m stress --stress-seed 7 -k kill             # the same cases again
@@ -12,12 +12,14 @@ from __future__ import annotations
 import secrets
 from collections.abc import Iterator
 from dataclasses import asdict
+from pathlib import Path
 
 import pytest
 from support.stress import table
 from support.stress.scenario import Row, Scenario
 
 LITTLE = 0.0005  # of the full number of cases
+RESULTS = Path(__file__).resolve().parents[3] / ".ws/stress"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -28,12 +30,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def is_asked_for(config: pytest.Config) -> bool:
-    """Whether it is a run of stress tests, not one of all tests."""
+    """Whether this is a stress run, not a run of all tests."""
     return config.option.markexpr == "stress"
 
 
 def prepare(config: pytest.Config) -> None:
-    """Chooses what wasn't given; the processes of pytest-xdist get it with the other options."""
+    """Choose what wasn't given; the processes of pytest-xdist get it with the other options."""
     if config.option.stress_scale is None:
         config.option.stress_scale = 1.0 if is_asked_for(config) else LITTLE
     if config.option.stress_seed is None:
@@ -48,7 +50,7 @@ def pytest_report_header(config: pytest.Config) -> list[str]:
 
 
 def deselect_full(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leaves what is marked `stress(full=True)` to a run of stress tests: its like runs in any."""
+    """Deselect what is marked `stress(full=True)` unless this is a stress run."""
     if is_asked_for(config):
         return
     marks = ((item, item.get_closest_marker("stress")) for item in items)
@@ -60,7 +62,7 @@ def deselect_full(config: pytest.Config, items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def scenario(request: pytest.FixtureRequest) -> Iterator[Scenario]:
-    """What a stress test draws from and counts with."""
+    """Random numbers and counters for a stress test."""
     option = request.config.option
     made = Scenario(option.stress_seed, option.stress_scale, option.stress_case)
     yield made
@@ -70,7 +72,7 @@ def scenario(request: pytest.FixtureRequest) -> Iterator[Scenario]:
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    """Tells and keeps the table of a run of stress tests."""
+    """Print the table of a stress run, and write it to .ws/stress/table.md."""
     if not is_asked_for(config):
         return
     option = config.option
@@ -84,6 +86,7 @@ def pytest_terminal_summary(
     ]
     records = [table.record(row, option.stress_seed, option.stress_scale) for row in rows]
     if records:
-        table.write(records)
+        RESULTS.mkdir(parents=True, exist_ok=True)
+        (RESULTS / "table.md").write_text(table.render(records))
         terminalreporter.section(f"stress, seed {option.stress_seed}")
         terminalreporter.write(table.render(records))

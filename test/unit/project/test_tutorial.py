@@ -94,7 +94,6 @@ def test_every_command_of_the_tutorial_works(tmp_path: Path, monkeypatch) -> Non
 
 def test_both_languages_have_the_same_commands() -> None:
     mine, other = blocks(ENGLISH), blocks(CHINESE)
-    assert len(mine) > 15
     code = [re.sub(r" *#.*", "", block.text) for block in mine if block.language != "text"]
     assert code == [re.sub(r" *#.*", "", each.text) for each in other if each.language != "text"]
     assert [block[:2] for block in mine] == [block[:2] for block in other]

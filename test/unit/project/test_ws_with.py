@@ -111,7 +111,7 @@ def test_the_commands_of_the_page(ws, root, workspace, tmp_path):
     """Those of docs/catkin.md with this workspace as ~/my_ws; the launch file is not started."""
     text = (root / "docs/catkin.md").read_text()
     lines = re.findall(r"^    \./ws (--with ~/my_ws .*)$", text, re.MULTILINE)
-    assert len(lines) == 3
+    assert lines
     for line in lines:
         words = [word.replace("~/my_ws", str(workspace)) for word in line.split()]
         if "roslaunch" in words:

@@ -1,1 +1,1 @@
-"""A training with Stable-Baselines3."""
+"""Trainings by Stable-Baselines3's algorithms."""

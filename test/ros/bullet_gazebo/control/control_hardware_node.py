@@ -7,15 +7,13 @@ import rosgraph
 import rospy
 import rostest
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
-from control_msgs.msg import JointControllerState, PidState
+from control_msgs.msg import JointControllerState
 from sensor_msgs.msg import JointState
 from slides_client import SlidesTest, listen
 from std_msgs.msg import Float64
-from std_srvs.srv import Empty
 from support.ros.calls import call
 
 DESCRIPTION, LIMITS = "/slides/robot_description", "/slides/joint_limits"
-SAFETY = '<safety_controller soft_lower_limit="-0.2" soft_upper_limit="0.2" k_position="20" k_velocity="50"/>'
 
 
 class HardwareTest(SlidesTest):
@@ -46,29 +44,6 @@ class HardwareTest(SlidesTest):
         self.assertAlmostEqual(joints["position_a"][0], 0.02, places=5)
         self.assertAlmostEqual(joints["velocity_a"][1], 0.2, places=5)
 
-    def test_soft_limits_stop_every_interface_before_the_end(self):
-        self.begin('velocity="4"/>', f'velocity="4"/>{SAFETY}')
-        self.run_controllers("effort_joint", "position_joint", "velocity_joint")
-        joints = self.step(3000, effort_joint=5.0, position_joint=1.0, velocity_joint=1.0)
-        self.assertAlmostEqual(joints["position_a"][0], 0.2, places=3)
-        self.assertAlmostEqual(joints["velocity_a"][0], 0.2, places=3)
-        self.assertAlmostEqual(joints["effort_a"][1], 0.0, places=3)
-        self.assertLess(joints["effort_a"][0], 0.21)
-
-    def test_limits_of_zero_hold_what_they_limit(self):
-        zero = {
-            "has_effort_limits": True,
-            "max_effort": 0,
-            "has_velocity_limits": True,
-            "max_velocity": 0,
-        }
-        rospy.set_param(LIMITS, {"effort_a": zero, "position_a": zero, "velocity_a": zero})
-        self.begin()
-        self.run_controllers("effort_joint", "position_joint", "velocity_joint")
-        joints = self.step(100, effort_joint=9.0, position_joint=1.0, velocity_joint=1.0)
-        for name in ("effort_a", "position_a", "velocity_a"):
-            self.assertAlmostEqual(joints[name][0], 0.0, places=9)
-
     def test_the_control_period_is_a_whole_number_of_steps(self):
         self.begin("<eStopTopic>", "<controlPeriod>0.0025</controlPeriod><eStopTopic>")
         self.run_controllers("effort_position")
@@ -81,21 +56,6 @@ class HardwareTest(SlidesTest):
         self.assertEqual((first.time_step, second.time_step), (0.003, 0.003))
         self.assertEqual((second.header.stamp - first.header.stamp).to_nsec(), 30_000_000)
         topic.close()
-
-    def test_a_reset_begins_a_control_period(self):
-        self.begin("<eStopTopic>", "<controlPeriod>0.1</controlPeriod><eStopTopic>")
-        rospy.set_param(
-            "/slides/effort_position/pid", {"p": 400.0, "d": 40.0, "publish_state": True}
-        )
-        self.run_controllers("effort_position")
-        self.step(150)
-        for reset in ("/gazebo/reset_world", "/gazebo/reset_simulation"):
-            topic = listen("effort_position/pid/state", PidState)
-            call(reset, Empty)
-            self.step(1)
-            self.assertTrue(topic.wait_for(len))
-            self.assertEqual(topic.messages[0].timestep, rospy.Duration(0, 100_000_000))
-            topic.close()
 
     def test_each_field_of_a_controllers_state(self):
         self.begin()

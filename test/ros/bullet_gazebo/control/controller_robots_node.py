@@ -2,7 +2,6 @@
 """Controller managers in a world that moves: namespaces, several robots, resets, latched efforts."""
 
 import unittest
-from itertools import pairwise
 
 import rospy
 import rostest
@@ -14,7 +13,6 @@ from controller_manager_msgs.utils import (
     get_rosparam_controller_names,
     is_controller_manager,
 )
-from gazebo_msgs.srv import GetJointProperties, SetModelConfiguration
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
@@ -92,19 +90,6 @@ class RobotsTest(unittest.TestCase):
 
     # efforts and resets
 
-    def test_the_last_effort_stays_after_stop(self):
-        self.assertTrue(spawn().success)
-        manager, joints = self.start(), self.joints()
-        self.command("/cart/command", 0.4)
-        self.assertTrue(joints.wait_for(lambda m: m[-1].effort[1] > 0.1))
-        self.assertTrue(manager.switch([], ["cart"], STRICT))
-        start = len(joints.messages) + 2  # one may have been on its way
-        self.assertTrue(joints.wait_for(lambda m: len(m) >= start + 20))
-        after = joints.messages[start : start + 20]
-        self.assertEqual(len({m.effort[1] for m in after}), 1, "the effort isn't held")
-        self.assertGreater(after[0].effort[1], 0.05)
-        self.assertTrue(all(b.velocity[1] > a.velocity[1] for a, b in pairwise(after)))
-
     def test_controllers_survive_resets(self):
         self.assertTrue(spawn().success)
         manager, joints = self.start(), self.joints()
@@ -118,15 +103,6 @@ class RobotsTest(unittest.TestCase):
         call("/gazebo/reset_simulation", Empty)
         self.assertEqual(manager.states(), RUNNING | {"cart": "stopped"})
         self.assertTrue(manager.switch(["cart"], [], BEST_EFFORT))
-
-    def test_controllers_survive_set_model_configuration(self):
-        self.assertTrue(spawn().success)
-        manager = self.start()
-        request = ("cartpole", "robot_description", ["stand_cart"], [0.2])
-        call("/gazebo/set_model_configuration", SetModelConfiguration, *request)
-        place = call("/gazebo/get_joint_properties", GetJointProperties, "stand_cart").position[0]
-        self.assertAlmostEqual(place, 0.2, places=2)
-        self.assertEqual(manager.states(), RUNNING)
 
     # controller_manager_msgs.utils
 

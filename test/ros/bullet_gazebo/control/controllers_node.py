@@ -9,7 +9,6 @@ import math
 import rospy
 import rostest
 from control_msgs.msg import JointControllerState
-from gazebo_msgs.srv import SetModelConfiguration
 from geometry_msgs.msg import Vector3
 from sensor_msgs.msg import JointState
 from slides_client import SlidesTest, listen
@@ -72,19 +71,6 @@ class ControllersTest(SlidesTest):
         self.assertTrue(topic.wait_for(lambda got: got[-1].set_point == 5.0))
         topic.close()
 
-    def test_effort_velocity_with_its_state_topic(self):
-        self.run_controllers("effort_velocity")
-        topic = listen("effort_velocity/state", JointControllerState)
-        joints = self.step(500, effort_velocity=0.7)
-        self.assertAlmostEqual(joints["effort_a"][1], 0.7, places=6)
-        self.assertTrue(
-            topic.wait_for(lambda got: got and got[-1].header.stamp.to_nsec() == 491_000_000)
-        )
-        state = topic.messages[-1]
-        self.assertEqual((state.set_point, state.process_value_dot), (0.7, 0.0))
-        self.assertAlmostEqual(state.process_value, 0.7, places=6)
-        topic.close()
-
     def test_groups_take_their_joints_in_the_order_of_the_parameter(self):
         for name, wanted in (
             ("effort_group", {"effort_b": 1.0, "effort_a": -2.0}),
@@ -105,44 +91,6 @@ class ControllersTest(SlidesTest):
                     abs(joints[a][i] - w[a]) < 1e-3 and abs(joints[b][i] - w[b]) < 1e-3
                 ),
             )
-
-    def test_effort_group_position(self):
-        self.run_controllers("effort_group_position")
-        command = self.publisher("effort_group_position/command", Float64MultiArray)
-        self.publish_until(
-            command, Float64MultiArray(data=[0.2, -0.1]), lambda joints: joints["effort_b"][2] > 0.0
-        )
-        joints = self.step(1000)
-        self.assertAlmostEqual(joints["effort_b"][0], 0.2, places=3)
-        self.assertAlmostEqual(joints["effort_a"][0], -0.1, places=3)
-
-    def test_position_joint_starts_where_it_is_and_keeps_to_the_velocity_limit(self):
-        self.run_controllers("position_joint")
-        self.assertAlmostEqual(self.step(50)["position_a"][0], 0.0, places=6)
-        position, velocity, effort = self.step(100, position_joint=3.0)["position_a"]
-        self.assertAlmostEqual(position, 0.4, places=5)  # 4 m/s for 0.1 s
-        self.assertAlmostEqual(velocity, 4.0, places=3)
-        self.assertEqual(effort, 0.0)
-
-    def test_velocity_joint_and_velocity_position(self):
-        self.run_controllers("velocity_joint")
-        self.assertAlmostEqual(self.step(100, velocity_joint=0.5)["velocity_a"][1], 0.5, places=4)
-        self.assertTrue(self.switch(stop=["velocity_joint"]))
-        self.assertAlmostEqual(self.step(100)["velocity_a"][1], 0.5, places=4)  # it stays latched
-        self.run_controllers("velocity_position")
-        self.assertAlmostEqual(
-            self.step(1000, velocity_position=-0.2)["velocity_a"][0], -0.2, places=3
-        )
-
-    def test_joints_with_gains_report_their_effort(self):
-        self.run_controllers("velocity_group", "position_group")
-        command = self.publisher("velocity_group/command", Float64MultiArray)
-        self.publish_until(
-            command,
-            Float64MultiArray(data=[0.5, 0.0]),
-            lambda joints: joints["velocity_b"][2] > 0.0,
-        )
-        self.assertAlmostEqual(self.step(500)["velocity_b"][1], 0.5, places=4)
 
     def test_joint_states_list_all_joints_alphabetically_at_the_rate(self):
         self.assertTrue(self.load("states"))
@@ -180,19 +128,6 @@ class ControllersTest(SlidesTest):
             self.assertAlmostEqual(joints["position_a"][0], 0.0, places=6)
             self.assertEqual(joints["effort_a"], (0.0, 0.0, 0.0))  # no kick
 
-    def test_position_joints_stay_where_a_service_puts_them(self):
-        self.run_controllers("position_joint", "position_group_b", "effort_position")
-        self.step(100, position_joint=0.4, effort_position=0.3)
-        names, places = ["position_a", "position_b", "effort_a"], [-0.5, 0.25, 0.1]
-        request = ("slides", "robot_description", names, places)
-        self.assertTrue(
-            call("/gazebo/set_model_configuration", SetModelConfiguration, *request).success
-        )
-        for ticks in (1, 1, 200):
-            joints = self.step(ticks)
-            for name, place in zip(names, places, strict=True):
-                self.assertAlmostEqual(joints[name][0], place, places=6)
-
     def test_what_cannot_be_loaded(self):
         before = self.types()
         for name in ("no_joint", "wrong_interface", "no_gains", "nan_gains", "empty_group", "twice",
@@ -213,15 +148,6 @@ class ControllersTest(SlidesTest):
         self.assertAlmostEqual(joints["effort_b"][0], 0.1 * (1.0 - math.cos(angle)), delta=3e-4)
         self.assertTrue(stretch.wait_for(len))
         stretch.close()
-
-    def test_a_controller_that_raises_is_stopped_and_the_others_go_on(self):
-        self.run_controllers("effort_position", "raises")
-        joints = self.step(500, effort_position=0.1)
-        self.assertEqual(self.state("raises"), "stopped")
-        self.assertEqual(self.state("effort_position"), "running")
-        self.assertEqual(joints["effort_b"], (0.0, 0.0, 0.0))  # its last command is let go of
-        self.assertAlmostEqual(joints["effort_a"][0], 0.1, delta=0.01)
-        self.assertTrue(self.unload("raises"))
 
     def test_the_emergency_stop(self):
         self.run_controllers("effort_joint", "position_joint", "velocity_joint")

@@ -10,7 +10,6 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 from control_msgs.msg import JointTolerance
-from control_msgs.srv import QueryTrajectoryState
 from controller_client import STRICT, Manager
 from gazebo_msgs.srv import GetJointProperties
 from std_srvs.srv import Empty
@@ -93,17 +92,6 @@ class TrajectoryTest(unittest.TestCase):
                     self.assertAlmostEqual(position(joint), place, delta=0.01)
                 pause()
 
-    def test_claims_are_alphabetical_and_states_keep_the_order_of_the_parameter(self):
-        arm = self.arm()
-        (listed,) = self.manager.listed()
-        self.assertEqual(listed.type, "effort_controllers/JointTrajectoryController")
-        (claim,) = listed.claimed_resources
-        self.assertEqual(claim.hardware_interface, "hardware_interface::EffortJointInterface")
-        self.assertEqual(claim.resources, EFFORT)
-        unpause()
-        self.assertTrue(arm.wait_state(lambda state: True))
-        self.assertEqual(arm.states[0].joint_names, EFFORT[::-1])
-
     # goals that fail
 
     def test_path_tolerance(self):
@@ -140,10 +128,6 @@ class TrajectoryTest(unittest.TestCase):
         plan = trajectory(EFFORT, (1.0, [0.0, 0.0]))
         self.check(arm.pursue(plan), "REJECTED", "INVALID_GOAL", "not running")
 
-    def test_missing_gains_refuse_the_load(self):
-        self.assertFalse(self.manager.load("no_gains"))
-        self.assertEqual(self.manager.listed(), [])
-
     # goals that something else comes between
 
     def test_cancel_holds_the_joints(self):
@@ -159,18 +143,6 @@ class TrajectoryTest(unittest.TestCase):
         self.assertTrue(arm.wait_state(lambda state: max(map(abs, state.error.positions)) < 1e-3))
         self.assertEqual(arm.states[-1].desired.positions, wanted)
 
-    def test_a_new_goal_preempts(self):
-        arm = self.arm("velocity_arm")
-        unpause()
-        first = arm.pursue(trajectory(["velocity_a"], (5.0, [1.0])))
-        self.assertTrue(first.wait_active())
-        other = Arm("/slides/velocity_arm")  # a client that sends anew forgets its first goal
-        self.arms.append(other)
-        self.assertTrue(other.wait_connected())
-        second = other.pursue(trajectory(["velocity_a"], (0.3, [-0.2])))
-        self.check(first, "PREEMPTED", "SUCCEEDED", "another goal came")
-        self.check(second, "SUCCEEDED", "SUCCEEDED")
-
     def test_a_command_preempts_and_bad_ones_do_not(self):
         arm = self.arm()
         unpause()
@@ -184,44 +156,7 @@ class TrajectoryTest(unittest.TestCase):
         self.check(pursuit, "PREEMPTED", "SUCCEEDED", "command topic")
         self.assertTrue(arm.wait_state(lambda state: state.desired.positions == (0.1, -0.2)))
 
-    def test_some_joints_if_it_is_allowed(self):
-        arm = self.arm("position_arm")
-        unpause()
-        self.check(arm.pursue(trajectory(["position_b"], (0.3, [0.2]))), "SUCCEEDED", "SUCCEEDED")
-        self.assertAlmostEqual(position("position_a"), 0.0, delta=1e-3)
-        self.assertAlmostEqual(position("position_b"), 0.2, delta=1e-3)
-
     # state, query
-
-    def test_states_come_at_50_hz_of_simulated_time(self):
-        arm = self.arm()
-        unpause()
-        self.assertTrue(wait_until(lambda: len(arm.states) >= 30))
-        state = arm.states[-1]
-        self.assertEqual((state.actual.accelerations, state.error.accelerations), ((), ()))
-        self.assertEqual([len(state.desired.accelerations), len(state.error.velocities)], [2, 2])
-        first, last = arm.states[5].header, state.header
-        rate = (last.seq - first.seq) / (last.stamp - first.stamp).to_sec()
-        self.assertAlmostEqual(rate, 50.0, delta=1.0)
-
-    def test_query_state(self):
-        arm = self.arm(start=False)
-        name = "/slides/effort_arm/query_state"
-        with self.assertRaisesRegex(rospy.ServiceException, "not running"):
-            call(name, QueryTrajectoryState, rospy.Time(0))
-        self.assertTrue(self.manager.switch(["effort_arm"], [], STRICT))
-        unpause()
-        self.assertTrue(arm.wait_state(lambda state: True))
-        start = arm.states[-1].header.stamp + rospy.Duration(1)
-        arm.command.publish(trajectory(EFFORT, (1.0, [1.0, 0.0]), stamp=start.to_sec()))
-        middle, end = start + rospy.Duration(0, 500_000_000), start + rospy.Duration(9)
-        self.assertTrue(
-            wait_until(lambda: call(name, QueryTrajectoryState, end).position == (0.0, 1.0))
-        )
-        found = call(name, QueryTrajectoryState, middle)
-        self.assertEqual(found.name, EFFORT[::-1])
-        self.assertAlmostEqual(found.position[1], 0.5, places=6)
-        self.assertAlmostEqual(found.velocity[1], 1.875, places=6)
 
     # pause, reset, unload
 

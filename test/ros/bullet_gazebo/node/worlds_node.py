@@ -4,7 +4,6 @@
 See docs/contract/gazebo.md 2.3 to 2.5.
 """
 
-import os
 import subprocess
 import tempfile
 import threading
@@ -242,51 +241,9 @@ class Refusals(unittest.TestCase):
         with self.assertRaises(rospy.ServiceException):
             spawn("new", "<?" * 5_000_000, service="urdf")
 
-    def test_a_name_may_be_huge(self):
-        name = "n" * 100_000
-        self.assertTrue(spawn(name, BOX.format(more=""), initial_pose=at(20.0)).success)
-        self.assertTrue(delete(name).success)
-
-    def test_a_pipe_is_no_mesh(self):
-        """Opening it would wait for a writer, and all later spawns with it."""
-        with tempfile.TemporaryDirectory() as folder:
-            os.mkfifo(f"{folder}/pipe.stl")
-            mesh = f"<mesh><uri>{folder}/pipe.stl</uri></mesh>"
-            xml = BOX.replace("<box><size>0.2 0.2 0.2</size></box>", mesh).format(more="")
-            self.refused("it is not a file", "new", xml)
-
-    def test_a_missing_mesh_is_named(self):
-        mesh = "<mesh><uri>model://gone/x.dae</uri></mesh>"
-        xml = BOX.replace("<box><size>0.2 0.2 0.2</size></box>", mesh).format(more="")
-        self.refused(
-            "link 'body', collision 'shell': 'model://gone/x.dae' is not found", "new", xml
-        )
-
 
 class OddFiles(unittest.TestCase):
     """Files and texts that take long, or come from elsewhere."""
-
-    def test_an_include_bomb_is_refused_with_its_limit(self):
-        """Ten includes of ten includes, seven levels: ten million models."""
-        with tempfile.TemporaryDirectory() as folder:
-            for level in range(7):
-                include = f"<include><uri>file://{folder}/{level + 1}.sdf</uri><name>m{{}}</name></include>"
-                includes = "".join(include.format(i) for i in range(10))
-                with open(f"{folder}/{level}.sdf", "w") as file:
-                    file.write(f'<sdf version="1.6"><model name="m">{includes}</model></sdf>')
-            with open(f"{folder}/7.sdf", "w") as file:
-                file.write('<sdf version="1.6"><model name="leaf"/></sdf>')
-            uri = f"file://{folder}/0.sdf"
-            answer = spawn("bomb", f'<sdf version="1.6"><include><uri>{uri}</uri></include></sdf>')
-        self.assertFalse(answer.success)
-        self.assertIn(f"<include> of 'file://{folder}/7.sdf'", answer.status_message)
-        self.assertIn("more than 5000 models (MAX_MODELS)", answer.status_message)
-
-    def test_a_giant_text_is_refused_with_its_limit(self):
-        for service in ("sdf", "urdf"):
-            answer = spawn("giant", "<robot>" + " " * 70_000_000, service=service)
-            self.assertFalse(answer.success)
-            self.assertIn("bytes of XML (MAX_BYTES)", answer.status_message)
 
     def test_spawns_of_others_go_on_while_a_file_is_read(self):
         """Seven hundred links are melted one after the other, for seconds; then a fault is found."""

@@ -232,7 +232,7 @@ def test_another_run_that_comes_into_its_place_is_left_alone(
     moving = MovedAfter(round(0.5 * times(name)), folder, other)
     with pytest.raises(WorkbenchError, match="moved or removed") as raised:
         train(folder, name, moving)
-    assert f"everything lies in {folder}" not in capsys.readouterr().out
+    assert f"all results are in {folder}" not in capsys.readouterr().out
     assert str(folder) in str(raised.value) and "goes on from" not in str(raised.value)
     assert list(contents(folder).values()) == list(contents(other).values())
     assert_same_run(whole(name), resume(tmp_path / "moved"))

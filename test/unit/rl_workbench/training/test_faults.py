@@ -26,7 +26,7 @@ from support.training.training_runs import (
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt
 from rl_workbench.training import checkpoints as run_checkpoints
-from rl_workbench.training.history import History, TrainingOutcome
+from rl_workbench.training.history import History, Outcome
 
 ON_A_ROBOT = {"env_id": POLE, "env_kwargs": {"noise": 0.05}}
 LEARNERS = [*EXACT, OTHERS[0]]  # from single actions
@@ -130,7 +130,7 @@ def test_memory_that_ends_in_the_picture(tmp_path: Path, monkeypatch) -> None:
         raise MemoryError("std::bad_alloc")
 
     with monkeypatch.context() as patched:
-        patched.setattr(TrainingOutcome, "write", write)
+        patched.setattr(Outcome, "write_summary", write)
         assert "there is no memory left" in failure(lambda: train(tmp_path, "dqn"))
     resume(tmp_path)
     assert summary(tmp_path)["complete"]

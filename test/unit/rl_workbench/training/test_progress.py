@@ -2,10 +2,14 @@
 
 import io
 import os
+import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
+from rl_workbench.training.callbacks import EpisodeResult
+from rl_workbench.training.history import History
 from rl_workbench.training.progress import Progress, tell
 
 
@@ -14,13 +18,19 @@ class Terminal(io.StringIO):
         return True
 
 
+def show_episode(bar: Progress, returns: list[float], length: int, note: str = "") -> None:
+    training = SimpleNamespace(history=History(returns=returns))
+    episode = EpisodeResult(len(returns), 0, returns[-1], length, None, 99.0, {}, note)
+    bar.on_episode(training, episode)
+
+
 def shown(stream: io.StringIO, episodes: int, total: int, note: str = "") -> str:
     """What a training of so many episodes shows; the i-th has length i and return i / 2."""
     bar = Progress(total, "episode", 0, stream)
     returns: list[float] = []
     for length in range(episodes):
         returns.append(length / 2)
-        bar.episode_done(returns, length, "99 steps/s", note)
+        show_episode(bar, returns, length, note)
     bar.close()
     return stream.getvalue()
 
@@ -53,9 +63,9 @@ def test_or_over_steps_which_ends_where_the_training_has_ended() -> None:
     bar = Progress(100, "step", 50, stream)
     assert "50/100" in stream.getvalue(), "one that is gone on with begins where it was"
     while "70/100" not in stream.getvalue():  # it isn't drawn at every step
-        bar.step_done(70)
+        bar.on_step(SimpleNamespace(steps=70))
         assert time.monotonic() < deadline
-    bar.step_done(100)
+    bar.on_step(SimpleNamespace(steps=100))
     bar.close()
     assert "100/100" in stream.getvalue()
 
@@ -63,7 +73,7 @@ def test_or_over_steps_which_ends_where_the_training_has_ended() -> None:
 def test_episodes_do_not_move_a_bar_over_steps() -> None:
     stream = Terminal()
     bar = Progress(100, "step", 0, stream)
-    bar.episode_done([1.0] * 20, 7, "9 steps/s", "")
+    show_episode(bar, [1.0] * 20, 7)
     bar.close()
     assert "0/100" in stream.getvalue() and "20/100" not in stream.getvalue()
 
@@ -94,3 +104,13 @@ def test_a_sign_that_the_output_cannot_write_costs_no_training(terminal: bool) -
 def test_bytes_of_a_path_that_are_no_text(capsys) -> None:
     tell("runs/\udcff")
     assert capsys.readouterr().out == "runs/\\udcff\n"
+
+
+def test_without_a_standard_error_it_goes_nowhere(monkeypatch, capsys) -> None:
+    """As 2>&- starts a training."""
+    monkeypatch.setattr(sys, "stderr", None)
+    bar = Progress(100, "step", 0)
+    for count in range(1, 21):
+        show_episode(bar, [1.0] * count, 1)
+    bar.close()
+    assert capsys.readouterr().out == "", "standard output is for results"

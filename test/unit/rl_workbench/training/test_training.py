@@ -134,7 +134,7 @@ def test_the_user_is_told_of_begin_and_end(tmp_path: Path, capsys, monkeypatch) 
     assert f"trained 13 episodes, {result['steps']} steps in " in told
     assert f"; best evaluation {mean:.1f} at step {step}" in told
     assert "; the last one over 20 greedy episodes: length " in told
-    assert f"everything lies in {tmp_path}\n" in told and "--resume" not in told
+    assert f"all results are in {tmp_path}\n" in told and "--resume" not in told
     assert (
         f"watch: '/a place/ws' --with '/my robots' rosrun cartpole workbench.py view {tmp_path}\n"
         in told

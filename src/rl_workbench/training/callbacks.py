@@ -1,0 +1,179 @@
+"""Callbacks: what happens at the events of a training. The log and the picture of curves are such, too."""
+
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, finding_modules
+from rl_workbench.storage import write_atomically
+from rl_workbench.training.scalar_log import CONFIRMED, EVAL_SUCCESS, EVALUATION, RETURN, SUCCESS
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+class EpisodeResult(NamedTuple):
+    """An episode that has ended."""
+
+    number: int  # from 1 on
+    step: int  # of the training, at its end
+    total_reward: float  # undiscounted
+    length: int  # [steps]
+    success: bool | None  # None if the environment doesn't say
+    speed: float  # of the training [steps/s]
+    scalars: Mapping[str, float]  # the algorithm's own figures
+    note: str  # what the algorithm says of itself, for people
+
+
+class EvaluationResult(NamedTuple):
+    """An evaluation by greedy episodes."""
+
+    step: int  # of the training
+    evaluation: Any  # an evaluator.Evaluation: lengths, returns and successes of its episodes
+    confirmed: float  # the mean return by which policies are compared
+    is_best: bool  # no policy before was as good
+    was_confirmed: bool  # over more episodes than those of the evaluation
+
+
+class Callback:
+    """Base class of callbacks: override the events that you need.
+
+    Pass instances to `rl_workbench.train(..., callbacks=[...])`, or name a class that needs no arguments
+    with `--callback module:Class`, several with commas:
+
+        from rl_workbench import Callback
+
+        class Printer(Callback):
+            def on_episode(self, training, episode):
+                print(episode.number, episode.total_reward)
+
+    Every event gets the training. It has `options` (`options.run`, `options.hyperparameters`,
+    `options.record()` as plain values), `folder` (the run folder), `steps`, `history` (returns, lengths and
+    evaluations so far), and `log.add(step, {tag: value})`, which writes to scalars.csv and TensorBoard.
+
+    Callbacks run in the order of the list, after our own. They must not touch the random generators of
+    Python, NumPy or torch, or the training ends with other weights. A callback that raises ends the
+    training with one line; what was learned is saved.
+    """
+
+    def on_training_start(self, training: Any) -> None:
+        """The environments are made. A resumed training has loaded its checkpoint."""
+
+    def on_step(self, training: Any) -> None:
+        """The algorithm has learned from its last steps: one of them, or a rollout, or an episode."""
+
+    def on_episode(self, training: Any, episode: EpisodeResult) -> None:
+        """An episode has ended."""
+
+    def on_evaluation(self, training: Any, result: EvaluationResult) -> None:
+        """The policy was evaluated."""
+
+    def on_checkpoint(self, training: Any, path: "Path") -> None:
+        """A checkpoint was written."""
+
+    def on_training_end(self, training: Any) -> None:
+        """Everything is saved; the training is complete, interrupted, or has failed."""
+
+
+class ScalarLogger(Callback):
+    """Logs episodes and evaluations."""
+
+    def on_episode(self, training: Any, episode: EpisodeResult) -> None:
+        charts = {
+            RETURN: episode.total_reward,
+            "charts/episodic_length": float(episode.length),
+            "charts/SPS": episode.speed,
+        }
+        if episode.success is not None:
+            charts[SUCCESS] = training.history.success_rate
+        training.log.add(episode.step, {**charts, **episode.scalars})
+
+    def on_evaluation(self, training: Any, result: EvaluationResult) -> None:
+        figures = {EVALUATION: result.evaluation.mean_return}
+        if result.evaluation.success_rate is not None:
+            figures[EVAL_SUCCESS] = result.evaluation.success_rate
+        if result.is_best and result.was_confirmed:
+            figures[CONFIRMED] = result.confirmed
+        training.log.add(result.step, figures)
+
+
+class CurvesPicture(Callback):
+    """Draws learning_curve.png at the end."""
+
+    def on_training_end(self, training: Any) -> None:
+        history, run = training.history, training.options.run
+        if not history.returns:
+            return
+        # matplotlib is slow to import
+        from rl_workbench.plotting import as_png, learning_curve
+
+        title = f"{training.options.kind.name}, {run.env_id}, seed {run.seed}"
+        figure = learning_curve(history.lengths, history.returns, title, history.successes)
+        write_atomically(training.folder / "learning_curve.png", as_png(figure))
+
+
+def load_callbacks(names: str) -> list[Callback]:
+    """Makes callbacks of the user's own.
+
+    Args:
+        names: module:Class, several with commas.
+
+    Raises:
+        WorkbenchError: If a class doesn't exist, is no Callback, or can't be made.
+    """
+    return [_load(name.strip()) for name in names.split(",") if name.strip()]
+
+
+def _load(name: str) -> Callback:
+    module, _, class_name = name.partition(":")
+    if not module or not class_name:
+        raise WorkbenchError(f"--callback must be module:Class, not {name!r}")
+    try:
+        made = getattr(import_module(module), class_name)()
+    except ModuleNotFoundError as error:
+        raise WorkbenchError(f"--callback {name}: {error}; {finding_modules()}") from error
+    except Exception as error:
+        raise WorkbenchError(f"--callback {name}: {error_line(error)}") from error
+    if not isinstance(made, Callback):
+        raise WorkbenchError(f"--callback {name}: it must be a subclass of rl_workbench.Callback")
+    return made
+
+
+class CallbackList:
+    """Calls the callbacks of a training.
+
+    Args:
+        own: Ours. Their errors go on as they are.
+        users: The user's. Their errors end the training with one line.
+    """
+
+    def __init__(self, own: Sequence[Callback], users: Sequence[Callback]) -> None:
+        self._own, self._users = list(own), list(users)
+        # Of the few that have it, since it is called at every step.
+        self._steppers = [
+            each for each in [*own, *users] if type(each).on_step is not Callback.on_step
+        ]
+
+    def step(self, training: Any) -> None:
+        """Calls `on_step`."""
+        for each in self._steppers:
+            with self._named(each, "on_step"):
+                each.on_step(training)
+
+    def call(self, event: str, training: Any, *arguments: Any) -> None:
+        """Calls the method of another event."""
+        for each in [*self._own, *self._users]:
+            with self._named(each, event):
+                getattr(each, event)(training, *arguments)
+
+    @contextlib.contextmanager
+    def _named(self, callback: Callback, event: str) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:
+            if not any(callback is each for each in self._users):
+                raise
+            name = type(callback).__name__
+            text = f"the callback {name} failed in {event}(): {error_line(error)}"
+            raise EnvironmentFailure(text) from error
