@@ -36,6 +36,13 @@ CONNECT_TIMEOUT = 5.0  # [s]; Ray itself would try for more than a minute
 OBJECT_STORE = 128 * 2**20  # [bytes] of a local cluster; jobs hardly use it
 SOCKET_PATH = 40  # [bytes] of a temporary folder's path, so that Ray's sockets fit below
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+# Ray reads these as it is imported.
+QUIET = {
+    "RAY_USAGE_STATS_ENABLED": "0",  # sends nothing home
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",  # no warning about processors for graphics
+    "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
+    "RAY_DEDUP_LOGS_SKIP_REGEX": ".",  # nothing printed about workers and nodes that die
+}
 # Ray's own messages are pages long.
 REASONS = {
     "NodeDiedError": "its node died",
@@ -182,7 +189,8 @@ def joined(address: str) -> Iterator[Any]:
         WorkbenchError: if Ray isn't installed, or there is no such cluster.
     """
     need("ray", "Ray", "--ray")
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # sends nothing home
+    for name, value in QUIET.items():
+        os.environ.setdefault(name, value)
     with contextlib.ExitStack() as stack:
         options = _local_cluster(stack) if address == LOCAL else {}
         if address not in (LOCAL, "auto"):
