@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.robots.trajectory_rig import Listener
 
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
@@ -55,17 +56,6 @@ def arm(interface):
         f'<robot name="arm"><link name="world"/>{link("upper")}{link("lower")}'
         f"{joint('shoulder', 'world', 'upper', 2)}{joint('elbow', 'upper', 'lower', -0.5)}</robot>"
     )
-
-
-class Listener:
-    def __init__(self):
-        self.samples, self.outcomes = [], []
-
-    def feedback(self, sample):
-        self.samples.append(sample)
-
-    def finished(self, outcome):
-        self.outcomes.append(outcome)
 
 
 @pytest.fixture
