@@ -31,7 +31,7 @@ from files.content import MAX_BYTES
 ROOT_TAG = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
 PACKAGE = re.compile(r"package://([^/\"'<>\s]+)")
 UNKNOWN_FORMAT = (
-    "GazeboRosApiPlugin srv.SpawnModel Failure: input model_xml not SDF or URDF, "
+    "GazeboRosApiPlugin SpawnModel Failure: input model_xml not SDF or URDF, "
     "or cannot be converted to Gazebo compatible format."
 )
 TAKEN = "SpawnModel: Failure - entity already exists."
