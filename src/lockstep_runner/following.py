@@ -10,8 +10,8 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from lockstep_runner.nodes.wire import ADDRESS, Ended, Line
-from lockstep_runner.script.seeds import AfterImport
+from lockstep_runner.line import ADDRESS, Line, LineEnded
+from lockstep_runner.script import AfterImport
 
 # They are the simulation and the graph themselves.
 NOT_FOLLOWING = frozenset(
@@ -48,13 +48,13 @@ def _follow(name: str) -> None:
         connection.connect(os.environ[ADDRESS])
         line = Line(connection)
         line.send(node=name, pid=os.getpid())
-    except (OSError, Ended):  # the script has ended
+    except (OSError, LineEnded):  # the script has ended
         connection.close()
         return
     from lockstep_runner.install import install
-    from lockstep_runner.simulation.world import World, WorldFailed
+    from lockstep_runner.world import ScriptWorld, WorldFailed
 
-    class FollowedWorld(World):
+    class FollowedWorld(ScriptWorld):
         """The simulator; for time it asks the script's process."""
 
         def __init__(self) -> None:
@@ -67,7 +67,7 @@ def _follow(name: str) -> None:
             until: Sequence[str] = (),
             connect: tuple[Sequence[str], Sequence[str]] | None = None,
         ) -> Any:
-            """As World.advance; time passes when the script's process says so."""
+            """As ScriptWorld.advance; time passes when the script's process says so."""
             if not ticks:
                 return super().advance(0, (), connect)
             response = super().advance(0, until)
@@ -86,7 +86,7 @@ def _follow(name: str) -> None:
         try:
             line.send(rest=None if span == math.inf else span)
             return float(line.receive()["passed"])
-        except (Ended, KeyError) as fault:
+        except (LineEnded, KeyError) as fault:
             if rospy.core.is_shutdown():
                 return 0.0
             raise WorldFailed("the script that it followed has ended") from fault

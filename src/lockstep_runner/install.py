@@ -1,4 +1,4 @@
-"""Puts everything that is replaced in place, for this process."""
+"""Replaces what docs/lockstep.md lists, for this process."""
 
 from __future__ import annotations
 
@@ -7,21 +7,13 @@ import os
 
 import rospy
 
-from lockstep_runner.nodes.followers import Followers
-from lockstep_runner.replaced import (
-    python_futures,
-    python_locks,
-    python_threads,
-    python_time,
-    ros_services,
-    ros_time,
-    ros_topics,
-)
-from lockstep_runner.runner import Runner
-from lockstep_runner.simulation.world import World
+from lockstep_runner.followers import Followers
+from lockstep_runner.replaced import python_locks, python_threads, ros
+from lockstep_runner.runner import ScriptRunner
+from lockstep_runner.world import ScriptWorld
 
 
-def install(args: argparse.Namespace, world: World | None = None) -> Runner:
+def install(args: argparse.Namespace, world: ScriptWorld | None = None) -> ScriptRunner:
     """Replaces what docs/lockstep.md lists.
 
     Args:
@@ -34,20 +26,20 @@ def install(args: argparse.Namespace, world: World | None = None) -> Runner:
     triggers = None
     if args.step_on is not None:
         triggers = [_global(name) for name in args.step_on if name != "none"]
-    runner = Runner(args.dt, triggers, world or World(args.seed))
+    runner = ScriptRunner(args.dt, triggers, world or ScriptWorld(args.seed))
     if world is None:
         followers = Followers(runner.notices)
         followers.passed = lambda: runner.clock.passed
         followers.forget_mail = runner.world.forget_mail
         runner.clock.others = followers
         runner.topics.follows = followers.has
-    ros_topics.install(runner)
-    ros_services.install(runner)
-    ros_time.install(runner)
-    python_threads.install(runner)
+    ros.replace_topics(runner)
+    ros.replace_services(runner)
+    ros.replace_time(runner)
+    python_threads.replace_threads(runner)
     python_locks.install(runner)
-    python_futures.install(runner)
-    python_time.install(runner, args.virtual_wall_clock)
+    python_threads.replace_futures(runner)
+    python_threads.replace_time(runner, args.virtual_wall_clock)
     os.register_at_fork(after_in_child=runner.world.leave)
     rospy.core.add_shutdown_hook(lambda reason: runner.clock.release_all())
     return runner

@@ -10,8 +10,8 @@ import threading
 import types
 from collections.abc import Callable, Sequence
 
+from lockstep_runner import script
 from lockstep_runner.notices import tell
-from lockstep_runner.script import running
 
 USAGE = 2
 SERVER_ARGUMENTS = "GZSERVER_ARGS"  # read by every simulator that is started below us
@@ -26,8 +26,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs the script that the command line names; returns the exit code, unless it leaves by itself."""
     args = _parse(sys.argv[1:] if argv is None else argv)
     try:
-        code = running.compiled(args.script)
-    except running.NoScript as fault:
+        code = script.compiled(args.script)
+    except script.NoScript as fault:
         tell(str(fault))
         return USAGE
     if args.seed is not None and os.environ.get(HASHES) != str(args.seed % MOST_SEED):
@@ -35,11 +35,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.environ[HASHES] = str(args.seed % MOST_SEED)
         os.execv(sys.executable, [sys.executable, *sys.argv])
     # Here: what it imports takes as long as Python's start, and would be imported twice
-    from lockstep_runner.simulation.world import NotInLockstep, is_running
+    from lockstep_runner.world import RunsByItself, is_running
 
     try:
         is_running()
-    except NotInLockstep as fault:
+    except RunsByItself as fault:
         tell(str(fault))
         return USAGE
     server = "--lockstep" if args.seed is None else f"--lockstep --seed {args.seed}"
@@ -49,17 +49,17 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(args: argparse.Namespace, code: types.CodeType) -> int:
     from lockstep_runner.install import install
-    from lockstep_runner.silence import watch
+    from lockstep_runner.runner import watch
 
     runner = install(args)
     if args.seed is not None:
-        from lockstep_runner.script.seeds import seed_everything
+        from lockstep_runner.script import seed_everything
 
         seed_everything(args.seed)
     watch(runner)
     show, sys.excepthook = sys.excepthook, _hide_ourselves(sys.excepthook, args.script)
     try:
-        running.run(args.script, args.arguments, code)
+        script.run(args.script, args.arguments, code)
         others = [
             each
             for each in threading.enumerate()
@@ -84,9 +84,9 @@ def _hide_ourselves(show: Hook, path: str) -> Hook:
     def shown(
         kind: type[BaseException], fault: BaseException, trace: types.TracebackType | None
     ) -> None:
-        fault.__traceback__ = running.own_part(trace, path)  # which is what is shown
+        fault.__traceback__ = script.own_part(trace, path)  # which is what is shown
         show(kind, fault, fault.__traceback__)
-        if hint := running.hint(fault):
+        if hint := script.hint(fault):
             tell(hint)
 
     return shown

@@ -14,12 +14,11 @@ from typing import Concatenate, NoReturn, ParamSpec, TypeVar
 import rospy
 
 from lockstep_runner import originals
+from lockstep_runner.clock import NANOSECONDS, Clock, Condition
 from lockstep_runner.notices import Notices, tell
-from lockstep_runner.simulation.clock import NANOSECONDS, Clock
-from lockstep_runner.simulation.sleeper import Condition
-from lockstep_runner.simulation.topics import Topics
-from lockstep_runner.simulation.triggers import Triggers
-from lockstep_runner.simulation.world import NODE, NotInLockstep, World, WorldFailed, WorldGone
+from lockstep_runner.topics import Topics
+from lockstep_runner.triggers import Triggers
+from lockstep_runner.world import NODE, RunsByItself, ScriptWorld, WorldFailed, WorldGone
 
 USAGE, FAILED = 2, 1  # exit codes
 OTHERS = 2.0  # [s of wall time] in which another node may come up without time passing
@@ -41,14 +40,14 @@ Options = ParamSpec("Options")
 
 def _ends_with_the_world(
     instead: Answer,
-) -> Callable[[Callable[Concatenate[Runner, Options], Answer]], Callable[..., Answer]]:
+) -> Callable[[Callable[Concatenate[ScriptRunner, Options], Answer]], Callable[..., Answer]]:
     """Has a method return something else when the simulator is ended, and end the script when it failed."""
 
     def decorate(
-        method: Callable[Concatenate[Runner, Options], Answer],
+        method: Callable[Concatenate[ScriptRunner, Options], Answer],
     ) -> Callable[..., Answer]:
         @functools.wraps(method)
-        def guarded(self: Runner, *args: Options.args, **kwds: Options.kwargs) -> Answer:
+        def guarded(self: ScriptRunner, *args: Options.args, **kwds: Options.kwargs) -> Answer:
             try:
                 return method(self, *args, **kwds)
             except WorldGone as gone:
@@ -57,7 +56,7 @@ def _ends_with_the_world(
                 return instead
             except BadPeriod as fault:
                 self.fail(fault, USAGE)
-            except (NotInLockstep, WorldFailed) as fault:
+            except (RunsByItself, WorldFailed) as fault:
                 self.fail(fault)
 
         return guarded
@@ -65,10 +64,10 @@ def _ends_with_the_world(
     return decorate
 
 
-class Runner:
+class ScriptRunner:
     """One script in lock-step."""
 
-    def __init__(self, period: float, triggers: Collection[str] | None, world: World) -> None:
+    def __init__(self, period: float, triggers: Collection[str] | None, world: ScriptWorld) -> None:
         """Args:
         period: what passes at a trigger [s].
         triggers: topics and services; None for the commands to controllers.
@@ -250,3 +249,38 @@ class Runner:
 
 def _is_quiet(service: str) -> bool:
     return service.rpartition("/")[2].startswith(QUIET)
+
+
+SILENCE = 30.0  # [s of wall time] without simulated time, after which the user is told
+WATCH_LOOK = 1.0  # [s]
+
+
+def watch(runner: ScriptRunner, silence: float = SILENCE) -> threading.Thread:
+    """Watches, in a thread of its own, until it has told or the node is shut down."""
+    thread = threading.Thread(
+        target=_watch, args=(runner, silence), name="lock-step's watchdog", daemon=True
+    )
+    originals.start(thread)
+    return thread
+
+
+def _watch(runner: ScriptRunner, silence: float) -> None:
+    passed, since = -1, originals.monotonic()
+    while not runner.is_over:
+        originals.sleep(min(WATCH_LOOK, silence / 10))
+        rests = runner.clock.driving or runner.world.paused or not runner.world.there
+        if rests or runner.clock.passed != passed:
+            passed, since = runner.clock.passed, originals.monotonic()
+        elif originals.monotonic() - since > silence:
+            tell(_text(runner, silence))
+            return
+
+
+def _text(runner: ScriptRunner, silence: float) -> str:
+    unused = runner.triggers.unused()
+    which = f" It uses nothing of the name {' or '.join(unused)}." if unused else ""
+    return (
+        f"no simulated time has passed for {silence:g} s: the script neither sleeps nor waits"
+        f" nor commands a controller.{which} If it isn't busy with itself, name what time is to pass"
+        f" with: --step-on {' or '.join(runner.triggers.seen) or 'TOPIC-OR-SERVICE'}"
+    )

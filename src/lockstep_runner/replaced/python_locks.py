@@ -10,12 +10,12 @@ import sys
 import threading
 from typing import Any
 
-from lockstep_runner.runner import Runner
-from lockstep_runner.script.callers import GO_BETWEENS, is_the_script
-from lockstep_runner.simulation.clock import NANOSECONDS
+from lockstep_runner.clock import NANOSECONDS
+from lockstep_runner.runner import ScriptRunner
+from lockstep_runner.script import GO_BETWEENS, is_the_script
 
 
-def install(runner: Runner) -> None:
+def install(runner: ScriptRunner) -> None:
     """Puts the functions in place."""
     make_lock, make_rlock = threading.Lock, threading.RLock
 
@@ -40,7 +40,7 @@ def _is_asked_for_by_the_script() -> bool:
 class _Lock:
     """A lock whose waits are simulated time where its holder's are."""
 
-    def __init__(self, runner: Runner, real: Any) -> None:
+    def __init__(self, runner: ScriptRunner, real: Any) -> None:
         self._runner = runner
         self._real = real
         self._holder = 0  # the thread that has it; 0: nobody
@@ -98,7 +98,7 @@ class _Lock:
 class _RLock(_Lock):
     """One that its holder may take again."""
 
-    def __init__(self, runner: Runner, real: Any) -> None:
+    def __init__(self, runner: ScriptRunner, real: Any) -> None:
         super().__init__(runner, real)
         self._depth = 0  # how often its holder has taken it
 

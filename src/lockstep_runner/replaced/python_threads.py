@@ -1,6 +1,7 @@
-"""threading.Event.wait, Condition.wait, Thread.start and join, where the script itself calls them.
+"""Waits of Python's that become simulated time where the script itself calls them.
 
-Also through Python's own queue, threading.Timer and concurrent.futures, which wait by these.
+Event.wait, Condition.wait, Thread.start and join; through them queue, threading.Timer and concurrent.futures;
+time.sleep, and with --virtual-wall-clock time.time, monotonic and perf_counter.
 """
 
 from __future__ import annotations
@@ -9,18 +10,27 @@ import concurrent.futures._base as futures
 import math
 import queue
 import threading
+import time
 import types
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import thread as pools
+from dataclasses import dataclass, field
 from typing import Any
+from weakref import WeakKeyDictionary
+
+import rospy
 
 from lockstep_runner import originals
-from lockstep_runner.runner import Runner
-from lockstep_runner.script.callers import is_the_script
+from lockstep_runner.looks import LOOK
+from lockstep_runner.runner import ScriptRunner
+from lockstep_runner.script import caller, is_the_script
 
 # [s]; what is left of a time limit where the last digits of its two ends were rounded: it is over.
 ROUNDING = 1e-6
 
 
-def install(runner: Runner) -> None:
+def replace_threads(runner: ScriptRunner) -> None:
     """Puts the methods in place."""
     rounded = threading.local()  # `passed`: where a thread's time limit was all but over
 
@@ -90,7 +100,7 @@ def install(runner: Runner) -> None:
     threading.Thread.join = join  # type: ignore[method-assign]
 
 
-def wait_for_notice(runner: Runner, condition: Any, timeout: float | None) -> bool:
+def wait_for_notice(runner: ScriptRunner, condition: Any, timeout: float | None) -> bool:
     """As Condition.wait, in simulated time: the lock is given back while it waits.
 
     Raises:
@@ -117,3 +127,122 @@ def wait_for_notice(runner: Runner, condition: Any, timeout: float | None) -> bo
 
 def _span(timeout: float | None) -> float:
     return math.inf if timeout is None else timeout
+
+
+@dataclass
+class _Tasks:
+    """Those of one executor."""
+
+    guard: Any = field(default_factory=originals.Condition)
+    submitted: int = 0
+    begun: int = 0
+    busy: int = 0  # threads
+    over: bool = False  # its threads end when they have done what there is to do
+
+
+class _Task:
+    """A function of the script's for an executor."""
+
+    def __init__(self, call: Callable[..., Any], tasks: _Tasks) -> None:
+        self.tasks = tasks
+        self._call = call
+
+    def __call__(self, *args: Any, **kwds: Any) -> Any:
+        return self._call(*args, **kwds)
+
+
+def replace_futures(runner: ScriptRunner) -> None:
+    """Puts the methods in place."""
+    submit, run = ThreadPoolExecutor.submit, pools._WorkItem.run
+    shut_down = ThreadPoolExecutor.shutdown
+    executors: WeakKeyDictionary[ThreadPoolExecutor, _Tasks] = WeakKeyDictionary()
+
+    def submitting(
+        self: ThreadPoolExecutor, call: Callable[..., Any], /, *args: Any, **kwds: Any
+    ) -> Future[Any]:
+        if not (is_the_script(1) and runner.world.there):
+            return submit(self, call, *args, **kwds)
+        tasks = executors.setdefault(self, _Tasks())
+        with tasks.guard:
+            future = submit(self, _Task(call, tasks), *args, **kwds)
+            tasks.submitted += 1
+            # It begins before the script goes on, unless all threads are busy
+            while tasks.begun < tasks.submitted and tasks.busy < self._max_workers:
+                originals.condition_wait(tasks.guard, LOOK)
+        return future
+
+    def running(item: Any) -> None:
+        if not isinstance(item.fn, _Task):
+            run(item)
+            return
+        tasks = item.fn.tasks
+        with tasks.guard:
+            tasks.begun += 1
+            tasks.busy += 1
+            runner.clock.began(threading.current_thread())
+            tasks.guard.notify_all()
+        try:
+            run(item)
+        finally:
+            with tasks.guard:
+                tasks.busy -= 1
+                if tasks.begun == tasks.submitted and not tasks.over:  # else it has more to do
+                    runner.clock.ended(threading.current_thread())
+
+    def shutting_down(self: ThreadPoolExecutor, *args: Any, **kwds: Any) -> None:
+        tasks = executors.get(self)
+        if tasks is not None:
+            with tasks.guard:
+                tasks.over = True
+                for thread in self._threads:
+                    runner.clock.began(thread)  # to end; those that rest do so later
+        shut_down(self, *args, **kwds)
+
+    ThreadPoolExecutor.shutdown = shutting_down  # type: ignore[method-assign, assignment]
+    ThreadPoolExecutor.submit = submitting  # type: ignore[method-assign, assignment]
+    pools._WorkItem.run = running  # type: ignore[method-assign, assignment]
+
+
+def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
+    """Puts the functions in place."""
+
+    def sleep(seconds: float) -> None:
+        """As time.sleep: the world moves on by as much."""
+        if (
+            rospy.core.is_shutdown()
+            or not is_the_script(1)
+            or caller(1) == "actionlib"
+            and runner.waits_for_others(seconds)
+        ):
+            originals.sleep(seconds)
+        elif _is_wall_time(runner):
+            runner.notices.once(
+                f"sleep {threading.current_thread().name}",
+                f"thread '{threading.current_thread().name}' sleeps by time.sleep, outside the main"
+                " thread: its sleeps are wall time, so that what it does isn't repeatable; rospy.sleep,"
+                " rospy.Rate and rospy.Timer are covered",
+            )
+            runner.clock.ended(threading.current_thread())  # nobody waits for it
+            originals.sleep(seconds)
+        elif runner.is_connected():
+            if seconds < 0:
+                raise ValueError("sleep length must be non-negative")
+            runner.wait(seconds)
+        else:
+            originals.sleep(seconds)
+
+    time.sleep = sleep  # type: ignore[assignment]
+    if virtual_wall_clock:
+        start, passed = time.time(), runner.clock
+
+        def simulated() -> float:
+            return passed.passed / 1e9
+
+        time.time = lambda: start + simulated()
+        time.monotonic = time.perf_counter = simulated
+
+
+def _is_wall_time(runner: ScriptRunner) -> bool:
+    """Whether this thread's time.sleep isn't covered: the script's own threads are free to use the wall's."""
+    clock = runner.clock
+    return not clock.covers_this_thread() or clock.is_own(threading.current_thread())

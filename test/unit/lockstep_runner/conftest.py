@@ -6,7 +6,7 @@ import pytest
 import rospy
 from support.ros.lockstep_world import Counter
 
-from lockstep_runner.runner import Runner
+from lockstep_runner.runner import ScriptRunner
 
 
 @pytest.fixture
@@ -14,7 +14,7 @@ def runner(monkeypatch):
     """For a script whose world is a `Counter`; nothing is replaced yet."""
     monkeypatch.setattr(rospy.rostime, "_rostime_current", None)
     monkeypatch.setattr(rospy.rostime, "_rostime_initialized", False)
-    made = Runner(0.008, None, Counter())
+    made = ScriptRunner(0.008, None, Counter())
     made.topics = SimpleNamespace(are_settled=True, commands=("/command",))
     yield made
     made.clock.release_all()

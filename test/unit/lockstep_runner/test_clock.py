@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.ros.lockstep_world import MS, Counter
 
+from lockstep_runner import clock as module
+from lockstep_runner.clock import Clock
 from lockstep_runner.notices import Notices
-from lockstep_runner.simulation import clock as module
-from lockstep_runner.simulation.clock import Clock
 
 BOUND = 30.0  # [s]
 

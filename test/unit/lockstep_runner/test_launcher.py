@@ -5,7 +5,7 @@ import os
 import pytest
 
 from lockstep_runner.launcher import _parse, main
-from lockstep_runner.script.seeds import AfterImport, seed_everything
+from lockstep_runner.script import AfterImport, seed_everything
 
 
 @pytest.mark.parametrize(

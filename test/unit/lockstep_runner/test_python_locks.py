@@ -19,7 +19,7 @@ def replaced(runner, monkeypatch):
         (threading, "_time"),
     ):  # fmt: skip
         monkeypatch.setattr(owner, name, getattr(owner, name))  # so that it is put back
-    python_threads.install(runner)
+    python_threads.replace_threads(runner)
     python_locks.install(runner)
     return runner
 

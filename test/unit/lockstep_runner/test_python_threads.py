@@ -12,7 +12,7 @@ import rospy
 from support.ros.lockstep_world import MS
 
 from lockstep_runner import originals
-from lockstep_runner.replaced import python_futures, python_threads
+from lockstep_runner.replaced import python_threads
 
 BOUND = 30.0  # [s of wall time]
 
@@ -25,8 +25,8 @@ def replaced(runner, monkeypatch):
         (ThreadPoolExecutor, "submit"), (ThreadPoolExecutor, "shutdown"), (pools._WorkItem, "run"),
     ):  # fmt: skip
         monkeypatch.setattr(owner, name, getattr(owner, name))  # so that it is put back
-    python_threads.install(runner)
-    python_futures.install(runner)
+    python_threads.replace_threads(runner)
+    python_threads.replace_futures(runner)
     return runner
 
 
@@ -49,7 +49,7 @@ def test_time_limits_end_whatever_the_clock_shows(runner, monkeypatch, uptime):
                         (threading.Event, "wait"), (futures, "time")):  # fmt: skip
         monkeypatch.setattr(owner, name, getattr(owner, name))
     monkeypatch.setattr(python_threads.originals, "monotonic", lambda: uptime)
-    python_threads.install(runner)
+    python_threads.replace_threads(runner)
     condition = threading.Condition()
     waits = 0
 

@@ -9,9 +9,9 @@ import rospy
 from support.ros.lockstep_world import MS
 
 from lockstep_runner import originals
-from lockstep_runner.silence import watch
-from lockstep_runner.simulation.triggers import Triggers
-from lockstep_runner.simulation.world import WorldFailed, WorldGone
+from lockstep_runner.runner import watch
+from lockstep_runner.triggers import Triggers
+from lockstep_runner.world import WorldFailed, WorldGone
 
 BOUND = 30.0  # [s of wall time]
 

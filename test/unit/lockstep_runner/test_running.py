@@ -5,7 +5,7 @@ import traceback
 
 import pytest
 
-from lockstep_runner.script import running
+from lockstep_runner import script as running
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 """When time passes for scripts that don't wait by themselves."""
 
-from lockstep_runner.simulation.triggers import Triggers
+from lockstep_runner.triggers import Triggers
 
 
 class Script:

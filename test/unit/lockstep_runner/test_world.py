@@ -8,8 +8,8 @@ import rospy
 from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldResponse
 from support.ros.ros_fakes import FakeMaster, FakeService, on_wire
 
-from lockstep_runner.simulation import world as world_module
-from lockstep_runner.simulation.world import World, WorldFailed
+from lockstep_runner import world as world_module
+from lockstep_runner.world import ScriptWorld, WorldFailed
 from ros_calls import master as ros_master
 
 ANSWER = AdvanceWorldResponse(success=True, time_step=0.001, ticks=1)
@@ -28,7 +28,7 @@ def world(answers):
     master.services[world_module.SERVICE] = service.address
     master.nodes[world_module.NODE] = master.uri
     with ros_master.using(master.uri):
-        made = World()
+        made = ScriptWorld()
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(rospy.core, "is_initialized", lambda: True)
             assert made.look(at_once=True)

@@ -22,7 +22,7 @@ DANGEROUS = {
     "marshal.load", "marshal.loads", "shelve.open", "joblib.load", "cloudpickle.load", "dill.load",
 }  # fmt: skip
 # The launcher runs the script that its user names, as `python3 script.py` does.
-RUNS_A_SCRIPT = {("src/lockstep_runner/script/running.py", name) for name in ("compile", "exec")}
+RUNS_A_SCRIPT = {("src/lockstep_runner/script.py", name) for name in ("compile", "exec")}
 MODEL = '<sdf version="1.6"><model name="m">{}</model></sdf>'
 INCLUDE = "<include><uri>{}</uri></include>"
 MESH = """<link name="l"><collision name="c"><geometry><mesh><uri>{}</uri></mesh></geometry></collision>
@@ -65,7 +65,7 @@ def test_the_check_finds_what_it_looks_for(tmp_path: Path) -> None:
 @pytest.mark.parametrize("scheme", ["http", "https", "ftp"])
 def test_nothing_is_fetched_from_a_network(entity: str, scheme: str) -> None:
     uri = f"{scheme}://127.0.0.1:9/thing.stl"
-    with pytest.raises(DescriptionError, match=f"{scheme}:// is not read here"):
+    with pytest.raises(DescriptionError, match=f"{scheme}:// is not supported"):
         spawn(entity.format(uri))
 
 

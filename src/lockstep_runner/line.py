@@ -10,7 +10,7 @@ from typing import Any
 ADDRESS = "LOCKSTEP_CLOCK"  # variable: the socket of the script's process
 
 
-class Ended(Exception):
+class LineEnded(Exception):
     """The other side has gone."""
 
 
@@ -23,26 +23,26 @@ class Line:
 
     def send(self, **content: Any) -> None:
         """Raises:
-        Ended: nobody is there.
+        LineEnded: nobody is there.
         """
         try:
             self._connection.sendall(json.dumps(content).encode() + b"\n")
         except OSError as fault:
-            raise Ended from fault
+            raise LineEnded from fault
 
     def receive(self) -> dict[str, Any]:
         """Waits for the next object.
 
         Raises:
-            Ended: there won't be one.
+            LineEnded: there won't be one.
         """
         try:
             line = self._reader.readline()
             content = json.loads(line) if line.endswith("\n") else None
         except (OSError, ValueError) as fault:
-            raise Ended from fault
+            raise LineEnded from fault
         if not isinstance(content, dict):
-            raise Ended
+            raise LineEnded
         return content
 
     def close(self) -> None:

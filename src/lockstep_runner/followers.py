@@ -1,20 +1,103 @@
-"""The script's side: nodes that follow its clock rest while it computes, and go on when it is their time."""
+"""Other processes under the script's clock.
+
+Nodes that follow the clock rest while the script computes, and go on when their time has come. No simulated
+time passes until processes that the script has started have come to rest.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import socket
+import subprocess
 import tempfile
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from lockstep_runner import originals
-from lockstep_runner.looks import LOOK, Seen
-from lockstep_runner.nodes.starting import Starting
-from lockstep_runner.nodes.wire import ADDRESS, Ended, Line
+from lockstep_runner.clock import Others
+from lockstep_runner.line import ADDRESS, Line, LineEnded
+from lockstep_runner.looks import LOOK, QUIET, WORKING, Seen, look_at
 from lockstep_runner.notices import Notices
+
+SITE = Path(__file__).with_name("site")
+STARTING_PATIENCE = 30.0  # [s of wall time]
+
+
+class StartedProcesses:
+    """Notices that processes are started, and when they work no more."""
+
+    def __init__(self, notices: Notices) -> None:
+        self.is_going_on = False
+        self._notices = notices
+        self._known: set[int] = set()  # processes that were told of: they compute for themselves
+        paths = [str(SITE), *filter(None, [os.environ.get("PYTHONPATH")])]
+        os.environ["PYTHONPATH"] = os.pathsep.join(paths)
+        begin, system = subprocess.Popen.__init__, os.system
+
+        def popen(process: Any, *args: Any, **kwds: Any) -> None:
+            begin(process, *args, **kwds)
+            self.is_going_on = True
+
+        def run(command: Any) -> int:
+            self.is_going_on = True
+            return system(command)
+
+        subprocess.Popen.__init__ = popen  # type: ignore[method-assign, assignment]
+        os.system = run
+
+    def settle(self, resting: Callable[[], set[int]]) -> None:
+        """Waits until none of the processes below this one works, but for those that rest by the clock."""
+        self.is_going_on = False
+        deadline = originals.monotonic() + STARTING_PATIENCE
+        quiet, before = 0, _below()
+        while quiet < QUIET:
+            originals.sleep(LOOK)
+            now = _below()
+            busy = {
+                pid
+                for pid, (state, used) in now.items()
+                if state in WORKING or before.get(pid, ("", -1))[1] != used
+            }
+            busy -= resting() | self._known
+            quiet = 0 if busy else quiet + 1
+            before = now
+            if busy and originals.monotonic() > deadline:
+                self._known |= busy
+                for pid in busy:
+                    self._notices.once(
+                        f"process {pid}",
+                        f"process {pid} ({_name(pid)}) computes on its own: it isn't waited for, so that"
+                        " what it tells the script isn't repeatable",
+                    )
+
+
+def _below() -> dict[int, tuple[str, int]]:
+    """Returns state and processor time [ticks] of the processes that come of this one."""
+    parents: dict[int, tuple[int, str, int]] = {}
+    for entry in os.listdir("/proc"):
+        look = look_at(Path("/proc", entry)) if entry.isdigit() else None
+        if look is not None:
+            parents[int(entry)] = look
+    below = {os.getpid()}
+    grown = True
+    while grown:
+        more = {pid for pid, (parent, _, _) in parents.items() if parent in below} - below
+        below |= more
+        grown = bool(more)
+    below.discard(os.getpid())
+    return {pid: parents[pid][1:] for pid in below if parents[pid][1] != "Z"}
+
+
+def _name(pid: int) -> str:
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{pid}/comm").read_text().strip()
+    return "ended"
+
 
 PATIENCE = (
     10.0  # [s of wall time] with a node that computes, or waits for something that isn't time
@@ -42,13 +125,13 @@ class _Node:
         self.seen = Seen(Path("/proc", str(self.pid)))
 
 
-class Followers:
-    """All nodes that follow (see clock.Others)."""
+class Followers(Others):
+    """All nodes that follow ."""
 
     def __init__(self, notices: Notices) -> None:
         self.passed = lambda: 0  # [ns], the clock's
         self.forget_mail = lambda node: None
-        self.starting = Starting(notices)
+        self.starting = StartedProcesses(notices)
         self._notices = notices
         self._guard = originals.Condition()
         self._nodes: dict[str, _Node] = {}
@@ -99,7 +182,7 @@ class Followers:
             node.rests, node.wake = False, math.inf
         try:
             node.line.send(passed=self.passed() - node.began)
-        except Ended:
+        except LineEnded:
             self._gone(node)
         self._until_all_rest()
 
@@ -141,7 +224,7 @@ class Followers:
                     node.rests = node.covered = True
                     node.look_anew()
                     self._guard.notify_all()
-        except (Ended, KeyError, TypeError, ValueError):
+        except (LineEnded, KeyError, TypeError, ValueError):
             line.close()
             if "node" in locals():
                 self._gone(node)

@@ -1,15 +1,16 @@
-"""Simulated time for the threads of a script: it passes while the main thread waits, and all else rests.
+"""Simulated time for the threads of a script: it passes while the main thread waits and all others rest.
 
 The main thread drives: while it waits, it asks the simulator for time, hands out messages, and wakes other
-threads (timers, callbacks, threads with a rospy.Rate) when theirs has come, one after the other. While one of
-them computes, no time passes. So who does what at which time doesn't depend on the machine.
+threads (timers, callbacks, threads with a rospy.Rate) when their time has come, one after the other. While
+one of them computes, no time passes. So the order of events doesn't depend on the machine.
 """
 
 from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
@@ -20,27 +21,61 @@ import rospy.impl.simtime
 from lockstep_runner import originals
 from lockstep_runner.looks import Seen
 from lockstep_runner.notices import Notices
-from lockstep_runner.simulation.callbacks import Callbacks
-from lockstep_runner.simulation.others import NobodyElse, Others
-from lockstep_runner.simulation.sleeper import Condition, Sleeper
-from lockstep_runner.simulation.world import World
+from lockstep_runner.topics import Callbacks
+from lockstep_runner.world import ScriptWorld
 
 NANOSECONDS = 1_000_000_000
 LOOK = 0.002  # [s of wall time] between two looks whether a thread that computes has ended
 PATIENCE = 10.0  # [s of wall time] with a thread that computes, or waits for what isn't time
 OWN_QUIET = 30  # looks in a row at a thread of the script's that does nothing; 1 s
 PAUSED_LOOKS = 0.001, 0.05  # [s of wall time] between two looks at a paused world: first, most
+Condition = Callable[[], bool]
+
+
+@dataclass
+class Sleeper:
+    """A thread other than the main one that waits for simulated time."""
+
+    thread: int
+    wake: float  # [ns] of time passed
+    until: Condition | None
+    order: int
+    came: bool = False
+    resting: threading.Lock = field(default_factory=threading.Lock)
+
+    def __post_init__(self) -> None:
+        self.resting.acquire()
+
+    def is_due(self, passed: int) -> bool:
+        return self.wake <= passed or (self.until is not None and self.until())
+
+
+class Others:
+    """Other processes under the same clock; here there are none."""
+
+    def settle(self) -> None:
+        """Waits until all of them rest."""
+
+    def next_wake(self) -> float:
+        """Returns when the first of them is to go on [ns of time passed]."""
+        return math.inf
+
+    def wake_due(self, passed: int) -> None:
+        """Lets those go on whose time has come, one after the other, until they rest again."""
+
+    def wake(self, node: str) -> None:
+        """Lets a node go on that has a message, until it rests again."""
 
 
 class Clock:
     """Lets threads wait in simulated time."""
 
-    def __init__(self, world: World, notices: Notices) -> None:
+    def __init__(self, world: ScriptWorld, notices: Notices) -> None:
         self.world = world
         self.passed = 0  # [ns] simulated, in all; a reset of the simulation doesn't take it back
         self.waits = 0  # counts waits of the main thread in which time has passed
         self.driving = False  # whether the main thread waits
-        self.others: Others = NobodyElse()
+        self.others = Others()
         self._notices = notices
         self._guard = originals.Condition()
         self._sleepers: list[Sleeper] = []

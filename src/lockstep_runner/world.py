@@ -15,7 +15,7 @@ from ros_calls.service import ServiceClient, ServiceGone, ServiceHangs
 
 NODE = "/gazebo"
 SERVICE = f"{NODE}/advance_world"
-TIMEOUT = 30.0  # [s of wall time] for an answer; a call is at most `World.longest` ticks
+TIMEOUT = 30.0  # [s of wall time] for an answer; a call is at most `ScriptWorld.longest` ticks
 LOOK = 0.2  # [s of wall time] between two looks for a simulator
 NANOSECONDS = 1_000_000_000
 CALLING = (
@@ -28,7 +28,7 @@ CALLING = (
 )  # packages that a call runs
 
 
-class NotInLockstep(Exception):
+class RunsByItself(Exception):
     """A simulator is there whose time runs by itself; the text says what to do."""
 
 
@@ -40,7 +40,7 @@ class WorldFailed(Exception):
     """The simulator has died, or hangs; the text says which."""
 
 
-class World:
+class ScriptWorld:
     """One simulator at a time, found by itself; thread-safe."""
 
     def __init__(self, seed: int | None = None) -> None:
@@ -68,7 +68,7 @@ class World:
         """Looks for a simulator, now and then, or `at_once`; returns whether there is one.
 
         Raises:
-            NotInLockstep: there is one that runs by itself.
+            RunsByItself: there is one that runs by itself.
         """
         if self._call is not None:
             return True
@@ -195,7 +195,7 @@ def is_running() -> bool:
     """Whether a simulator in lock-step answers under the master.
 
     Raises:
-        NotInLockstep: there is one that runs by itself.
+        RunsByItself: there is one that runs by itself.
     """
     try:
         master.call("lookupService", SERVICE)
@@ -211,7 +211,7 @@ def is_running() -> bool:
         return False
     if not _lives():
         return False
-    raise NotInLockstep(
+    raise RunsByItself(
         f"the simulator under {master.uri()} runs in real time: end it, so that the script starts its own,"
         " or start it with lockstep:=true"
     )

@@ -1,0 +1,256 @@
+"""What is replaced of rospy: publishers, subscribers, service calls, waits, timers, and reading the time.
+
+Messages to and from the simulator go with its time; connections to services last.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import select
+import threading
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import genpy
+import rospy
+import rospy.impl.tcpros_service
+import rospy.timer
+import rospy.topics
+from rospy.impl.tcpros_service import ServiceProxy
+from rospy.topics import _PublisherImpl, _SubscriberImpl, _TopicImpl
+
+from lockstep_runner import originals
+from lockstep_runner.runner import ScriptRunner
+from lockstep_runner.world import NODE
+from lockstep_runner.world import SERVICE as ADVANCE
+from ros_calls.service import ServiceClient
+
+
+def replace_topics(runner: ScriptRunner) -> None:
+    """Puts the methods in place."""
+    _divert(runner)
+    _leave_others_out(runner)
+    publish = rospy.topics.Publisher.publish
+    begin_publisher = rospy.topics.Publisher.__init__
+    begin_subscriber = rospy.topics.Subscriber.__init__
+
+    def publishing(self: rospy.Publisher, *args: Any, **kwds: Any) -> None:
+        runner.before_publishing(self.resolved_name)
+        publish(self, *args, **kwds)
+        runner.published(self.resolved_name)
+
+    def publisher(self: rospy.Publisher, *args: Any, **kwds: Any) -> None:
+        begin_publisher(self, *args, **kwds)
+        runner.topics.changed()
+
+    def subscriber(self: rospy.Subscriber, *args: Any, **kwds: Any) -> None:
+        begin_subscriber(self, *args, **kwds)
+        self.impl.set_queue_size(None)  # else what came in one reading is thrown away
+        runner.topics.changed()
+
+    rospy.topics.Publisher.publish = publishing
+    rospy.topics.Publisher.__init__ = publisher
+    rospy.topics.Subscriber.__init__ = subscriber
+    wait = _Waiting(runner, rospy.wait_for_message)
+    rospy.wait_for_message = rospy.client.wait_for_message = wait
+
+
+def _divert(runner: ScriptRunner) -> None:
+    """What is published for the simulator waits for the next call instead of going over the connection."""
+    add_connection = _TopicImpl.add_connection
+
+    def adding(topic: _TopicImpl, connection: Any) -> bool:
+        if isinstance(topic, _PublisherImpl) and connection.endpoint_id == NODE:
+            connection.write_data = partial(runner.post, topic.resolved_name)
+        return bool(add_connection(topic, connection))
+
+    _TopicImpl.add_connection = adding
+
+
+def _leave_others_out(runner: ScriptRunner) -> None:
+    """What comes from others in wall time is left out of topics that the simulator publishes, too."""
+    receive = _SubscriberImpl.receive_callback
+
+    def receiving(self: _SubscriberImpl, messages: list[Any], connection: Any) -> None:
+        if runner.topics.lets_in(self, connection):
+            receive(self, messages, connection)
+
+    _SubscriberImpl.receive_callback = receiving
+
+
+class _Waiting:
+    """rospy.wait_for_message. It keeps its subscriptions: a new one each time costs 10 ms."""
+
+    def __init__(self, runner: ScriptRunner, original: Callable[..., Any]) -> None:
+        self._runner = runner
+        self._original = original
+        self._last: dict[tuple[str, type], _Last] = {}
+
+    def __call__(self, topic: str, topic_type: type, timeout: Any = None) -> Any:
+        if not (self._runner.is_connected() and self._runner.clock.covers_this_thread()):
+            return self._original(topic, topic_type, timeout)
+        name = rospy.resolve_name(topic)
+        last = self._last.get((name, topic_type))
+        if last is None:
+            last = self._last[name, topic_type] = _Last(name, topic_type)
+            before = 0
+            self._runner.topics.changed()
+        else:
+            before = 0 if last.latched() else last.count
+        seconds = timeout.to_sec() if isinstance(timeout, rospy.Duration) else timeout
+        limit = math.inf if seconds is None else seconds
+        if not self._runner.wait(limit, lambda: last.count > before or rospy.is_shutdown(), [name]):
+            raise rospy.ROSException(f"timeout exceeded while waiting for message on topic {topic}")
+        if rospy.is_shutdown():
+            raise rospy.exceptions.ROSInterruptException("rospy shutdown")
+        return last.message
+
+
+class _Last:
+    """The newest message of a topic."""
+
+    def __init__(self, name: str, kind: type) -> None:
+        self.message: Any = None
+        self.count = 0
+        self._subscriber = rospy.Subscriber(name, kind, self._keep)
+
+    def _keep(self, message: Any) -> None:
+        self.message = message
+        self.count += 1
+
+    def latched(self) -> bool:
+        """Whether a new subscriber would get the newest message at once."""
+        return any(each.is_latched for each in self._subscriber.impl.connections)
+
+
+def replace_services(runner: ScriptRunner) -> None:
+    """Puts the methods in place."""
+    begin, call = ServiceProxy.__init__, ServiceProxy.call
+
+    def beginning(
+        self: ServiceProxy,
+        name: str,
+        service_class: Any,
+        persistent: bool = False,
+        headers: Any = None,
+    ) -> None:
+        begin(self, name, service_class, True, headers)
+        self._lockstep_guard = threading.Lock()
+        self._lockstep_kept = not persistent
+
+    def calling(self: ServiceProxy, *args: Any, **kwds: Any) -> Any:
+        request = rospy.msg.args_kwds_to_message(self.request_class, args, kwds)
+        if self.service_class._type == "std_srvs/Empty" and runner.switches(self.resolved_name):
+            return self.response_class()
+        runner.before_call(self.resolved_name)
+        if self._lockstep_guard.acquire(blocking=False):
+            try:
+                _drop_if_broken(self)
+                answer = call(self, request)
+            except rospy.ServiceException:
+                _drop(self)
+                raise
+            finally:
+                self._lockstep_guard.release()
+        else:  # another thread is in the middle of a call
+            proxy = ServiceProxy(self.resolved_name, self.service_class)
+            try:
+                answer = call(proxy, request)
+            finally:
+                proxy.close()
+        runner.called(self.resolved_name, lambda: _bytes(request))
+        return answer
+
+    ServiceProxy.__init__ = beginning
+    ServiceProxy.call = calling
+    _let_time_pass_with(runner, ServiceClient)
+
+
+def _let_time_pass_with(runner: ScriptRunner, kind: type[ServiceClient]) -> None:
+    """The same for those of ros_utils, whose connections are its own affair; a call is begun and ended."""
+    begin, end = kind.begin, kind.end
+    requests: WeakKeyDictionary[ServiceClient, tuple[Any, ...]] = WeakKeyDictionary()
+
+    def beginning(self: ServiceClient, *request: Any) -> None:
+        if self.name != ADVANCE:  # which is ours
+            runner.before_call(self.name)
+            requests[self] = request
+        begin(self, *request)
+
+    def ending(self: ServiceClient) -> Any:
+        answer = end(self)
+        if self.name != ADVANCE:
+            runner.called(self.name, lambda: repr(requests[self]).encode())
+        return answer
+
+    kind.begin = beginning  # type: ignore[method-assign]
+    kind.end = ending  # type: ignore[method-assign]
+
+
+def _drop_if_broken(proxy: ServiceProxy) -> None:
+    """A kept connection has nothing to say between two calls, unless its other end has gone."""
+    if proxy._lockstep_kept and proxy.transport is not None:
+        connection = proxy.transport.socket
+        if connection is None or select.select([connection], [], [], 0)[0]:
+            _drop(proxy)
+
+
+def _drop(proxy: ServiceProxy) -> None:
+    if proxy._lockstep_kept and proxy.transport is not None:
+        proxy.transport.close()
+        proxy.transport = None
+
+
+def _bytes(request: Any) -> bytes:
+    buffer = io.BytesIO()
+    request.serialize(buffer)
+    return buffer.getvalue()
+
+
+def replace_time(runner: ScriptRunner) -> None:
+    """Puts the functions in place."""
+    sleep, spin, start_timer = rospy.timer.sleep, rospy.spin, rospy.timer.Timer.__init__
+
+    def ros_sleep(duration: float | genpy.Duration) -> None:
+        if not runner.is_connected():
+            sleep(duration)
+            return
+        seconds = duration.to_sec() if isinstance(duration, genpy.Duration) else float(duration)
+        if seconds > 0:
+            runner.wait(seconds)
+        if rospy.core.is_shutdown():
+            raise rospy.ROSInterruptException("ROS shutdown request")
+
+    def ros_spin() -> None:
+        if not rospy.core.is_initialized():
+            spin()
+        while not rospy.core.is_shutdown():
+            if threading.current_thread() is threading.main_thread() and runner.is_connected():
+                runner.wait(math.inf, rospy.core.is_shutdown)
+            else:
+                originals.sleep(0.05)
+
+    def timer(self: rospy.Timer, *args: Any, **kwds: Any) -> None:
+        start_timer(self, *args, **kwds)
+        if runner.is_connected():
+            runner.clock.began(self)
+
+    rospy.sleep = rospy.timer.sleep = ros_sleep
+    rospy.spin = rospy.client.spin = ros_spin
+    rospy.timer.Timer.__init__ = timer
+    for owner, name in ((rospy, "get_time"), (rospy, "get_rostime"), (rospy.Time, "now")):
+        setattr(owner, name, _counted(runner, getattr(owner, name)))
+
+
+def _counted(runner: ScriptRunner, read: Callable[[], Any]) -> Callable[[], Any]:
+    """A script that only looks at the clock waits for it."""
+
+    def look() -> Any:
+        runner.reads_time()
+        return read()
+
+    look.__doc__ = read.__doc__
+    return look

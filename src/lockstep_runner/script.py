@@ -1,0 +1,231 @@
+"""The script: compiled and run as if it had been started by itself, seeded, and told apart from libraries."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import importlib.abc
+import importlib.machinery
+import importlib.util
+import os
+import random
+import re
+import sys
+import sysconfig
+import threading
+import tokenize
+import types
+from collections.abc import Callable, Sequence
+
+PYTHON_2 = re.compile(r"<>|^\s*raise [\w.]+,|\bur['\"]|`")
+MODULES_OF_PYTHON_2 = frozenset(
+    ["ConfigParser", "Queue", "StringIO", "Tkinter", "__builtin__", "cPickle", "thread", "urllib2"]
+)
+NAMES_OF_PYTHON_2 = frozenset(
+    ["basestring", "execfile", "long", "raw_input", "reduce", "unichr", "unicode", "xrange"]
+)
+OURS = __name__.partition(".")[0]
+
+
+class NoScript(Exception):
+    """The file can't be run; the text says why."""
+
+
+def compiled(path: str) -> types.CodeType:
+    """Reads and compiles a script.
+
+    Raises:
+        NoScript: it can't be read, or isn't Python 3.
+    """
+    try:
+        with tokenize.open(path) as file:
+            source = file.read()
+        return compile(ast.parse(source, path), path, "exec", dont_inherit=True)
+    except (OSError, UnicodeDecodeError) as fault:
+        raise NoScript(f"{path}: {fault}") from fault
+    except (SyntaxError, ValueError) as fault:
+        what, line, place = str(fault), "", ""
+        if isinstance(fault, SyntaxError):
+            what, line, place = fault.msg, fault.text or "", f", line {fault.lineno}"
+        hint = ""
+        if _is_for_python_2(what, line):
+            hint = " (a script for Python 2: this is Python 3; 2to3 mends most of it)"
+        raise NoScript(f"{path}{place}: {what}{hint}") from fault
+
+
+def _is_for_python_2(fault: str, line: str) -> bool:
+    signs = (
+        "Missing parentheses in call to 'print'",
+        "Missing parentheses in call to 'exec'",
+        "multiple exception types must be parenthesized",
+        "leading zeros in decimal integer literals",
+        "invalid decimal literal",
+        "inconsistent use of tabs",
+    )
+    return any(sign in fault for sign in signs) or PYTHON_2.search(line) is not None
+
+
+def hint(fault: BaseException) -> str:
+    """What a script that reads as Python 3 means by a name of Python 2; empty for other faults."""
+    missing = fault.name if isinstance(fault, ImportError | NameError) else None
+    if missing in MODULES_OF_PYTHON_2 | NAMES_OF_PYTHON_2:
+        return f"{missing} is Python 2's: the script is for Python 2, this is Python 3; 2to3 mends most of it"
+    return ""
+
+
+def run(path: str, arguments: Sequence[str], code: types.CodeType) -> None:
+    """Runs a script as `__main__`, with its arguments, from the folder where we are.
+
+    What it raises goes up; `own_part` takes ours out of the traceback.
+    """
+    main = types.ModuleType("__main__")
+    main.__dict__.update(__file__=path, __builtins__=builtins, __cached__=None)
+    sys.modules["__main__"] = main
+    sys.argv = [path, *arguments]
+    sys.path[0] = os.path.dirname(os.path.realpath(path))
+    exec(code, main.__dict__)
+
+
+def own_part(trace: types.TracebackType | None, path: str) -> types.TracebackType | None:
+    """A traceback from the script's first frame on, without those that are replaced functions'."""
+    part = trace
+    while part is not None and part.tb_frame.f_code.co_filename != path:
+        part = part.tb_next
+    if part is None:
+        return trace
+    last = part
+    while last.tb_next is not None:
+        name = last.tb_next.tb_frame.f_globals.get("__name__", "")
+        if name.partition(".")[0] == OURS:
+            last.tb_next = last.tb_next.tb_next
+        else:
+            last = last.tb_next
+    return part
+
+
+def seed_everything(seed: int) -> None:
+    """Seeds random and NumPy now, and torch when the script imports it."""
+    import numpy
+
+    random.seed(seed)
+    numpy.random.seed(seed)
+    # What generators begin with that nobody seeds, as Gymnasium's of an environment
+    vars(numpy.random.bit_generator)["randbits"] = random.Random(seed).getrandbits
+    if "torch" in sys.modules:
+        sys.modules["torch"].manual_seed(seed)
+    else:
+        sys.meta_path.insert(0, AfterImport("torch", lambda torch: torch.manual_seed(seed)))
+
+
+class AfterImport(importlib.abc.MetaPathFinder):
+    """Calls a function with a module when it has been imported."""
+
+    def __init__(self, name: str, call: Callable[[types.ModuleType], object]) -> None:
+        self._name = name
+        self._call = call
+
+    def find_spec(
+        self,
+        fullname: str,
+        path: Sequence[str] | None,
+        target: types.ModuleType | None = None,
+    ) -> importlib.machinery.ModuleSpec | None:
+        if fullname != self._name:
+            return None
+        sys.meta_path.remove(self)
+        spec = importlib.util.find_spec(fullname)
+        if spec is None or spec.loader is None:
+            return spec
+        execute = spec.loader.exec_module
+
+        def executing(module: types.ModuleType) -> None:
+            execute(module)
+            self._call(module)
+
+        spec.loader.exec_module = executing  # type: ignore[method-assign]
+        return spec
+
+
+STANDARD = sysconfig.get_path("stdlib") + "/"
+# Their waits are for processes, sockets, files and threads of their own.
+LIBRARIES = frozenset(
+    # fmt: off
+    [
+        "bullet_gazebo",
+        "catkin_pkg",
+        "genpy",
+        "joblib",
+        "lockstep_runner",
+        "matplotlib",
+        "multiprocess",
+        "numpy",
+        "optuna",
+        "pybullet",
+        "ray",
+        "rl_workbench",
+        "robot_envs",
+        "ros_calls",
+        "ros_utils",
+        "rosgraph",
+        "roslaunch",
+        "roslib",
+        "rosmaster",
+        "rosnode",
+        "rosparam",
+        "rospkg",
+        "rospy",
+        "rosservice",
+        "rostopic",
+        "scipy",
+        "tensorboard",
+        "tensorboardX",
+        "tensorflow",
+        "torch",
+        "tqdm",
+        "wandb",
+        "xacro",
+        "xmlrpc",
+    ]
+    # fmt: on
+)
+
+
+# Of these the waits are their callers'.
+GO_BETWEENS = frozenset(
+    ["threading", "queue", "concurrent.futures._base", "concurrent.futures.thread"]
+)
+
+
+def is_the_script(depth: int) -> bool:
+    """Whether the function `depth` frames above the caller belongs to the script, or a module of its own.
+
+    A wait in Python's own `queue`, `threading` and `concurrent.futures` counts as that of who called
+    them, and one in a `threading.Timer` as the script's.
+    """
+    frame: types.FrameType | None = sys._getframe(depth + 1)
+    while frame is not None and _module(frame) in GO_BETWEENS:
+        if _module(frame) == "threading" and frame.f_code is threading.Timer.run.__code__:
+            return True
+        frame = frame.f_back
+    if frame is None:
+        return False
+    path = frame.f_code.co_filename
+    if path.startswith("<frozen"):
+        return False
+    if path.startswith(STANDARD) and "-packages/" not in path:
+        return False
+    return _package(frame) not in LIBRARIES
+
+
+def caller(depth: int) -> str:
+    """The package or module, by its first name, of the function `depth` frames above the caller."""
+    return _package(sys._getframe(depth + 1))
+
+
+def _module(frame: types.FrameType) -> str:
+    name: str = frame.f_globals.get("__name__", "")
+    return name
+
+
+def _package(frame: types.FrameType) -> str:
+    return _module(frame).partition(".")[0]
