@@ -1,4 +1,4 @@
-"""Efforts and wrenches that clients apply for a time (docs/contract/gazebo.md 2.18 and 2.19)."""
+"""Efforts and wrenches that clients apply for some time (docs/contract/gazebo.md 2.18 and 2.19)."""
 
 import math
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ Wrench = tuple[Vector, Vector]
 
 
 @dataclass(frozen=True)
-class Interval:
+class ActingTime:
     """When an effort or wrench acts, in simulated time [ns]; a negative duration is for ever."""
 
     start: int
@@ -31,7 +31,7 @@ class AppliedEffort:
     model: Model
     joint: str
     effort: float
-    interval: Interval
+    interval: ActingTime
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,11 @@ class AppliedWrench:
     model: Model
     link: str
     wrench: Wrench
-    interval: Interval
+    interval: ActingTime
 
 
 class AppliedForces:
-    """All that acts now or later; the simulator looks once a tick whether there is anything at all."""
+    """The efforts and wrenches that act now or later."""
 
     def __init__(self) -> None:
         self.efforts: list[AppliedEffort] = []
@@ -74,7 +74,7 @@ class AppliedForces:
         self.efforts = [each for each in self.efforts if each.joint not in names]
 
     def apply(self, now: int) -> None:
-        """Acts for the step that ends at `now` [ns], and drops what is over."""
+        """Applies what acts in the step that ends at `now` [ns], and drops what is over."""
         self._apply_wrenches(now)
         self._apply_efforts(now)
 
@@ -94,7 +94,7 @@ class AppliedForces:
 
 
 def _truncated(applied: AppliedEffort) -> float:
-    """The effort within the joint's limit, and none that would speed it up beyond its velocity limit."""
+    """Returns the effort within the joint's limit; 0 if it would exceed the velocity limit further."""
     joint = applied.model.description.joints[applied.joint]
     _, speed = applied.model.joint_state(applied.joint)
     if 0.0 <= joint.velocity < abs(speed) and speed * applied.effort > 0.0:
@@ -105,10 +105,10 @@ def _truncated(applied: AppliedEffort) -> float:
 
 
 def in_world(wrench: Wrench, point: Vector, body: Pose, frame: Pose | None) -> Wrench:
-    """Returns the wrench that acts when a client gives `wrench` at `point` [m] of `frame`.
+    """Returns the wrench that acts when a client applies `wrench` at `point` [m] of `frame`.
 
-    None is the world: `point` is then an offset from the body's centre of mass. Otherwise Gazebo turns the
-    wrench into the body's axes and applies it as if those were the world's; so do we.
+    A frame of None is the world: `point` is then an offset from the body's centre of mass. Otherwise Gazebo
+    turns the wrench into the body's axes and applies it as if those were the world's; so do we.
     """
     force, torque = wrench
     torque = add(torque, cross(point, force))

@@ -1,4 +1,4 @@
-"""The C library's heap: what is free goes back to the system. Without effect where it isn't glibc's."""
+"""glibc's heap: free memory goes back to the system. Other C libraries are left alone."""
 
 import ctypes
 
@@ -6,17 +6,17 @@ ARENA_MAX = -8  # mallopt's M_ARENA_MAX
 
 
 def give_back() -> None:
-    """Gives back what is free in the heap, which the C library would keep for later."""
+    """Returns free memory to the system, which the C library would keep for later."""
     function = _function("malloc_trim")
     if function is not None:
         function(0)
 
 
 def use_one_arena() -> None:
-    """Has all threads use one heap; to be called before there is a second thread.
+    """Makes all threads share one heap. Call it before there is a second thread.
 
-    Else each of some eight for every core keeps what was free in it once, and Python's threads allocate in
-    turn anyhow.
+    By default glibc makes up to eight heaps a core, and each keeps its free memory. Python's threads
+    allocate one after the other anyway.
     """
     function = _function("mallopt")
     if function is not None:

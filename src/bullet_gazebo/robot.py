@@ -9,18 +9,18 @@ from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import ControllerManager
 from bullet_gazebo.physics.engine import FURTHEST
 from bullet_gazebo.physics.model import Model
-from bullet_gazebo.stability import StabilityWatch, Tell
+from bullet_gazebo.stability import Log, StabilityWatch
 
 JointStates = Sequence[Sequence[float]]
 NANOSECONDS = 1_000_000_000
-FAST = 0.999 * FURTHEST  # [rad, m] in a step: nothing that is in order moves like that
-STRONGEST = 1e9  # [N m, N]; of a motor without a limit: the engine's solver wants a number
+FAST = 0.999 * FURTHEST  # [rad, m] in a step: only what has blown up moves like that
+STRONGEST = 1e9  # [N m, N]; of a motor without a limit: the engine's solver needs a finite number
 
 logger = logging.getLogger(__name__)
 
 
 class ControlledRobot:
-    """Reads joint states into handles and writes what controllers command, in place, once a tick."""
+    """Copies joint states into ros_control's handles, and commands back, once a tick."""
 
     def __init__(
         self,
@@ -29,11 +29,16 @@ class ControlledRobot:
         manager: ControllerManager,
         control_period: float = 0.0,
         namespace: str = "/",
-        tell: Tell = logger.log,
+        log: Log = logger.log,
     ) -> None:
-        """Controllers are updated every `control_period` [s], or with each step if that is longer.
-
-        `namespace` is the manager's, for those who look a controller up by its full name. `tell` logs.
+        """
+        Args:
+            model: the robot in the world.
+            hardware: its joints as ros_control sees them.
+            manager: of its controllers.
+            control_period: of the controllers [s]; they are updated on each step if that is longer.
+            namespace: the manager's, to look up controllers by their full names.
+            log: logs what is wrong with gains.
 
         Raises:
             ControlError: if the model lacks a joint that a transmission names, or has a wrong setting.
@@ -59,22 +64,24 @@ class ControlledRobot:
         # What a motor drives is as fast as its command.
         self._watched = [index for name, index in indices.items() if name not in moved]
         self._others = [index for name, index in indices.items() if name not in hardware.joints]
-        self._watch = StabilityWatch(model, hardware, manager, tell)
-        self._knows = False  # the state that the next tick begins with
+        self._watch = StabilityWatch(model, hardware, manager, log)
+        self._read_ahead = (
+            False  # whether the handles hold the state that the next tick begins with
+        )
         self.review_gains()
         manager.on_change = self.review_gains
         self.read()
         hardware.relatch()
 
     def review_gains(self) -> None:
-        """Looks for gains that the step of the physics can't follow: when they change, or the step does."""
+        """Looks for gains that the physics step can't follow, after gains or the step have changed."""
         self._fast = FAST / self.model.time_step
         self._slow = -self._fast
-        self._knows = False
+        self._read_ahead = False
         self._watch.review(self._control_period / NANOSECONDS)
 
     def read(self) -> None:
-        """Copies positions and velocities from the engine, and sees to it that nothing has blown up."""
+        """Copies positions and velocities from the engine, and contains what has blown up."""
         states, slow, fast = self.model.body.joint_states(), self._slow, self._fast
         calm = True
         for joint, index in self._joints:
@@ -90,39 +97,44 @@ class ControlledRobot:
             self._contain(states)
 
     def read_ahead(self) -> None:
-        """Reads what the next tick would begin with, and so spares it that, unless something moves the robot
-        in between: whoever steps wants the state after each call, and calls may be of one tick."""
+        """Reads the state after the last tick of a call that steps the world.
+
+        The next tick begins with the same state and need not read it again, unless something moves the robot
+        in between. It matters where each call is of one tick.
+        """
         self.model.body.moved = False
         self.read()
-        self._knows = True
+        self._read_ahead = True
 
     def update(self, now: int, dt: float) -> None:
-        """Reads, and updates the controllers if it is their turn; `now` [ns], `dt` [s] is the step."""
-        if self._knows:
-            self._knows = False
-            if self.model.body.moved:
-                self.read()
-        else:
+        """Reads the state, and updates the controllers if they are due.
+
+        Args:
+            now: simulated time [ns].
+            dt: the step [s].
+        """
+        if not self._read_ahead or self.model.body.moved:
             self.read()
+        self._read_ahead = False
         if self._control_period:
             self._update_in_time(now, round(dt * NANOSECONDS))
         else:
             self.manager.update(now, dt)
 
     def _contain(self, states: JointStates) -> None:
-        """Takes energy from nowhere out, as ODE's solver loses it, and takes the new state over."""
+        """Removes energy that came from nowhere, as ODE's solver loses it, and reads the new state."""
         names = self.model.joint_names
         blown = [names[index] for index in self._watched if not abs(states[index][1]) < self._fast]
         self._watch.blown_up(blown, self._fast)
-        # What shakes brakes itself in the next step, if there is something to brake: at rest it would be
-        # pushed the same way for ever.
+        # A shaking joint keeps half of its speed, which its gains brake in the next step. At rest it would
+        # be pushed the same way for ever.
         self.model.calm({name: 0.5 if name in self._watch.shaking else 0.0 for name in blown})
         states = self.model.body.joint_states()
         for joint, index in self._joints:
             joint.position, joint.velocity = states[index][:2]
 
     def _update_in_time(self, now: int, step: int) -> None:
-        """The control period is a whole number of steps, and always the nominal one."""
+        """Updates the controllers each control period, a whole number of steps and always the nominal one."""
         period = max(1, ceil(self._control_period / step)) * step
         self._waited = period if self._waited is None else self._waited + step
         if self._waited >= period:
@@ -138,7 +150,7 @@ class ControlledRobot:
         for joint, enforce, index in self._effort_joints:
             enforce(joint)
             effort = joint.command
-            if not isfinite(effort):  # the engine would carry it into every state of the world
+            if not isfinite(effort):  # it would spread to every state of the world
                 effort = 0.0
             joint.effort = efforts[index] = effort
         if self.hardware.halted:
@@ -148,7 +160,7 @@ class ControlledRobot:
         self.model.body.apply_efforts(efforts)
 
     def _halt(self) -> None:
-        """What an emergency stop leaves of the commands (docs/contract/gazebo_ros_control.md 6.7)."""
+        """Replaces the commands in an emergency stop (docs/contract/gazebo_ros_control.md 6.7)."""
         for joint, _, index in self._effort_joints:
             joint.effort = self._efforts[index] = 0.0
         for drive, _ in self._drives:
@@ -165,7 +177,12 @@ class ControlledRobot:
                 self.model.body.set_motor(index, speed, min(most, STRONGEST))
 
     def joints_moved(self, now: int, relatch: bool) -> None:
-        """Takes over a state that something other than time has changed."""
+        """Reads a state that something other than time has changed.
+
+        Args:
+            now: simulated time [ns].
+            relatch: whether controllers begin anew, as an episode should.
+        """
         self.read()
         self._waited = None
         if relatch:
@@ -174,7 +191,10 @@ class ControlledRobot:
         self.manager.joints_moved(now, relatch)
 
     def emergency_stop(self, on: bool) -> None:
-        """Lets go of all joints, positions held, until it is taken back; then controllers begin anew."""
+        """Releases all joints but those with a position interface, which it holds.
+
+        When it ends, controllers begin anew.
+        """
         if on:
             self.hardware.halt()
         elif self.hardware.halted:

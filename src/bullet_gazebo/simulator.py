@@ -17,25 +17,25 @@ NANOSECONDS = 1_000_000_000
 IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()
 
 
-class Postman(Protocol):
-    """Tells clients something that a tick has brought up, outside of it."""
+class Outbox(Protocol):
+    """Sends clients what a tick has produced, after the tick."""
 
-    def has_post(self) -> bool:
-        """Whether there is something to tell; the caller holds the lock."""
+    def has_messages(self) -> bool:
+        """Returns whether there is something to send. The caller holds the lock."""
 
     def deliver(self) -> None:
-        """Tells it; the caller doesn't hold the lock."""
+        """Sends it. The caller doesn't hold the lock."""
 
 
 class NotInLockstep(RuntimeError):
-    """A step was asked of a world whose time runs by itself."""
+    """A client wants to step a world whose time runs by itself."""
 
 
 class Simulator:
-    """Time, the world and its robots, under one lock that everybody who touches them holds.
+    """Time, the world and its robots, under one lock that everybody holds who touches them.
 
-    Modes: time runs by itself in run(), paced to `max_update_rate` ticks a second of wall time
-    (0: as fast as possible); or in lock-step, when only advance() moves it.
+    There are two modes. Either time runs by itself in run(), at most `max_update_rate` ticks a second of
+    wall time (0: as fast as possible), or in lock-step, where only advance() moves it.
     """
 
     def __init__(
@@ -46,7 +46,13 @@ class Simulator:
         max_update_rate: float = 1000.0,
         relatch: bool = True,
     ) -> None:
-        """With `relatch`, controllers begin anew when a service moves joints or resets the world."""
+        """
+        Args:
+            world: all models.
+            lockstep: whether only advance() moves time.
+            max_update_rate: ticks a second of wall time; 0 is as fast as possible.
+            relatch: whether controllers begin anew when a service moves joints or resets the world.
+        """
         self.world = world
         self.lock = FairLock()
         self.lockstep = lockstep
@@ -59,9 +65,9 @@ class Simulator:
         self.applied = AppliedForces()
         # Called with `now` before each physics step.
         self.listeners: list[Callable[[int], None]] = []
-        # What tells clients something after the ticks, and whether somebody who steps calls them.
-        self.postmen: list[Postman] = []
-        self.post_goes_with_steps = False
+        # What sends messages after the ticks, and whether those who step the world call them.
+        self.outboxes: list[Outbox] = []
+        self.deliver_with_steps = False
         self._period = round(world.time_step * NANOSECONDS)
         self._paused = False
         self._flowing = threading.Event()  # set while time runs by itself
@@ -76,11 +82,9 @@ class Simulator:
 
     @property
     def version(self) -> tuple[int, int, int]:
-        """Another one whenever models, robots or controllers have come or gone; the caller holds the lock."""
-        loaded = sum(
-            [robot.manager.version for robot in self.robots]
-        )  # of the same robots, if all is equal
-        return self.world.version, self._robots_version, loaded
+        """Changes whenever models, robots or controllers come or go. The caller holds the lock."""
+        controllers = sum([robot.manager.version for robot in self.robots])
+        return self.world.version, self._robots_version, controllers
 
     @property
     def paused(self) -> bool:
@@ -88,7 +92,7 @@ class Simulator:
 
     @property
     def outruns_the_clock(self) -> bool:
-        """Whether ticks may come faster than real time: in lock-step, step(), and beyond factor 1."""
+        """Whether ticks may come faster than real time: in lock-step, by step(), and beyond factor 1."""
         rate = self.max_update_rate
         return self.lockstep or self._paused or rate <= 0.0 or rate * self.world.time_step > 1.0001
 
@@ -105,7 +109,7 @@ class Simulator:
             self._update_flow()
 
     def run(self) -> None:
-        """Lets time pass until stop(); for a thread of its own."""
+        """Lets time pass until stop(), in a thread of its own."""
         pacer = Pacer()
         while not self._stopping.is_set():
             if not self._flowing.is_set():
@@ -118,7 +122,7 @@ class Simulator:
             self._keep_pace(pacer)
 
     def _keep_pace(self, pacer: Pacer) -> None:
-        """Waits for the next tick's turn, or until a service changes what there is to wait for."""
+        """Waits until the next tick is due, or a service changes the rate or stops time."""
         rate = self.max_update_rate
         due = pacer.wait(1.0 / rate if rate > 0.0 else 0.0, IDLE_POLL)
         while not due:
@@ -136,14 +140,14 @@ class Simulator:
         self._stopping.set()
 
     def advance(self, ticks: int, until: Callable[[], bool] | None = None) -> int:
-        """Moves time by `ticks` physics steps; the caller holds the lock.
+        """Moves time by `ticks` physics steps. The caller holds the lock.
 
         Args:
             ticks: at least 1.
-            until: asked after each tick; ends it early.
+            until: called after each tick; it ends the advance when it returns true.
 
         Returns:
-            How many ticks have passed.
+            The number of ticks that have passed.
 
         Raises:
             NotInLockstep: if time runs by itself.
@@ -186,7 +190,7 @@ class Simulator:
                 robot.read_ahead()
 
     def await_holds(self) -> None:
-        """Waits until nobody holds time; for those who step, in whose lock others go on meanwhile."""
+        """Waits until nobody holds time. The caller steps the world; its lock is released meanwhile."""
         if self.holds:
             self.holds.await_end(self._stopping)
 
@@ -215,10 +219,9 @@ class Simulator:
     def set_joint_states(
         self, model: Model, positions: Mapping[str, float], velocities: Mapping[str, float]
     ) -> None:
-        """Puts joints of `model` at `positions` [rad, m], moving at `velocities` [rad/s, m/s], for the begin
-        of an episode; the caller holds the lock.
+        """Begins an episode with joints of `model` at `positions` [rad, m] and `velocities` [rad/s, m/s].
 
-        What the joints carry rests, but for those that `velocities` names.
+        What the joints carry is at rest, but for joints in `velocities`. The caller holds the lock.
         """
         model.set_joint_positions(positions)
         model.set_joint_velocities(velocities)

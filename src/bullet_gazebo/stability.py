@@ -1,8 +1,8 @@
-"""Whether a robot's gains are too high for the step of the physics, and what rings for want of damping.
+"""Finds gains that are too high for the physics step, and damps joints that a P gain alone would let ring.
 
 The engines step semi-implicitly, v' = v - dt/M (p x + d v), x' = x + dt v', with the effort of the state
-before the step. Such a loop shakes from step to step, and more each time, where an eigenvalue of
-M^-1 (p dt² + 2 d dt) is beyond 4; for a loop on velocity, where one of M^-1 (2 p dt + 4 d) is.
+before the step. Such a loop diverges, alternating from step to step, if an eigenvalue of
+M^-1 (p dt² + 2 d dt) exceeds 4; a loop on velocity diverges if one of M^-1 (2 p dt + 4 d) does.
 """
 
 import logging
@@ -20,8 +20,8 @@ from bullet_gazebo.control.pid import Loop
 from bullet_gazebo.physics.dynamics import mobility, most_inertias, poses_at_zero
 from bullet_gazebo.physics.model import Model
 
-Tell = Callable[[int, str], None]
-"""Takes what is to be logged: a level of `logging`, and the text."""
+Log = Callable[[int, str], None]
+"""Logs a text at a level of `logging`."""
 
 MOST = 4.0  # of the eigenvalue
 P_ONLY_DAMPING = 0.05  # of critical damping
@@ -30,33 +30,36 @@ CONTROL_PLUGIN = "libgazebo_ros_control.so"
 
 
 class OwnedLoop(NamedTuple):
-    """A loop and whose it is: a controller's, or a drive's."""
+    """A loop, and the controller or drive that it belongs to."""
 
     owner: str
     loop: Loop
 
 
 class StabilityWatch:
-    """Looks at a robot's gains whenever they or its controllers change, and tells each fault once."""
+    """Checks a robot's gains whenever they or its controllers change, and logs each fault once."""
 
     def __init__(
-        self, model: Model, hardware: RobotHardware, manager: ControllerManager, tell: Tell
+        self, model: Model, hardware: RobotHardware, manager: ControllerManager, log: Log
     ) -> None:
         """
         Raises:
-            ControlError: if the model's `<pOnlyDamping>` is no number from 0 to 1.
+            ControlError: if the model's `<pOnlyDamping>` isn't a number from 0 to 1.
         """
-        self.shaking: set[str] = set()  # joints that are driven by gains that are too high
+        self.shaking: set[str] = set()  # joints that gains drive which are too high
         self._model = model
         self._hardware = hardware
         self._manager = manager
-        self._tell = tell
+        self._log = log
         self._damping_ratio = p_only_damping(model)
-        self._told: set[object] = set()
+        self._logged: set[object] = set()
 
     def review(self, period: float) -> None:
-        """Warns of gains that are too high, and damps what a P gain alone drives; `period` [s] is that of
-        the controllers, or 0 if they are updated on each step."""
+        """Warns of gains that are too high, and damps joints that a P gain alone drives.
+
+        Args:
+            period: of the controllers [s]; 0 if they are updated on each step.
+        """
         dt = max(period, self._model.time_step)
         acting = self._acting()
         found = too_high(self._model, acting, dt)
@@ -69,17 +72,17 @@ class StabilityWatch:
         self._damp(acting)
 
     def blown_up(self, joints: Iterable[str], speed: float) -> None:
-        """Tells, once of each, that `joints` have reached `speed` [rad/s, m/s], and what drives them."""
+        """Logs, once for each joint, that it has reached `speed` [rad/s, m/s], and what drives it."""
         for name in joints:
-            if name in self._told:
+            if name in self._logged:
                 continue
-            self._told.add(name)
+            self._logged.add(name)
             driver = "No controller with gains drives it"
             for owner, loop in self._acting():
                 if loop.joint == name:
                     gains = loop.pid.gains
                     driver = f"The {owner} drives it with p = {gains.p:g}, i = {gains.i:g}, d = {gains.d:g}"
-            self._tell(
+            self._log(
                 logging.WARNING,
                 f"joint '{name}' of model '{self._model.name}' blew up: it went half a turn in a step "
                 f"({speed:.0f} rad/s or m/s; the step is {self._model.time_step:g} s). It was slowed down. "
@@ -93,12 +96,12 @@ class StabilityWatch:
     def _warn_of(self, each: OwnedLoop, excess: float, dt: float) -> None:
         owner, loop = each
         key = (owner, loop.joint, loop.pid.gains, dt)
-        if key in self._told:
+        if key in self._logged:
             return
-        self._told.add(key)
+        self._logged.add(key)
         p, d = _stiffness(loop, dt)
         gain, value = ("d", loop.pid.gains.d) if d > p else ("p", loop.pid.gains.p)
-        self._tell(
+        self._log(
             logging.WARNING,
             f"{owner} drives joint '{loop.joint}' of model '{self._model.name}' with {gain} = {value:g}, "
             f"{excess:.3g} times what a step of {dt:g} s can follow (about {value / excess:.3g}): "
@@ -106,16 +109,16 @@ class StabilityWatch:
         )
 
     def _damp(self, acting: list[OwnedLoop]) -> None:
-        """Gives joints that a P gain alone drives some damping: nothing else would ever still them."""
+        """Adds damping to joints that a P gain alone drives: nothing else would ever stop them."""
         added = {}
         loops = [each for each in acting if self._damping_ratio and _rings(each.loop, self._model)]
         inertias = most_inertias(self._model.description) if loops else {}
         for owner, loop in loops:
             critical = 2.0 * math.sqrt(loop.pid.gains.p * inertias[loop.joint])
             added[loop.joint] = self._damping_ratio * critical
-            if (owner, loop.joint) not in self._told:
-                self._told.add((owner, loop.joint))
-                self._tell(
+            if (owner, loop.joint) not in self._logged:
+                self._logged.add((owner, loop.joint))
+                self._log(
                     logging.INFO,
                     f"{owner} drives joint '{loop.joint}' of model '{self._model.name}' with p alone: it "
                     f"gets {self._damping_ratio:g} of critical damping, unless <{P_ONLY_TAG}> of the plugin "
@@ -125,8 +128,10 @@ class StabilityWatch:
 
 
 def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[tuple[OwnedLoop, float]]:
-    """Returns the loops whose gains are too high for steps of `dt` [s], and how many times so: the worst
-    first. Each joint's inertia is that with all joints at zero."""
+    """Returns the loops whose gains are too high for steps of `dt` [s], the worst first.
+
+    Each comes with the factor by which it is too high. Inertias are those with all joints at zero.
+    """
     left = {each.loop.joint: each for each in loops if sum(_stiffness(each.loop, dt)) > 0.0}
     order = [joint.name for joint in model.description.movable_joints]
     left = {name: left[name] for name in order if name in left}
@@ -137,7 +142,7 @@ def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[tuple[Owne
     added = {name: damping / 2.0 for name, damping in own.items()} if implicit else {}
     matrix = mobility(model.description, poses_at_zero(model.description), added)
     stiffness = {name: sum(_stiffness(each.loop, dt)) for name, each in left.items()}
-    if not implicit:  # it is cut at half of what stops the joint in one step (Model.apply_damping)
+    if not implicit:  # Model.apply_damping cuts it at half of what stops the joint in one step
         for name in left:
             place = order.index(name)
             stiffness[name] += min(2.0 * own[name], 1.0 / matrix[place, place])
@@ -154,11 +159,10 @@ def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[tuple[Owne
 
 
 def p_only_damping(model: Model) -> float:
-    """Returns the share of critical damping for joints that a P gain alone drives: `<pOnlyDamping>` of the
-    model's control plugin.
+    """Returns `<pOnlyDamping>` of the model's control plugin: a share of critical damping.
 
     Raises:
-        ControlError: if it is no number from 0 to 1.
+        ControlError: if it isn't a number from 0 to 1.
     """
     for plugin in model.description.plugins:
         text = plugin.element.findtext(P_ONLY_TAG)
@@ -179,7 +183,7 @@ def _owned(controllers: Iterable[Controller]) -> list[OwnedLoop]:
 
 
 def _stiffness(loop: Loop, dt: float) -> tuple[float, float]:
-    """What p and d of a loop add to M times the eigenvalue [kg m², kg], in steps of `dt` [s]."""
+    """Returns what p and d of a loop add to M times the eigenvalue [kg m², kg], in steps of `dt` [s]."""
     p, d = max(loop.pid.gains.p, 0.0), max(loop.pid.gains.d, 0.0)
     return (2.0 * p * dt, 4.0 * d) if loop.of_velocity else (p * dt * dt, 2.0 * d * dt)
 

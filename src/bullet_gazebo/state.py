@@ -1,4 +1,7 @@
-"""What a client wants to know of a world after a step, beside its joints; names are resolved once."""
+"""What a client asks of a world beside its joints: models, links in any frame, contacts.
+
+`step_world` and in-process environments share this code. Names are looked up once for each query.
+"""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -25,12 +28,20 @@ from bullet_gazebo.physics.pose import (
 )
 from bullet_gazebo.physics.world import World, seen_from
 
+SCOPE = "::"
+MOST_COMPARED = 2000  # names; among more, the search for a similar one would take too long
+Wrench = tuple[Vector, Vector]
+"""Force [N] and torque [N m], in world axes."""
+Collision = tuple[str, str, str]
+"""Names of a model, its link, and the link's collision."""
+State = tuple[Pose, Twist]
+
 
 def distance(shape: Shape, link: Pose, point: Vector) -> float:
     """Returns the distance [m] of a point from a shape's surface, on either side of it.
 
     Args:
-        shape: of a mesh it is the box around it that counts.
+        shape: a mesh counts as its bounding box.
         link: the shape's link in the world.
         point: in the world [m].
     """
@@ -49,7 +60,7 @@ def distance(shape: Shape, link: Pose, point: Vector) -> float:
 
 
 def _box(shape: Shape) -> tuple[Vector, Vector]:
-    """Opposite corners [m] of a box, or of the one around a mesh."""
+    """Returns opposite corners [m] of a box, or of the bounding box of a mesh."""
     if shape.kind == "box":
         x, y, z = (length / 2.0 for length in shape.size)
         return (-x, -y, -z), (x, y, z)
@@ -60,20 +71,17 @@ def _box(shape: Shape) -> tuple[Vector, Vector]:
 
 
 def _beyond(*excess: float) -> float:
-    """Distance [m] from a body of a point that is beyond it by so much in directions at right angles.
+    """Returns the signed distance [m] of a point from a body, negative inside.
 
-    Negative inside.
+    Args:
+        excess: by how much the point is beyond the body in directions at right angles [m].
     """
     outside = hypot(*(max(each, 0.0) for each in excess))
     return outside + min(max(excess), 0.0)
 
 
-SCOPE = "::"
-MOST_COMPARED = 2000  # names; in a fuller world the search for a near one would hold everybody
-
-
 class UnknownName(ValueError):
-    """A name that nothing has, or several have; the text says what to write instead."""
+    """No entity has a name, or several have; the text says what to write instead."""
 
 
 def find_model(world: World, name: str) -> Model:
@@ -88,11 +96,11 @@ def find_model(world: World, name: str) -> Model:
 
 
 def find_link(world: World, name: str) -> tuple[Model, str]:
-    """Returns model and plain name of a link; also of one that a fixed joint has made part of another one.
+    """Returns model and plain name of a link, also of one that was lumped into another one.
 
     Args:
-        world: where it is.
-        name: of the link, or model::link, which it must be where several models have such a link.
+        world: all models.
+        name: of the link; model::link where several models have such a link.
 
     Raises:
         UnknownName: if there is none, or there are several.
@@ -111,7 +119,7 @@ def find_link(world: World, name: str) -> tuple[Model, str]:
 
 
 def link_names(world: World) -> list[str]:
-    """All names that `find_link` knows, plain and scoped."""
+    """Returns all names that `find_link` accepts, plain and scoped."""
     names = []
     for model in world.models.values():
         description = model.description
@@ -122,7 +130,7 @@ def link_names(world: World) -> list[str]:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """The end of a line that refuses a name: the nearest one of those that are known, if one is near."""
+    """Returns the end of an error about an unknown name: the most similar known one, if there is one."""
     names = sorted(set(known))
     near = get_close_matches(name, names, 1) if len(names) <= MOST_COMPARED else []
     return f"; did you mean '{near[0]}'?" if near else ""
@@ -133,19 +141,13 @@ def _has_link(model: Model, name: str) -> bool:
     return name != WORLD and (name in description.links or name in description.lumped)
 
 
-Wrench = tuple[Vector, Vector]
-"""Force [N] and torque [N m], in world axes."""
-Collision = tuple[str, str, str]
-"""Names of a model, its link, and the link's collision."""
-
-
 @dataclass
 class ContactPair:
     """Two collisions that touched in the last physics step, each as model::link::collision.
 
-    There is one of each list for a point [m]. Normals, of length 1, point towards the first collision.
-    Wrenches act on its link, their torques about its centre of mass. Depths [m] are those of the overlap.
-    All is in world axes.
+    The lists have an entry for each point [m]. Unit normals point towards the first collision. Wrenches act
+    on its link, with torques about its centre of mass. Depths [m] are those of the overlap. All is in world
+    axes.
     """
 
     first: str
@@ -165,15 +167,15 @@ class ContactPair:
 
 
 def find_collisions(world: World, names: Iterable[str]) -> set[Collision]:
-    """Returns all collisions that are meant by names.
+    """Returns all collisions that names refer to.
 
     Args:
-        world: where they are.
-        names: of models, links and collisions; plain, or scoped as model::link and
-            model::link::collision, which they must be where several models have one of that name.
+        world: all models.
+        names: of models, links and collisions: plain, or scoped as model::link and
+            model::link::collision where several models have such a name.
 
     Raises:
-        UnknownName: if one means no collision, or those of several models.
+        UnknownName: if a name refers to no collision, or to those of several models.
     """
     found: set[Collision] = set()
     for name in names:
@@ -204,7 +206,7 @@ def _collisions_of(world: World, name: str) -> set[Collision]:
 
 
 def _why_none(world: World, name: str) -> str:
-    """Why a name means no collision."""
+    """Returns why a name refers to no collision."""
     if name in world.models:
         return f"model '{name}' has no collision"
     known = list(world.models)
@@ -228,8 +230,8 @@ def contact_pairs(world: World, wanted: set[Collision] | None) -> list[ContactPa
     """Returns what touched in the last physics step, in the engine's order.
 
     Args:
-        world: whose contacts.
-        wanted: only pairs with one of these, which comes first in them; None: all.
+        world: all models.
+        wanted: only pairs with one of these collisions, which then is the first one; None: all pairs.
     """
     models = {id(model.body): model for model in world.models.values()}
     pairs: dict[tuple[Collision, Collision], ContactPair] = {}
@@ -254,7 +256,7 @@ def contact_pairs(world: World, wanted: set[Collision] | None) -> list[ContactPa
 
 
 def _collision(model: Model, side: Side, point: Vector) -> Collision:
-    """The one that touches. Of several that it may be, that with the nearest surface."""
+    """Returns the collision that touches: of several possible ones, that with the nearest surface."""
     name = side.collisions[0]
     if len(side.collisions) > 1:
         pose, shapes = model.link_state(side.link)[0], model.collisions(side.link)
@@ -263,18 +265,15 @@ def _collision(model: Model, side: Side, point: Vector) -> Collision:
 
 
 def _centre(model: Model, link: str) -> Vector:
-    """The centre of mass [m] of a link in the world; the origin of one that has no mass."""
+    """Returns the centre of mass [m] of a link in the world; the origin of a link without mass."""
     inertia, pose = model.description.links[link].inertia, model.link_state(link)[0]
     return pose.position if inertia is None else pose.compose(inertia.com).position
 
 
-State = tuple[Pose, Twist]
-
-
 class LinkQuery(NamedTuple):
-    """A link, and the link in whose frame its state is wanted: of the world if that is "" or "world".
+    """A link, and the link in whose frame its state is wanted; "" or "world" is the world's frame.
 
-    Names are plain, or model::link. A link that a fixed joint has made part of another one can be named, too.
+    Names are plain, or model::link. Links that were lumped into another one have a state, too.
     """
 
     link: str
@@ -283,14 +282,14 @@ class LinkQuery(NamedTuple):
 
 @dataclass(frozen=True)
 class StateQuery:
-    """What is wanted. What isn't, costs nothing.
+    """What to read. What isn't asked for costs nothing.
 
     Args:
         models: names of models whose states are wanted.
-        all_models: of all of them, instead.
-        links: whose states are wanted.
-        contacts_of: names of models, links or collisions, plain or scoped: all that touches them is wanted.
-        all_contacts: all that touches anything, instead.
+        all_models: whether the states of all models are wanted instead.
+        links: links whose states are wanted.
+        contacts_of: names of models, links or collisions, plain or scoped, whose contacts are wanted.
+        all_contacts: whether all contacts are wanted instead.
     """
 
     models: tuple[str, ...] = ()
@@ -306,7 +305,7 @@ NOTHING = StateQuery()
 class StateAnswer(NamedTuple):
     """Poses [m] and twists [m/s, rad/s] of models by name and of links in the query's order, and contacts.
 
-    A model's are as get_model_state tells them, a link's as get_link_state.
+    States of models are those of get_model_state, states of links those of get_link_state.
     """
 
     models: dict[str, State]
@@ -320,7 +319,7 @@ class StateReader:
     def __init__(self, world: World, query: StateQuery) -> None:
         """
         Raises:
-            UnknownName: if the world has nothing of a name, or several things.
+            UnknownName: if the world has no entity of a name, or several.
         """
         self.query = query
         self._world = world
@@ -335,11 +334,11 @@ class StateReader:
         """Reads the world.
 
         Args:
-            stepped: whether what touches is that of the present state. After a reset or a placing
-                it isn't: that only a step finds out, and there are no contacts before.
+            stepped: whether a step led to the present state. After a reset or a placing none has, and
+                there are no contacts yet.
 
         Raises:
-            UnknownName: if something of the query has gone.
+            UnknownName: if an entity of the query has gone.
         """
         if self.is_stale:
             self._resolve()
@@ -371,7 +370,7 @@ class StateReader:
 
 
 def _reader(model: Model, link: str) -> Callable[[], State]:
-    """Returns what reads a link's state in the world."""
+    """Returns a function that reads a link's state in the world."""
     if link in model.description.links:
         return lambda: model.link_state(link)
     whole, place = model.description.lumped[link]

@@ -1,4 +1,4 @@
-"""Keeps simulated time in step with the wall clock."""
+"""Who holds the world, what keeps time from passing, and its pace against the wall clock."""
 
 import math
 import threading
@@ -6,17 +6,19 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import TracebackType
+
+POLL = 0.2  # [s]
+MAX_LAG = 0.1  # [s]; a host that falls behind further than this isn't made up for
 
 
 class FairLock:
-    """First come, first served.
+    """A lock that serves its waiters in the order in which they came.
 
-    threading.Lock lets a thread that releases and re-acquires it in a loop, as the simulation does, keep
-    all others out. Here every waiter gets its turn after at most one tick.
+    The simulation releases and re-acquires its lock in a loop. With threading.Lock that keeps all other
+    threads out; here every waiter gets its turn after at most one tick.
 
     Raises:
-        RuntimeError: if the thread that holds it takes it once more, for which it would wait for ever.
+        RuntimeError: if the thread that holds it acquires it again: it would wait for ever.
     """
 
     def __init__(self) -> None:
@@ -24,7 +26,7 @@ class FairLock:
         self._waiting: deque[threading.Lock] = deque()
         self._held = False
         self._holder: int | None = None  # the thread
-        self.turns = 0  # how often it was taken
+        self.turns = 0  # how often it was acquired
 
     @property
     def held(self) -> bool:
@@ -32,7 +34,7 @@ class FairLock:
 
     @property
     def holder(self) -> int | None:
-        """The thread that holds it; None also in the moment in which it is handed over."""
+        """The thread that holds it; None also at the moment when it is handed over."""
         return self._holder
 
     def __enter__(self) -> None:
@@ -54,22 +56,20 @@ class FairLock:
         turn.acquire()
 
     def wait(self, event: threading.Event, timeout: float) -> None:
-        """Lets go of the lock until `event` is set, or for `timeout` [s]; for the holder."""
-        self.__exit__(None, None, None)
+        """Releases the lock until `event` is set, or for `timeout` [s]. Only the holder may call it."""
+        self._release()
         event.wait(timeout)
         self.__enter__()
 
     def yield_turn(self) -> None:
-        """Lets everybody who waits have their turn first; for the holder, in the middle of long work."""
-        self.__exit__(None, None, None)
+        """Lets all waiters go first. The holder calls it in the middle of long work."""
+        self._release()
         self.__enter__()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
+        self._release()
+
+    def _release(self) -> None:
         self._holder = None
         with self._guard:
             if self._waiting:
@@ -78,14 +78,18 @@ class FairLock:
                 self._held = False
 
 
-POLL = 0.2  # [s]
-
-
 class Holds:
-    """Who holds time at the moment. A world that is held is not paused: pausing is the clients' affair."""
+    """Keeps time from passing while something is prepared that the next step needs.
+
+    A world that is held isn't paused: only clients pause it.
+    """
 
     def __init__(self, lock: FairLock, changed: Callable[[], None]) -> None:
-        """`lock` is the simulator's; `changed` is called under it."""
+        """
+        Args:
+            lock: the simulator's.
+            changed: called with the lock held, whenever holders have come or gone.
+        """
         self._lock = lock
         self._changed = changed
         self._holders: set[object] = set()
@@ -97,10 +101,10 @@ class Holds:
 
     @contextmanager
     def hold(self, patience: float, late: Callable[[], None]) -> Iterator[None]:
-        """Lets no time pass within the block; not called under the lock.
+        """Lets no time pass within the block. The caller doesn't hold the lock.
 
-        What waits for time to pass in there would wait for ever: after `patience` [s of wall time] time goes
-        on, and `late` is called.
+        Code in the block that waits for time to pass would wait for ever. So time goes on after `patience`
+        [s of wall time], and `late` is called.
         """
         holder = object()
         with self._lock:
@@ -109,14 +113,14 @@ class Holds:
         timer = threading.Timer(patience, self._give_up, (holder, late))
         timer.daemon = True
         try:
-            timer.start()  # may fail: where memory is short there is no thread to be had
+            timer.start()  # it may fail, where there is no memory for a thread
             yield
         finally:
             timer.cancel()
             self._release(holder)
 
     def await_end(self, stopping: threading.Event) -> None:
-        """Returns when nobody holds time, or `stopping` is set; the caller's lock is let go of meanwhile."""
+        """Waits until nobody holds time or `stopping` is set, and releases the caller's lock meanwhile."""
         while self._holders and not stopping.is_set():
             self._lock.wait(self._free, POLL)
 
@@ -140,9 +144,6 @@ class Holds:
         self._changed()
 
 
-MAX_LAG = 0.1  # [s]; a host that falls behind further than this isn't made up for
-
-
 class Pacer:
     """Waits until the wall clock has caught up with the ticks done so far."""
 
@@ -150,7 +151,7 @@ class Pacer:
         self._due = time.perf_counter()
 
     def restart(self) -> None:
-        """Begins to count from now, after a pause."""
+        """Counts from now on, after a pause."""
         self._due = time.perf_counter()
 
     def wait(self, period: float, longest: float = math.inf) -> bool:

@@ -39,7 +39,7 @@ class _BoundedBuilder(TreeBuilder):
         self._count = count
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        raise FileError("a document type (<!DOCTYPE>) is not taken")
+        raise FileError("a document type (<!DOCTYPE>) is not accepted")
 
     def start(self, tag: str, attributes: dict[str, str]) -> Element:
         self._depth += 1
@@ -110,7 +110,7 @@ def decode(data: bytes) -> str:
     except LookupError:
         name = ""
     if not ENCODINGS.fullmatch(name):
-        raise FileError(f"its encoding '{declared.group(1)}' is not known here")
+        raise FileError(f"its encoding '{declared.group(1)}' is not supported")
     return _decoded(data, name)
 
 

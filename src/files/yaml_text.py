@@ -1,4 +1,4 @@
-"""YAML files of parameters, as rosparam reads them, with a bound for all that one could be large in."""
+"""Parsing YAML files of parameters as rosparam does, within bounds of size, depth and number of values."""
 
 import ast
 import math
@@ -12,25 +12,25 @@ import yaml
 
 from files.content import FileError, TooLarge
 
-MAX_BYTES = 2**20  # the parser takes seconds for so much; a robot's controllers have some kilobytes
-MAX_VALUES = 100_000  # in lists and mappings, each time that an anchor is referred to
+MAX_BYTES = 2**20  # takes the parser seconds; a robot's controllers have some kilobytes
+MAX_VALUES = 100_000  # in lists and mappings, counted for each reference to an anchor
 MAX_DEPTH = 50
-LONGEST_ANGLE = 100  # characters
+MAX_ANGLE = 100  # characters
 OPERATORS: dict[type, Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
 }
-SIMPLE = (str, int, float, bytes, datetime)  # what the parameter server takes; bool is an int
+SIMPLE = (str, int, float, bytes, datetime)  # types that the parameter server takes; bool is an int
 
 
 def load_documents(data: bytes | str) -> list[Any]:
     """Returns the documents of a YAML text in UTF-8 or UTF-16; ``deg(90)`` and ``rad(pi/2)`` are radians.
 
     Raises:
-        FileError: if it is no YAML, with the place; if a value contains itself.
-        TooLarge: if it is, as it stands or with all that its anchors stand for.
+        FileError: if it isn't YAML, with the place, or if a value contains itself.
+        TooLarge: if it exceeds a bound, also with its anchors expanded.
     """
     if len(data) > MAX_BYTES:
         raise TooLarge(f"it has more than {MAX_BYTES} bytes (MAX_BYTES)")
@@ -44,7 +44,7 @@ def load_documents(data: bytes | str) -> list[Any]:
         raise FileError(str(error)) from error
     except FileError:
         raise
-    except ValueError as error:  # of a date or number that is none, for which PyYAML gives no place
+    except ValueError as error:  # an invalid date or number, for which PyYAML gives no place
         raise FileError(f"a value can't be read: {error}") from error
     except RecursionError as error:
         raise TooLarge(f"values are nested more than {MAX_DEPTH} deep (MAX_DEPTH)") from error
@@ -53,9 +53,11 @@ def load_documents(data: bytes | str) -> list[Any]:
 
 
 def load_parameters(data: bytes | str) -> list[dict[str, Any]]:
-    """As load_documents; each is a mapping, of values that a parameter server takes.
+    """Returns the documents of a YAML text that are mappings of parameters; empty ones are left out.
 
-    Empty documents are left out.
+    Raises:
+        FileError: as `load_documents`, or if a value can't be a parameter.
+        TooLarge: as `load_documents`.
     """
     documents = [document for document in load_documents(data) if document is not None]
     for document in documents:
@@ -67,7 +69,7 @@ def load_parameters(data: bytes | str) -> list[dict[str, Any]]:
 
 
 class _Loader(yaml.SafeLoader):
-    """PyYAML's, without what takes it exponential time; and its angles are computed, not evaluated."""
+    """PyYAML's safe loader with angles, and without merges that take exponential time."""
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
         super().flatten_mapping(node)
@@ -78,12 +80,12 @@ class _Loader(yaml.SafeLoader):
         text = str(self.construct_scalar(node)).strip()
         inner = text[4:-1] if text.startswith(("deg(", "rad(")) else text
         try:
-            if len(inner) > LONGEST_ANGLE:
+            if len(inner) > MAX_ANGLE:
                 raise ValueError
             angle = _evaluated(ast.parse(inner, mode="eval").body)
         except (ValueError, SyntaxError, ZeroDivisionError, OverflowError) as error:
             raise yaml.constructor.ConstructorError(
-                problem=f"'{text[:LONGEST_ANGLE]}' is no angle", problem_mark=node.start_mark
+                problem=f"'{text[:MAX_ANGLE]}' is no angle", problem_mark=node.start_mark
             ) from error
         return math.radians(angle) if node.tag == "!degrees" else angle
 
@@ -94,7 +96,7 @@ for _tag, _name in (("!degrees", "deg"), ("!radians", "rad")):
 
 
 def _evaluated(node: ast.expr) -> float:
-    """The value of an expression of numbers and pi."""
+    """Returns the value of an expression of numbers and pi."""
     if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
         return float(node.value)
     if isinstance(node, ast.Name) and node.id == "pi":
@@ -108,9 +110,12 @@ def _evaluated(node: ast.expr) -> float:
 
 
 def _count(value: Any, known: dict[int, int | None], depth: int) -> int:
-    """How many values there are in `value`, with anchors written out, but without writing them out.
+    """Returns the number of values in `value` with anchors expanded, without expanding them.
 
-    `known` has those that were counted; None for those that are being counted, which contain themselves.
+    Args:
+        value: a parsed value.
+        known: counts by id; None for a value that is being counted: if it comes up, it contains itself.
+        depth: of `value`.
     """
     if not isinstance(value, (list, dict, tuple, set)):
         return 1

@@ -3,11 +3,11 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from bullet_gazebo.control.controllers import find_type
 from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.control.user_types import find_type
 from bullet_gazebo.state import did_you_mean
 
 KINDS = ("Float64", "Float64MultiArray")  # of command topics that take numbers

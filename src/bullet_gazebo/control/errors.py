@@ -1,4 +1,4 @@
-"""Errors of the control room, and what a user's code is caught at."""
+"""Errors of controllers, and which exceptions of users' code are caught."""
 
 import threading
 
@@ -6,18 +6,17 @@ from files.content import one_line
 
 
 class ControlError(ValueError):
-    """A controller or a robot description that can't work: the text says what to mend."""
+    """A controller or robot description can't work: one line that says what to change."""
 
     def __init__(self, text: str) -> None:
-        """Names in a file may hold anything: `text` is made one line, of a length for a log."""
         super().__init__(one_line(text))
 
 
 def faults() -> tuple[type[BaseException], ...]:
-    """What a user's code is caught at, as in ``except faults()``: whatever it may raise.
+    """Returns the exceptions to catch from a user's code, as in ``except faults()``: all of them.
 
-    A script's sys.exit() must not end the simulator, nor stop its time. Only an interrupt in the main
-    thread is not the code's own: it is somebody's Ctrl-C, wherever it comes up.
+    A script's sys.exit() must not end the simulator. Only a KeyboardInterrupt in the main thread isn't the
+    code's own: it is a Ctrl-C.
     """
     if threading.current_thread() is threading.main_thread():
         return (Exception, SystemExit, GeneratorExit)

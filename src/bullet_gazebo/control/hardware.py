@@ -1,4 +1,4 @@
-"""A robot's hardware as ros_control sees it: joints by interface, and what becomes of their commands."""
+"""A robot's hardware as ros_control sees it: joints by interface, and how commands move them."""
 
 import math
 from abc import ABC, abstractmethod
@@ -17,11 +17,17 @@ from bullet_gazebo.control.limits import (
 from bullet_gazebo.control.pid import Loop, Pid
 from bullet_gazebo.control.transmissions import RobotDescription
 
+EFFORT = "EffortJointInterface"
+POSITION = "PositionJointInterface"
+VELOCITY = "VelocityJointInterface"
+STATE = "JointStateInterface"
+GAINS = "gazebo_ros_control/pid_gains"  # where, in the robot's namespace, gains of drives stand
+
 
 class Drive(ABC):
-    """One joint with a position or a velocity interface.
+    """Moves one joint with a position or velocity interface (docs/contract/gazebo_ros_control.md 6.4).
 
-    `pid` turns commands into efforts; without one a motor drives the joint to the commanded state.
+    `pid` turns commands into efforts; without one, a motor drives the joint to the commanded state.
     """
 
     def __init__(self, joint: JointHandle, pid: Pid | None) -> None:
@@ -34,14 +40,14 @@ class Drive(ABC):
 
     @abstractmethod
     def relatch(self) -> None:
-        """Takes the joint's present state for what is commanded, and forgets the past."""
+        """Makes the joint's present state the command, and forgets the past."""
 
     def begin_hold(self) -> None:
         """Called when an emergency stop begins."""
 
     @abstractmethod
     def hold(self) -> None:
-        """What an emergency stop commands, on each step."""
+        """Sets the command of an emergency stop, on each step."""
 
     @abstractmethod
     def limit(self, dt: float) -> None:
@@ -53,10 +59,10 @@ class Drive(ABC):
 
     @abstractmethod
     def motor(self, dt: float) -> tuple[float, float]:
-        """Returns speed [rad/s, m/s] and most effort [N m, N] of the motor for a step of `dt` [s]."""
+        """Returns speed [rad/s, m/s] and maximum effort [N m, N] of the motor for a step of `dt` [s]."""
 
     def _clipped(self, error: float, dt: float) -> float:
-        """The PID's effort within the limit, and none that speeds a joint up beyond its velocity limit."""
+        """Returns the PID's effort within its limit; 0 if it would exceed the velocity limit further."""
         assert self.pid is not None
         effort = clamp(self.pid.compute(error, dt), -self._most, self._most)
         speed = self.joint.velocity
@@ -64,10 +70,10 @@ class Drive(ABC):
 
 
 class PositionDrive(Drive):
-    """Commands are positions [rad, m].
+    """Takes commands as positions [rad, m].
 
-    Gazebo sets the joint's position at each step. Here a motor takes it there within the step, which
-    is the same for the joint, and right for what it carries and touches.
+    Gazebo sets the joint's position at each step. Here a motor moves it there within the step: the result
+    for the joint is the same, and it is right for what the joint carries and touches.
     """
 
     def __init__(self, joint: JointHandle, pid: Pid | None) -> None:
@@ -102,7 +108,7 @@ class PositionDrive(Drive):
 
 
 class VelocityDrive(Drive):
-    """Commands are velocities [rad/s, m/s]."""
+    """Takes commands as velocities [rad/s, m/s]."""
 
     def __init__(self, joint: JointHandle, pid: Pid | None) -> None:
         super().__init__(joint, pid)
@@ -129,24 +135,20 @@ class VelocityDrive(Drive):
         return self.joint.command, self._most
 
 
-EFFORT = "EffortJointInterface"
-POSITION = "PositionJointInterface"
-VELOCITY = "VelocityJointInterface"
-STATE = "JointStateInterface"
-GAINS = "gazebo_ros_control/pid_gains"  # where, in the robot's namespace, gains of drives stand
-
-
 class RobotHardware:
     """The joints that have a transmission (docs/contract/gazebo_ros_control.md 6.3 and 6.4).
 
-    `joints` is in alphabetical order, the order of joint states. `effort_joints` take their command
-    for an effort, once their `enforcers` have clipped it; `drives` are the others.
+    `joints` is in alphabetical order, the order of joint states. The commands of `effort_joints` are efforts,
+    once their `enforcers` have clipped them; `drives` move the other joints.
     """
 
     def __init__(
         self, description: RobotDescription, gains: Mapping[str, object] | None = None
     ) -> None:
-        """`gains` is the parameter tree `<ns>/gazebo_ros_control/pid_gains`: joints by name.
+        """
+        Args:
+            description: joints and transmissions.
+            gains: the parameters `<ns>/gazebo_ros_control/pid_gains`: joints by name.
 
         Raises:
             ControlError: if a transmission's joint isn't in the description, or gains are wrong.
@@ -173,7 +175,7 @@ class RobotHardware:
 
     @property
     def loops(self) -> list[Loop]:
-        """The PIDs of the drives, and what they are around."""
+        """The PIDs of the drives as loops."""
         return [
             Loop(d.joint.name, d.pid, isinstance(d, VelocityDrive))
             for d in self.drives
@@ -197,8 +199,10 @@ class RobotHardware:
         return joints[name]
 
     def relatch(self, names: Iterable[str] | None = None) -> None:
-        """Lets go of joints (default: all), or holds them where they are; what was commanded before is
-        forgotten."""
+        """Forgets the commands of joints (default: all).
+
+        It releases joints with an effort or velocity interface, and holds those with a position interface.
+        """
         wanted = set(self.joints if names is None else names)
         for joint in self.effort_joints:
             if joint.name in wanted:
@@ -208,7 +212,7 @@ class RobotHardware:
                 drive.relatch()
 
     def halt(self) -> None:
-        """An emergency stop: no effort, no velocity, and positions as they are.
+        """Begins an emergency stop: no effort, no velocity, positions held.
 
         See docs/contract/gazebo_ros_control.md 6.7.
         """
@@ -233,7 +237,7 @@ class RobotHardware:
 
 
 def drive_pid(gains: Mapping[str, object], joint: str) -> Pid | None:
-    """Returns the PID that the gains name for `joint`; None if they name no `p`."""
+    """Returns the PID with the gains of `joint`; None if they have no `p`."""
     params = gains.get(joint)
     if not isinstance(params, Mapping) or "p" not in params:
         return None

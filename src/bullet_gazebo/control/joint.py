@@ -1,4 +1,4 @@
-"""The joint as controllers see it: state, command and limits (ros_control's joint handle)."""
+"""A joint as controllers see it: state, command and limits (ros_control's joint handle)."""
 
 import math
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ TURN = 2.0 * math.pi
 
 def normalized(angle: float) -> float:
     """Returns `angle` [rad] in (-pi, pi]."""
-    if -math.pi < angle <= math.pi:  # nearly always true, and several times cheaper than fmod
+    if -math.pi < angle <= math.pi:  # nearly always true, and several times faster than fmod
         return angle
     angle = math.fmod(angle + math.pi, TURN)
     return angle + math.pi if angle <= 0.0 else angle - math.pi
@@ -20,10 +20,9 @@ def shortest_distance(start: float, end: float) -> float:
 
 
 def shortest_distance_within(start: float, end: float, lower: float, upper: float) -> float:
-    """Returns the shortest turn from `start` to `end` that stops inside [lower, upper].
+    """Returns the shortest turn from `start` to `end` that stays within [lower, upper].
 
-    If neither way round does, the shorter one is returned, as upstream does when the joint has left
-    its limits.
+    If neither direction does, it returns the shorter one, as upstream does when a joint has left its limits.
     """
     short = shortest_distance(start, end)
     for turn in (short, short - math.copysign(TURN, short)):
@@ -44,7 +43,7 @@ class SoftLimits:
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Limits of a joint; None where there is none. [rad, m] and their derivatives, [N m, N]."""
+    """Limits of a joint [rad, m] and their derivatives, [N m, N]; None if there is no limit."""
 
     lower: float | None = None
     upper: float | None = None
@@ -58,8 +57,8 @@ class JointLimits:
 class JointHandle:
     """One joint of the robot's hardware. `kind` is revolute, continuous or prismatic.
 
-    `command` is a position, a velocity or an effort, as the joint's hardware interface has it. It is
-    kept until it is replaced, also when its controller stops (docs/contract/ros_control.md 1.6).
+    `command` is a position, a velocity or an effort, depending on the joint's hardware interface. It
+    remains until it is replaced, also when its controller stops (docs/contract/ros_control.md 1.6).
     `effort` is the effort [N m, N] applied in the last step.
     """
 
@@ -82,9 +81,10 @@ class JointHandle:
         return upper if upper < position else position
 
     def way_to(self, position: float) -> float:
-        """Returns the way from here to `position` [rad, m] (docs/contract/ros_control.md 3.2).
+        """Returns the difference from the present position to `position` [rad, m].
 
-        For an angle it is the shortest turn, within the limits of a revolute joint.
+        For an angle it is the shortest turn, within the limits of a revolute joint
+        (docs/contract/ros_control.md 3.2).
         """
         if self.kind == "prismatic":
             return position - self.position

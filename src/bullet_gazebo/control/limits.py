@@ -1,4 +1,4 @@
-"""Joint limits on commands, as joint_limits_interface has them.
+"""Joint limits on commands, as in joint_limits_interface.
 
 See docs/contract/ros_control.md 5 and docs/contract/gazebo_ros_control.md 6.5.
 """
@@ -12,20 +12,16 @@ UNLIMITED = float("inf")
 
 
 def effort_enforcer(limits: JointLimits) -> Enforcer:
-    """Returns what clips a joint's effort command in place, on each step."""
+    """Returns a function that clips a joint's effort command in place, on each step."""
     if limits.effort is None and limits.velocity is None and limits.lower is None:
-        return _leave
+        return lambda joint: None
     if limits.soft is not None:
         return _soft_effort(limits, limits.soft)
     return _effort_saturation(limits)
 
 
-def _leave(joint: JointHandle) -> None:
-    """For a joint without limits."""
-
-
 def _effort_saturation(limits: JointLimits) -> Enforcer:
-    """Full effort, but none that pushes further beyond an exceeded position or velocity limit."""
+    """Allows full effort, but none that pushes further beyond an exceeded position or velocity limit."""
     effort = _or_unlimited(limits.effort)
     velocity = _or_unlimited(limits.velocity)
     lower = -UNLIMITED if limits.lower is None else limits.lower
@@ -47,7 +43,7 @@ def _effort_saturation(limits: JointLimits) -> Enforcer:
 
 
 def _soft_effort(limits: JointLimits, soft: SoftLimits) -> Enforcer:
-    """The windows of `<safety_controller>`: effort falls off as speed nears its position-dependent bound."""
+    """Reduces effort as the speed nears a bound that depends on the position (`<safety_controller>`)."""
     effort = _or_unlimited(limits.effort)
 
     def enforce(joint: JointHandle) -> None:
@@ -60,10 +56,10 @@ def _soft_effort(limits: JointLimits, soft: SoftLimits) -> Enforcer:
 
 
 class PositionLimiter:
-    """Clips a position command to the joint's range, and its way in a step to the velocity limit.
+    """Clips a position command to the joint's range, and its change in a step to the velocity limit.
 
-    Upstream never forgets the last command; here a reset does, else the joint would creep back from
-    where it was put.
+    Upstream never forgets the last command. Here a reset forgets it: otherwise the joint would creep back
+    from where the reset has put it.
     """
 
     def __init__(self, limits: JointLimits) -> None:
@@ -86,7 +82,7 @@ class PositionLimiter:
         )
         low = max(last + slowest * dt, self._lower)
         high = min(last + fastest * dt, self._upper)
-        # Where the joint stands beyond its range, the two bounds may cross: the range goes first.
+        # If the joint is beyond its range the two bounds may cross: then the range counts.
         self._last = joint.command = clamp(
             clamp(joint.command, low, high), self._lower, self._upper
         )
@@ -117,7 +113,7 @@ class VelocityLimiter:
 
 
 def _soft_speeds(limits: JointLimits, soft: SoftLimits, position: float) -> tuple[float, float]:
-    """The slowest and the fastest velocity [rad/s, m/s] that soft limits allow at `position`."""
+    """Returns the lowest and highest velocity [rad/s, m/s] that soft limits allow at `position`."""
     speed = _or_unlimited(limits.velocity)
     if limits.lower is None or limits.upper is None:
         return -speed, speed

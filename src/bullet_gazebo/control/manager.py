@@ -30,10 +30,10 @@ class ControllerInfo(NamedTuple):
 
 
 class ControllerManager:
-    """Controllers of one robot, in load order. Not thread-safe: called between two ticks only.
+    """The controllers of one robot, in load order. Not thread-safe: called between two ticks only.
 
-    A refused request raises ControlError with the reason and changes nothing. A controller that
-    raises anything else is stopped and told to `on_fault`; the others go on.
+    A refused request raises ControlError with the reason, and changes nothing. A controller that raises
+    anything else is stopped and reported to `on_fault`; the others continue.
     """
 
     def __init__(self, hardware: RobotHardware) -> None:
@@ -41,11 +41,11 @@ class ControllerManager:
         self.types: dict[str, type[Controller]] = dict(BUILT_IN)
         self._controllers: dict[str, Controller] = {}
         self._running: list[Controller] = []
-        self.version = 0  # counts what changes `loaded`
+        self.version = 0  # changes whenever `loaded` does
         self._now = 0
-        self.on_fault: Callable[[Controller, BaseException], None] = _ignore
-        # Called when other controllers are loaded or run, and when somebody has changed gains.
-        self.on_change: Callable[[], None] = _leave
+        self.on_fault: Callable[[Controller, BaseException], None] = lambda controller, error: None
+        # Called when controllers are loaded, started or stopped, and when gains have changed.
+        self.on_change: Callable[[], None] = lambda: None
 
     def update(self, now: int, dt: float) -> None:
         """Updates the running controllers; `now` [ns], `dt` [s]."""
@@ -72,7 +72,7 @@ class ControllerManager:
         return self._controllers[name]
 
     def load(self, name: str, params: object) -> Controller:
-        """Makes controller `name` from the parameters `<ns>/<name>`."""
+        """Creates controller `name` from the parameters `<ns>/<name>`."""
         if name in self._controllers:
             raise ControlError(
                 f"A controller named '{name}' was already loaded inside the controller manager"
@@ -110,12 +110,10 @@ class ControllerManager:
     def switch(
         self, start: Iterable[str], stop: Iterable[str], strictness: int = BEST_EFFORT
     ) -> None:
-        """Stops and starts controllers as one act, also while the world is paused.
-
-        See docs/contract/ros_control.md 1.6.
+        """Stops and starts controllers at once, also while the world is paused.
 
         A running controller that is in both lists, or in the start list under BEST_EFFORT, is restarted;
-        under STRICT both are refused.
+        STRICT refuses both (docs/contract/ros_control.md 1.6).
         """
         strict = strictness == STRICT
         stopping = self._known(stop, strict)
@@ -134,7 +132,7 @@ class ControllerManager:
             raise ControlError(f"Could not start {failed}: see the error above.")
 
     def restart(self) -> None:
-        """Stops and starts whatever runs, as the end of an emergency stop does."""
+        """Restarts all running controllers, at the end of an emergency stop."""
         names = [c.name for c in self._running]
         self.switch(names, names)
 
@@ -151,7 +149,7 @@ class ControllerManager:
         ]
 
     def unload_all(self) -> list[Controller]:
-        """Stops and forgets everything, and returns what was loaded."""
+        """Stops and unloads all controllers, and returns them."""
         self.switch([], [c.name for c in self._running])
         gone = list(self._controllers.values())
         self._controllers.clear()
@@ -159,13 +157,13 @@ class ControllerManager:
         return gone
 
     def loops_changed(self) -> None:
-        """Takes note of gains that somebody has changed."""
+        """Has gains checked that somebody has changed."""
         self.on_change()
 
     def joints_moved(self, now: int, relatch: bool) -> None:
-        """Tells controllers that joints moved by other means than time.
+        """Tells controllers that something other than time has moved joints.
 
-        With `relatch` they begin anew: set-points at the new positions, no PID past, no old effort.
+        If `relatch`, they begin anew: set-points at the new positions, no PID history, no old effort.
         """
         self._now = now
         if relatch:
@@ -197,7 +195,7 @@ class ControllerManager:
             self._fail(controller, error)
 
     def _fail(self, controller: Controller, error: BaseException) -> None:
-        """Stops a controller that raised, and lets go of its joints."""
+        """Stops a controller that raised, and releases its joints."""
         if controller.state == RUNNING:
             self._stop(controller)
         # A new list: the old one may be in use by the update that is going on.
@@ -216,18 +214,10 @@ class ControllerManager:
         return list(found.values())
 
 
-def _ignore(controller: Controller, error: BaseException) -> None:
-    """For a manager that nobody listens to."""
-
-
-def _leave() -> None:
-    """The same, of changes."""
-
-
 def _check_made(controller: object, name: str, hardware: RobotHardware) -> None:
-    """Refuses a user's controller that would break list_controllers or the check of conflicts."""
+    """Refuses a user's controller that would break list_controllers or the check for conflicts."""
     if not isinstance(controller, Controller):
-        raise ControlError(f"create() returned {controller!r}, which is no controller")
+        raise ControlError(f"create() returned {controller!r}, which isn't a controller")
     if controller.name != name:
         raise ControlError(
             f"it calls itself {controller.name!r}: __init__ must get create()'s name"
@@ -239,7 +229,7 @@ def _check_made(controller: object, name: str, hardware: RobotHardware) -> None:
         name in hardware.joints for name in claimed
     ):
         raise ControlError(
-            f"it claims {claimed!r}, which is no tuple of names of controlled joints "
+            f"it claims {claimed!r}, which isn't a tuple of names of controlled joints "
             f"({', '.join(hardware.joints) or 'there are none'})"
         )
 
@@ -257,7 +247,7 @@ def _check_strict(starting: list[Controller], stopping: list[Controller]) -> Non
 
 
 def _check_conflicts(controllers: list[Controller]) -> None:
-    """A joint has one master, whatever the interface."""
+    """Refuses two controllers of one joint, whatever their interfaces."""
     owners: dict[str, str] = {}
     for controller in controllers:
         for joint in controller.claimed:

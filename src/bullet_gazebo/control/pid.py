@@ -1,4 +1,4 @@
-"""The PID of control_toolbox, to the letter of docs/contract/ros_control.md 4."""
+"""The PID of control_toolbox, exactly as in docs/contract/ros_control.md 4."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -27,7 +27,7 @@ class PidSample(NamedTuple):
 
 @dataclass(frozen=True)
 class Gains:
-    """p, i, d [command per error, per error s, s per error]; the integral TERM is clamped to i_min..i_max."""
+    """Gains of a PID: p, i, d. The integral term, not the integral, is clamped to i_min..i_max."""
 
     p: float
     i: float = 0.0
@@ -38,10 +38,10 @@ class Gains:
 
     @classmethod
     def from_params(cls, params: object, place: str) -> "Gains":
-        """Reads gains from a parameter tree; `place` is where they stand, for the error text.
+        """Reads gains from a parameter tree; `place` is its name, for errors.
 
         Raises:
-            ControlError: if `p` is missing or a gain is no finite number.
+            ControlError: if `p` is missing or a gain isn't a finite number.
         """
         if not isinstance(params, Mapping) or "p" not in params:
             raise ControlError(f"No p gain specified for pid. Namespace: {place}")
@@ -64,15 +64,15 @@ def _number(params: Mapping[str, object], key: str, default: float, place: str) 
 
 
 def one_listener() -> int:
-    """Whoever sets a sink and says nothing of listeners is one himself."""
+    """The default number of listeners: whoever sets a sink."""
     return 1
 
 
 class Pid:
-    """Gains and the state that they act on. One instance a controlled joint.
+    """Gains, and the state that they act on: one instance for each controlled joint.
 
-    With `publish_state` each computation is reported to `sink`, once somebody has set it; `listeners` tells
-    how many hear it then, and for nobody no report is made.
+    If `publish_state` is set, a ROS adapter sets `sink`, which takes a report of each computation, and
+    `listeners`, which returns the number of subscribers: without any there is no report.
     """
 
     __slots__ = ("d_error", "gains", "i_error", "last_error", "listeners", "output", "p_error",
@@ -94,12 +94,15 @@ class Pid:
         return cls(gains, params.get("publish_state", False) is True)
 
     def clear(self) -> None:
-        """Forgets the past. The last error counts as a known 0, so the next step has a derivative."""
+        """Forgets the past. The last error then counts as 0, so that the next step has a derivative."""
         self.p_error = self.i_error = self.d_error = self.last_error = self.output = 0.0
         self.seeded = True
 
     def compute(self, error: float, dt: float) -> float:
-        """Returns the command for `error`, `dt` [s] after the last call; 0 for dt = 0 or a bad error."""
+        """Returns the command for `error`, `dt` [s] after the last call.
+
+        It is 0 if dt is 0 or the error isn't finite.
+        """
         if dt == 0.0 or not math.isfinite(error):
             return 0.0
         rate = self.d_error
@@ -111,7 +114,7 @@ class Pid:
         return self._respond(error, rate, dt)
 
     def compute_with_rate(self, error: float, rate: float, dt: float) -> float:
-        """As compute, with the error's derivative known instead of differenced."""
+        """Does the same as `compute` with a known derivative of the error."""
         if dt == 0.0 or not (math.isfinite(error) and math.isfinite(rate)):
             self.p_error, self.d_error = error, rate
             return 0.0
@@ -126,7 +129,7 @@ class Pid:
             bounds = (gains.i_min / gains.i, gains.i_max / gains.i)
             self.i_error = max(min(bounds), min(max(bounds), self.i_error))
         i_term = gains.i * self.i_error
-        if not gains.antiwindup:  # min() and max() written out: to call them cost a third of a PID
+        if not gains.antiwindup:  # min() and max() would take a third of the PID's time
             i_term = i_term if i_term < gains.i_max else gains.i_max
             i_term = i_term if i_term > gains.i_min else gains.i_min
         self.output = output = gains.p * error + i_term + gains.d * rate
@@ -143,7 +146,7 @@ class Pid:
 
 
 class Loop(NamedTuple):
-    """A PID whose output is an effort on a joint, and whose error is one of its position or velocity."""
+    """A PID from an error of a joint's position or velocity to an effort on it."""
 
     joint: str
     pid: Pid

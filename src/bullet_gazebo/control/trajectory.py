@@ -1,4 +1,7 @@
-"""A joint on its trajectory: what is wanted of it, how far it is off, what it is commanded."""
+"""Trajectories of joints: splines between waypoints, and the axis that follows them.
+
+See docs/contract/ros_control.md 3.5.
+"""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
@@ -12,7 +15,7 @@ Coefficients = tuple[float, float, float, float, float, float]
 
 
 class Waypoint(NamedTuple):
-    """Where a joint shall be [rad, m], and, if given, how fast [1/s] and with what acceleration [1/s²]."""
+    """A wanted position of a joint [rad, m], optionally with velocity [1/s] and acceleration [1/s²]."""
 
     position: float
     velocity: float | None = None
@@ -28,10 +31,10 @@ class State(NamedTuple):
 
 
 class Segment:
-    """The way between two waypoints, each at its time [ns].
+    """A spline between two waypoints, each at its time [ns].
 
-    It is as smooth as what both of them say: a line for positions alone, a cubic with velocities, a
-    quintic with accelerations. Outside its time the joint stands at the nearer end.
+    It is linear for positions alone, a cubic if both have velocities, a quintic if both have accelerations.
+    Outside of its time the joint rests at the nearer end.
     """
 
     __slots__ = ("_coefficients", "_first", "_last", "_seconds", "_span", "end", "start")
@@ -62,7 +65,7 @@ class Segment:
 
 
 def still(time: int, position: float) -> Segment:
-    """Returns a segment that stands at `position` [rad, m] from `time` [ns] on."""
+    """Returns a segment that rests at `position` [rad, m] from `time` [ns] on."""
     waypoint = Waypoint(position)
     return Segment(time, waypoint, time, waypoint)
 
@@ -70,8 +73,8 @@ def still(time: int, position: float) -> Segment:
 def stop_ramp(start: int, state: State, duration: int) -> Segment:
     """Returns a segment that brings `state` to rest within `duration` [ns].
 
-    It is the first half of the quintic that comes back, without acceleration at either end, to where it
-    starts: it stops 5/8 of the way that the joint would have gone on.
+    It is the first half of the quintic that returns to its start without acceleration at either end. It
+    stops after 5/8 of the distance that the joint would have travelled.
     """
     seconds = duration / NANOSECONDS
     goes_on = state.velocity * seconds
@@ -84,7 +87,7 @@ def stop_ramp(start: int, state: State, duration: int) -> Segment:
 
 
 def _spline(first: Waypoint, last: Waypoint, seconds: float) -> Coefficients:
-    """Coefficients over s in [0, 1]; in seconds they would lose digits over long times."""
+    """Returns coefficients over s in [0, 1]: in seconds they would lose digits over long times."""
     way = last.position - first.position
     if first.velocity is None or last.velocity is None:
         return (first.position, way, 0.0, 0.0, 0.0, 0.0)
@@ -103,12 +106,15 @@ def _spline(first: Waypoint, last: Waypoint, seconds: float) -> Coefficients:
 
 
 class JointSpline:
-    """Segments in order of time; the last one's end is held for ever. Times are uptime [ns]."""
+    """The trajectory of a joint: segments in order of time, then rest. Times are uptime [ns]."""
 
     __slots__ = ("_segments", "_starts", "end")
 
     def __init__(self, segments: Sequence[Segment]) -> None:
-        """There is at least one segment."""
+        """
+        Args:
+            segments: at least one.
+        """
         self._segments = segments
         self._starts = [segment.start for segment in segments]
         self.end = segments[-1].end
@@ -120,10 +126,10 @@ class JointSpline:
     def continued(
         self, now: int, start: int, points: Iterable[tuple[int, Waypoint]], turns: bool
     ) -> "JointSpline":
-        """Returns a spline that leaves this one at `start`, for points that all lie after `now`.
+        """Returns a spline that leaves this one at `start` for `points`, all of them after `now`.
 
-        What lies before `now` is forgotten. With `turns` the joint is continuous: the points are moved by
-        whole turns, so that the first one is the nearest to where the joint then is.
+        Segments before `now` are dropped. If the joint `turns` without limits, the points are moved by whole
+        turns, so that the first one is as near as possible.
         """
         first = max(0, bisect_right(self._starts, now) - 1)
         segments = list(self._segments[first : bisect_left(self._starts, start)])
@@ -141,9 +147,9 @@ class JointSpline:
 
 
 class Axis:
-    """Leads a joint along its spline. Errors are wanted minus actual [rad, m] and [rad/s, m/s].
+    """Moves a joint along its spline. Errors are desired minus actual [rad, m] and [rad/s, m/s].
 
-    Without a PID the joint takes positions for commands; with one, velocities or efforts.
+    Without a PID the command is a position; with one, a velocity or an effort.
     """
 
     __slots__ = (
@@ -167,7 +173,7 @@ class Axis:
         self.spline = JointSpline([still(0, joint.position)])
 
     def begin(self, duration: int) -> None:
-        """Makes uptime 0 the moment at which the joint is where it is found, then stops within `duration`."""
+        """Starts at uptime 0 from the joint's present state, and stops within `duration` [ns]."""
         joint = self.joint
         self.position_error = self.velocity_error = 0.0
         self.desired = State(joint.position, joint.velocity)
@@ -182,14 +188,14 @@ class Axis:
             self.pid.clear()
 
     def hold(self, start: int, duration: int) -> None:
-        """Stops from uptime `start` [ns] on: at once where the joint is, or as a ramp of what was wanted."""
+        """Stops from uptime `start` [ns] on: at once where the joint is, or in a ramp of `duration` [ns]."""
         if duration > 0:
             self.spline = JointSpline([stop_ramp(start, self.spline.at(start), duration)])
         else:
             self.spline = JointSpline([still(start, self.joint.position)])
 
     def follow(self, now: int, start: int, points: list[tuple[int, Waypoint]]) -> None:
-        """Leaves the present spline at uptime `start` [ns] for `points`, which all lie after `now`."""
+        """Leaves the present spline at uptime `start` [ns] for `points`, all of them after `now`."""
         turns = self.joint.kind == "continuous"
         self.spline = self.spline.continued(now, start, points, turns)
 
@@ -197,8 +203,8 @@ class Axis:
         """One control tick at `uptime` [ns], `dt` [s] after the last one."""
         joint = self.joint
         self.desired = desired = self.spline.at(uptime)
-        # Upstream takes the shortest turn on a rail too, and would lead a joint that is more than pi metres
-        # off the wrong way.
+        # Upstream takes the shortest turn on a rail, too: a joint that is more than pi metres off would go
+        # the wrong way.
         if joint.kind == "prismatic":
             self.position_error = desired.position - joint.position
         else:

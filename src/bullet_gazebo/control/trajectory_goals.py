@@ -1,4 +1,7 @@
-"""A goal of follow_joint_trajectory: whether it is reached, missed or still on its way."""
+"""Trajectories as clients send them, and goals of follow_joint_trajectory: checks and outcomes.
+
+See docs/contract/ros_control.md 3.5.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,11 +13,16 @@ from bullet_gazebo.control.trajectory import NANOSECONDS, Axis, Waypoint
 SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS = 0, -1, -2  # control_msgs/FollowJointTrajectoryResult
 PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
 MOST_NAMED = 10  # joints in an error text
-LARGEST = 1e12  # of a position and its derivatives; beyond it a spline's figures would overflow
+LARGEST = (
+    1e12  # of a position and its derivatives: the coefficients of a spline would overflow beyond it
+)
+
+
+SUCCEEDED, ABORTED, CANCELED = "succeeded", "aborted", "canceled"
 
 
 class TrajectoryRefused(ControlError):
-    """A trajectory that can't be followed. `code` is FollowJointTrajectory's error code."""
+    """A trajectory can't be followed. `code` is FollowJointTrajectory's error code."""
 
     def __init__(self, code: int, text: str) -> None:
         super().__init__(text)
@@ -30,7 +38,7 @@ class TrajectoryPoint(NamedTuple):
     accelerations: Sequence[float] = ()
 
     def waypoint(self, index: int) -> Waypoint:
-        """Returns the point of the joint with that place in the trajectory."""
+        """Returns the waypoint of the joint with that index in the trajectory."""
         return Waypoint(
             self.positions[index],
             self.velocities[index] if self.velocities else None,
@@ -39,7 +47,7 @@ class TrajectoryPoint(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """trajectory_msgs/JointTrajectory; it begins at `stamp` [ns], or with the next tick if that is 0."""
+    """trajectory_msgs/JointTrajectory. It begins at `stamp` [ns], or with the next tick if that is 0."""
 
     names: Sequence[str]
     points: Sequence[TrajectoryPoint]
@@ -47,7 +55,7 @@ class Trajectory(NamedTuple):
 
 
 def check_joints(names: Sequence[str], joints: Sequence[str], partial: bool) -> None:
-    """Returns if `names` are `joints` in any order, or with `partial` some of them.
+    """Checks that `names` are `joints` in any order, or some of them if `partial`.
 
     Raises:
         TrajectoryRefused: if they aren't.
@@ -68,13 +76,13 @@ def check_joints(names: Sequence[str], joints: Sequence[str], partial: bool) -> 
 
 
 def _shortened(names: Sequence[str]) -> str:
-    """A list of names for a text that goes into the log and to the client."""
+    """Returns a list of names, cut to a length for the log and the client."""
     rest = len(names) - MOST_NAMED
     return str(list(names[:MOST_NAMED])) + (f" and {rest} more" if rest > 0 else "")
 
 
 def check_points(trajectory: Trajectory) -> None:
-    """Returns if all points are whole, finite, and later than the one before.
+    """Checks that all points are complete, finite and later than the one before.
 
     Raises:
         TrajectoryRefused: if one isn't.
@@ -93,7 +101,7 @@ def check_points(trajectory: Trajectory) -> None:
 
 
 def dropped_points(trajectory: Trajectory, elapsed: int) -> tuple[int, str]:
-    """Returns how many points come too late, `elapsed` [ns] after the trajectory begins, and a warning.
+    """Returns the number of points that are over, `elapsed` [ns] after the trajectory begins, and a warning.
 
     Raises:
         TrajectoryRefused: if all of them do.
@@ -106,7 +114,7 @@ def dropped_points(trajectory: Trajectory, elapsed: int) -> tuple[int, str]:
             INVALID_GOAL,
             f"All {dropped} points of the trajectory lie in the past, the last one by {late:f} s",
         )
-    # Most clients begin with a point "now", so it is no news that it is over.
+    # Most clients begin with a point "now": no warning for that.
     if not dropped or (dropped == 1 and not trajectory.stamp and not points[0].time):
         return dropped, ""
     return dropped, f"The first {dropped} of {len(points)} points lie in the past: left out"
@@ -126,9 +134,9 @@ def _fault(point: TrajectoryPoint, joints: int) -> str:
 
 
 class Tolerance(NamedTuple):
-    """control_msgs/JointTolerance of position [rad, m] and velocity [1/s]; 0 or less: any error will do.
+    """control_msgs/JointTolerance of position [rad, m] and velocity [1/s]; 0 or less accepts any error.
 
-    Accelerations aren't measured, so none is ever off.
+    Accelerations aren't measured, so any is accepted.
     """
 
     position: float = 0.0
@@ -143,24 +151,21 @@ class Tolerance(NamedTuple):
         return ""
 
     def changed(self, wish: "Tolerance | None") -> "Tolerance":
-        """Returns the tolerance with a goal's wishes: more than 0 overrides, less disables, 0 keeps."""
+        """Returns the tolerance as a goal changes it: positive overrides, negative disables, 0 keeps."""
         if wish is None:
             return self
         return Tolerance(*(w if w else own for own, w in zip(self, wish, strict=True)))
 
 
 class Constraints(NamedTuple):
-    """The parameters `constraints`: a tolerance for each joint, and how late [ns] the end may come."""
+    """The parameters `constraints`: tolerances of each joint, and how late [ns] a goal may be reached."""
 
     path: tuple[Tolerance, ...]
     goal: tuple[Tolerance, ...]
     goal_time: int = 0
 
 
-SUCCEEDED, ABORTED, CANCELED = "succeeded", "aborted", "canceled"
-
-
-class Outcome(NamedTuple):
+class GoalOutcome(NamedTuple):
     """How a goal ended; `code` is FollowJointTrajectory's error code."""
 
     kind: str
@@ -178,14 +183,14 @@ class TrajectorySample(NamedTuple):
     error: tuple[tuple[float, ...], tuple[float, ...]]
 
 
-class GoalListener(Protocol):
-    """Hears of a goal from within a control tick, so it must not wait for anything."""
+class GoalObserver(Protocol):
+    """Follows a goal. It is called within a control tick, so it must not wait for anything."""
 
     def feedback(self, sample: TrajectorySample) -> None:
-        """Where the joints are; at action_monitor_rate."""
+        """Takes the state of the joints, at action_monitor_rate."""
 
-    def finished(self, outcome: Outcome) -> None:
-        """The end; nothing comes after it."""
+    def finished(self, outcome: GoalOutcome) -> None:
+        """Takes the outcome; it is the last call."""
 
 
 class GoalRequest(NamedTuple):
@@ -206,26 +211,33 @@ class MonitoredJoint(NamedTuple):
 
 
 class Goal:
-    """An accepted goal. `key` identifies it; `outcome` is a success that wasn't told yet."""
+    """An accepted goal. `key` identifies it; `outcome` is a success that isn't reported yet."""
 
     def __init__(
         self,
         key: str,
-        listener: GoalListener,
+        listener: GoalObserver,
         monitored: list[MonitoredJoint],
         start: int,
         late: int,
     ) -> None:
-        """It begins at uptime `start` [ns], and may end `late` [ns] after its last point."""
+        """
+        Args:
+            key: identifies the goal.
+            listener: takes progress and outcome.
+            monitored: its joints.
+            start: uptime at which it begins [ns].
+            late: how long after its last point it may be reached [ns].
+        """
         self.key = key
         self.listener = listener
-        self.outcome: Outcome | None = None
+        self.outcome: GoalOutcome | None = None
         self._monitored = monitored
         self._start = start
         self._late = late
 
-    def check(self, uptime: int) -> Outcome | None:
-        """Returns the outcome, None while the joints are on their way."""
+    def check(self, uptime: int) -> GoalOutcome | None:
+        """Returns the outcome; None while the joints are on their way."""
         reached = True
         for axis, path, goal in self._monitored:
             if uptime < axis.spline.end:
@@ -241,11 +253,11 @@ class Goal:
                 reached = False
                 if uptime >= axis.spline.end + self._late:
                     return _aborted(GOAL_TOLERANCE_VIOLATED, axis, "goal", fault)
-        return Outcome(SUCCEEDED) if reached else None
+        return GoalOutcome(SUCCEEDED) if reached else None
 
 
 def check_tolerances(request: GoalRequest) -> None:
-    """Returns if all tolerances are numbers: no error would ever exceed what is none.
+    """Checks that all tolerances are numbers: no error ever exceeds NaN.
 
     Raises:
         TrajectoryRefused: if one isn't.
@@ -258,7 +270,7 @@ def check_tolerances(request: GoalRequest) -> None:
 def monitored_joints(
     request: GoalRequest, axes: Sequence[Axis], constraints: Constraints
 ) -> tuple[list[MonitoredJoint], int]:
-    """Returns the goal's joints with their tolerances, and how late [ns] they may come."""
+    """Returns the goal's joints with their tolerances, and how late [ns] they may arrive."""
     wanted = request.trajectory.names
     monitored = [
         MonitoredJoint(
@@ -273,7 +285,7 @@ def monitored_joints(
     return monitored, late
 
 
-def _aborted(code: int, axis: Axis, where: str, fault: str) -> Outcome:
-    return Outcome(
+def _aborted(code: int, axis: Axis, where: str, fault: str) -> GoalOutcome:
+    return GoalOutcome(
         ABORTED, code, f"{axis.joint.name} {where} error {axis.position_error:f} ({fault})"
     )

@@ -1,4 +1,4 @@
-"""What ros_control reads from a robot description: transmissions, joint kinds and limits."""
+"""What ros_control reads from a robot description: transmissions, kinds of joints, limits."""
 
 import math
 from collections.abc import Mapping
@@ -31,14 +31,14 @@ class Transmission:
 
 @dataclass(frozen=True)
 class RobotDescription:
-    """Joints by name, in document order, and what drives them; `warnings` are for the log."""
+    """Joints by name, in document order, and their transmissions; `warnings` are for the log."""
 
     joints: dict[str, JointHandle]
     transmissions: list[Transmission]
     warnings: list[str]
 
     def limited_by(self, params: object) -> "RobotDescription":
-        """Returns the description with limits overridden from the tree `<ns>/joint_limits`."""
+        """Returns the description with limits overridden by the parameters `<ns>/joint_limits`."""
         tree = params if isinstance(params, Mapping) else {}
         warnings = list(self.warnings)
         joints = {}
@@ -54,7 +54,7 @@ def read_description(text: str) -> RobotDescription:
     """Reads URDF text (docs/contract/gazebo_ros_control.md 6.3, docs/contract/ros_control.md 3.0 and 5).
 
     Raises:
-        ControlError: if it isn't XML, or a transmission names an interface that doesn't exist.
+        ControlError: if it isn't XML, or a transmission has an unknown interface.
     """
     try:
         robot = parse(text)
@@ -118,13 +118,13 @@ def _float(element: Element, key: str) -> float:
 
 def _size(element: Element, key: str) -> float:
     value = _float(element, key)
-    if value < 0.0:  # as a limit it would push
+    if value < 0.0:  # such a limit would push the joint
         raise ControlError(f"robot_description: <{element.tag} {key}='{value:g}'> is negative")
     return value
 
 
 def _transmission(element: Element, warnings: list[str]) -> Transmission | None:
-    """One transmission, or None and a warning where upstream's parser skips it."""
+    """Returns one transmission; None, and a warning, where upstream's parser skips it."""
     name = element.get("name", "")
     kind = (element.findtext("type") or "").strip()
     joints = [j for j in element.findall("joint") if j.get("name")]
@@ -163,7 +163,7 @@ def _text(element: Element) -> str:
 
 
 def _overridden(joint: JointHandle, params: Mapping[str, Any], warnings: list[str]) -> JointLimits:
-    """`has_X_limits` switches X on (with its values) or off; what isn't named stays as in the URDF."""
+    """Returns limits with those replaced that `has_X_limits` switches on or off."""
     limits = joint.limits
     for what, fields in OVERRIDES.items():
         if what == "position" and joint.kind not in ("revolute", "prismatic"):
@@ -191,5 +191,5 @@ def _is_limit(value: Any, signed: bool) -> bool:
 
 
 def is_number(value: object) -> bool:
-    """Returns whether a parameter is a finite number; a bool is none."""
+    """Returns whether a parameter is a finite number; a bool isn't."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,5 +1,6 @@
 """What a model consists of, whatever file it came from and whatever engine simulates it."""
 
+from collections import defaultdict
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
@@ -11,16 +12,19 @@ from files.content import one_line
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
+Color = tuple[float, float, float, float]
+"""Red, green, blue, alpha: 0 to 1."""
+
+
 class DescriptionError(ValueError):
-    """A model file that can't be simulated: the text names the place in it and what is wrong."""
+    """A model file can't be simulated: one line with the place in it and what is wrong."""
 
     def __init__(self, text: str) -> None:
-        """Names in the file may hold anything: `text` is made one line, of a length for a log."""
         super().__init__(one_line(text))
 
 
 class LimitExceeded(DescriptionError):
-    """More of something than one model or world may have: there is no going on without it."""
+    """A model or world exceeds a limit. It is refused as a whole: no part of it is left out."""
 
 
 @dataclass(frozen=True)
@@ -39,10 +43,14 @@ class Inertia:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles that were checked (meshes/arrays.py); equal to those of a file with the same contents.
+    """Checked triangles of a mesh file. Two meshes are equal if their files have the same contents.
 
-    `vertices` (n, 3) are finite, `faces` (m, 3) are indices inside of them. `hulls` are the points (k, 3) of
-    the convex bodies that stand for the mesh where it moves: one for each object of a file that has several.
+    Attributes:
+        vertices: (n, 3), finite [the file's unit; metres for COLLADA].
+        faces: (m, 3), indices of vertices.
+        hulls: points (k, 3) of the convex bodies that a moving mesh collides by: one for each object of the
+            file.
+        digest: of the arrays.
     """
 
     vertices: np.ndarray
@@ -59,9 +67,10 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Shape:
-    """A collision or visual shape: box (x, y, z), cylinder (radius, length), sphere (radius), mesh (scales).
+    """A collision or visual shape.
 
-    `mesh` is the name of a mesh's file, `solid` what a collision's file held when it was read.
+    `size` is (x, y, z) of a box, (radius, length) of a cylinder, (radius,) of a sphere [m], and the scales
+    of a mesh. `mesh` is the path of a mesh file, `solid` the content of a collision's file.
     """
 
     kind: str
@@ -82,15 +91,15 @@ class Link:
     visuals: list[Shape] = field(default_factory=list)
     gravity: bool = True  # whether gravity acts on it
     self_collide: bool = False  # also with links of its own model that it isn't joined to
-    part_of: str = ""  # of an engine's helper link: the link that it is a piece of
+    part_of: str = ""  # of a helper link for the engine: the link that it was split from
 
 
 @dataclass
 class Joint:
-    """A joint; limits in [rad, m], [N m, N] and [rad/s, m/s]. `pose` places the child in the parent link.
+    """A joint; limits in [rad, m], [N m, N] and [rad/s, m/s].
 
-    `anchor` is the joint's frame, seen from the child link; `axis` is given in it. A URDF's joint frame is
-    the child's own frame; an SDF's can lie anywhere.
+    `pose` places the child in the parent link. `anchor` is the joint's frame seen from the child link, and
+    `axis` is given in it: in URDF it is the child's own frame, in SDF it can lie anywhere.
     """
 
     name: str
@@ -106,7 +115,7 @@ class Joint:
     velocity: float = -1.0
     damping: float = 0.0
     friction: float = 0.0
-    kept: bool = False  # a fixed joint that is not lumped
+    kept: bool = False  # whether a fixed joint is not lumped
 
     @property
     def movable(self) -> bool:
@@ -119,20 +128,16 @@ class Joint:
 
 @dataclass(frozen=True)
 class Plugin:
-    """A `<plugin>` element of the model: Gazebo picks the code by the library's file name."""
+    """A `<plugin>` element of a model. The library's file name selects the code."""
 
     filename: str
     name: str
     element: Element
 
 
-Color = tuple[float, float, float, float]
-"""Red, green, blue, alpha: 0 to 1."""
-
-
 @dataclass
 class Light:
-    """A light, for clients that read back what they set and for a window: nothing is lit in here."""
+    """A light. It lights nothing here; clients and windows read it."""
 
     name: str
     diffuse: Color = (1.0, 1.0, 1.0, 1.0)
@@ -148,11 +153,16 @@ class Light:
 
 @dataclass
 class ModelDescription:
-    """Links and joints in document order. `world_joints` fix the root link to the world, if there are any.
+    """A model: links and joints in document order.
 
-    `initial_pose` is where the file puts the model, `root_pose` the root link in the model. `islands` are
-    links of a static model that no joint connects with the root, and where they are, seen from it. `lumped`
-    are links that a fixed joint has made part of another one: that one, and where they are in it.
+    Attributes:
+        root: the link that no joint carries.
+        root_pose: of the root link in the model.
+        world_joints: joints that fix the root link to the world.
+        left_out: sensors and the like, which nothing simulates.
+        islands: links of a static model that no joint connects with the root, and their poses seen from it.
+        lumped: links that a fixed joint has made part of another one: that link, and their poses in it.
+        initial_pose: where the file puts the model.
     """
 
     name: str
@@ -163,7 +173,6 @@ class ModelDescription:
     world_joints: list[str] = field(default_factory=list)
     plugins: list[Plugin] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    # Sensors and the like, which nothing simulates.
     left_out: list[str] = field(default_factory=list)
     islands: dict[str, Pose] = field(default_factory=dict)
     lumped: dict[str, tuple[str, Pose]] = field(default_factory=dict)
@@ -177,3 +186,19 @@ class ModelDescription:
     @property
     def movable_joints(self) -> list[Joint]:
         return [joint for joint in self.joints.values() if joint.movable]
+
+    def joints_by_parent(self) -> defaultdict[str, list[Joint]]:
+        """Returns the joints that each link carries, in document order."""
+        joints = defaultdict(list)
+        for joint in self.joints.values():
+            joints[joint.parent].append(joint)
+        return joints
+
+    def carriers(self, link: str) -> list[Joint]:
+        """Returns the joints between the root and `link`, from the root on."""
+        above = {joint.child: joint for joint in self.joints.values()}
+        found: list[Joint] = []
+        while link in above:
+            found.insert(0, above[link])
+            link = above[link].parent
+        return found

@@ -1,7 +1,6 @@
-"""What an effort on a joint has to move: the mass matrix of an articulated model where it stands."""
+"""Mechanics of an articulated model: inertias, link poses, and what an effort on a joint has to move."""
 
 import math
-from collections import defaultdict
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -12,7 +11,10 @@ from bullet_gazebo.physics.pose import Pose, Quaternion, rotate, scale
 
 
 def combine(a: Inertia | None, b: Inertia | None) -> Inertia | None:
-    """Returns the inertia of both bodies held together; both are given in the same frame."""
+    """Returns the inertia of two bodies fixed to each other, by the parallel-axis theorem.
+
+    Both are given in the same frame.
+    """
     bodies = [body for body in (a, b) if body is not None and body.mass > 0.0]
     if not bodies:
         return a or b
@@ -29,7 +31,7 @@ def combine(a: Inertia | None, b: Inertia | None) -> Inertia | None:
 
 
 def _about(body: Inertia, point: np.ndarray) -> np.ndarray:
-    """The tensor (3, 3) about `point`, in the axes of the link."""
+    """Returns the tensor (3, 3) about `point`, in the axes of the link."""
     rotation = _matrix(body.com.orientation)
     own = _tensor(body)
     arm = np.array(body.com.position) - point
@@ -38,7 +40,7 @@ def _about(body: Inertia, point: np.ndarray) -> np.ndarray:
 
 
 def _tensor(body: Inertia) -> np.ndarray:
-    """The tensor (3, 3) about the centre of mass, in the axes of `com`."""
+    """Returns the tensor (3, 3) about the centre of mass, in the axes of `com`."""
     return np.array(
         [
             [body.ixx, body.ixy, body.ixz],
@@ -54,12 +56,15 @@ def _matrix(q: Quaternion) -> np.ndarray:
 
 
 def is_positive_definite(inertia: Inertia) -> bool:
-    """Returns whether mass and tensor are those of a body that an engine can turn about any axis."""
+    """Returns whether mass and tensor are positive (definite), so that a body can turn about any axis."""
     return inertia.mass > 0.0 and bool(np.linalg.eigvalsh(_tensor(inertia)).min() > 0.0)
 
 
 def tensor_in(inertia: Inertia, orientation: Quaternion) -> np.ndarray:
-    """The tensor (3, 3) about the centre of mass, in the axes that `orientation` of the link is given in."""
+    """Returns the tensor (3, 3) about the centre of mass, in the axes in which `orientation` is given.
+
+    `orientation` is that of the link.
+    """
     rotation = _matrix(orientation) @ _matrix(inertia.com.orientation)
     return rotation @ _tensor(inertia) @ rotation.T
 
@@ -67,15 +72,13 @@ def tensor_in(inertia: Inertia, orientation: Quaternion) -> np.ndarray:
 def link_poses(
     model: ModelDescription, root: Pose, positions: Mapping[str, float]
 ) -> dict[str, Pose]:
-    """Returns the frame of every link, in the frame that `root`, the root link's, is given in.
+    """Returns the frame of every link, in the frame in which `root`, the root link's, is given.
 
-    `positions` are those of the movable joints [rad, m]; one that isn't named is at zero.
+    `positions` are those of the movable joints [rad, m]; a joint that isn't named is at zero.
     """
     poses = {model.root: root}
     poses.update({name: root.compose(pose) for name, pose in model.islands.items()})
-    below: dict[str, list[Joint]] = defaultdict(list)
-    for joint in model.joints.values():
-        below[joint.parent].append(joint)
+    below = model.joints_by_parent()
     order = list(poses)
     for parent in order:
         for joint in below[parent]:
@@ -96,9 +99,9 @@ def _motion(joint: Joint, position: float) -> Pose:
 
 
 def effective_inertias(model: ModelDescription, poses: Mapping[str, Pose]) -> dict[str, float]:
-    """Returns for each movable joint effort / acceleration [kg m², kg], all other joints being free.
+    """Returns effort / acceleration [kg m², kg] of each movable joint while all others are free.
 
-    `poses` are those of the links, in the world.
+    `poses` are those of the links in the world.
     """
     parts = np.diag(mobility(model, poses))
     return {
@@ -112,9 +115,9 @@ def mobility(
     poses: Mapping[str, Pose],
     added: Mapping[str, float] = MappingProxyType({}),
 ) -> np.ndarray:
-    """Returns what accelerations of the movable joints (n, n) a unit of effort on one of them gives.
+    """Returns the accelerations of the movable joints for unit efforts: the inverse mass matrix (n, n).
 
-    `added` are inertias [kg m², kg] of joints themselves, by name.
+    `added` are inertias [kg m², kg] of the joints themselves, by name.
     """
     joints = model.movable_joints
     base = 0 if model.fixed_base else 6
@@ -136,9 +139,7 @@ def mobility(
 def poses_at_zero(model: ModelDescription) -> dict[str, Pose]:
     """Returns the poses of the links, seen from the root, with all joints at zero."""
     poses = {model.root: Pose()}
-    below = defaultdict(list)
-    for joint in model.joints.values():
-        below[joint.parent].append(joint)
+    below = model.joints_by_parent()
     todo = [model.root]
     for name in todo:
         for joint in below[name]:
@@ -148,11 +149,11 @@ def poses_at_zero(model: ModelDescription) -> dict[str, Pose]:
 
 
 def most_inertias(model: ModelDescription) -> dict[str, float]:
-    """Returns for each movable joint the inertia [kg m², kg] of all that it carries, stretched out: in no
-    pose has an effort on it to move more."""
-    below = defaultdict(list)
-    for joint in model.joints.values():
-        below[joint.parent].append(joint)
+    """Returns the largest inertia [kg m², kg] that an effort on each movable joint has to move in any pose.
+
+    It is that of all that the joint carries, stretched out.
+    """
+    below = model.joints_by_parent()
     return {joint.name: _stretched(model, below, joint) for joint in model.movable_joints}
 
 
@@ -176,13 +177,13 @@ def _jacobian(
     link: str,
     point: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Linear velocity of `point` of `link` and angular velocity, (3, base + joints) each."""
+    """Returns linear velocity of `point` of `link`, and angular velocity, (3, base + joints) each."""
     linear, angular = np.zeros((2, 3, base + len(joints)))
     if base:
         linear[:, :3] = angular[:, 3:6] = np.eye(3)
         arm = point - np.array(poses[model.root].position)
         linear[:, 3:6] = np.cross(np.eye(3), arm).T
-    carriers = _carriers(model, link)
+    carriers = {joint.name for joint in model.carriers(link)}
     for column, joint in enumerate(joints, start=base):
         if joint.name not in carriers:
             continue
@@ -194,12 +195,3 @@ def _jacobian(
             linear[:, column] = np.cross(axis, point - np.array(frame.position))
             angular[:, column] = axis
     return linear, angular
-
-
-def _carriers(model: ModelDescription, link: str) -> set[str]:
-    parents = {joint.child: joint for joint in model.joints.values()}
-    found = set()
-    while link in parents:
-        found.add(parents[link].name)
-        link = parents[link].parent
-    return found

@@ -1,4 +1,4 @@
-"""The interface between our physics world and the engine that integrates it."""
+"""What a physics engine has to do. To add one: subclasses of Engine and Body, named in `engines`."""
 
 import math
 from abc import ABC, abstractmethod
@@ -12,10 +12,17 @@ Twist = tuple[Vector, Vector]
 """Linear [m/s] and angular [rad/s] velocity in world axes."""
 
 
-class Side(NamedTuple):
-    """One of two bodies that touch: its link, and which of the link's collisions it may be, by name.
+FURTHEST = math.pi
+"""The largest motion [rad, m] in a step of a joint, or of a free base that carries joints. Beyond half a turn
+a rotation has no direction, and explicit terms, such as centrifugal forces, add energy."""
+FASTEST = 1e9
+"""The largest velocity [rad/s, m/s] of a body without joints, and of a motor."""
 
-    An engine that knows the very collision names one.
+
+class Side(NamedTuple):
+    """One of two bodies that touch.
+
+    `collisions` names the link's collisions that may touch: just one if the engine knows which.
     """
 
     body: "Body"
@@ -35,22 +42,15 @@ class Contact(NamedTuple):
     second: Side
 
 
-FURTHEST = math.pi
-"""The way [rad, m] that a joint, or a free base that carries joints, goes in a step at most. Beyond half a
-turn a rotation has no direction, and what acts explicitly, as centrifugal forces do, feeds energy in."""
-FASTEST = 1e9
-"""The velocity [rad/s, m/s] of a body without joints at most, and the one that a motor can be asked for."""
-
-
 class Body(ABC):
-    """A model inside the engine. Joints are the movable ones, in document order."""
+    """A model in the engine. Its joints are the movable ones, in document order."""
 
     implicit_damping: ClassVar[bool]
-    """Whether the damping of joints acts on their velocity after the step, not before it."""
+    """Whether joint damping acts on the velocity after the step, instead of before it."""
     joint_names: tuple[str, ...]
     link_names: tuple[str, ...]
     moved = True
-    """Whether something but time has moved it since this was set to False."""
+    """Whether something other than time has moved it since this was set to False."""
 
     @abstractmethod
     def joint_states(self) -> Sequence[Sequence[float]]:
@@ -71,12 +71,14 @@ class Body(ABC):
 
     @abstractmethod
     def set_inertia(self, link: str, old: Inertia | None, new: Inertia) -> bool:
-        """Gives `link` another inertia. False, and nothing done, if that takes loading the model anew."""
+        """Gives `link` another inertia. Returns False, and does nothing, if the model has to be reloaded."""
 
     @abstractmethod
     def set_damping(self, index: int, damping: float) -> None:
-        """Sets the viscous damping [N m s/rad, N s/m] of joint `index`. It acts explicitly: beyond the
-        joint's inertia / time step it would drive instead of damp."""
+        """Sets the viscous damping [N m s/rad, N s/m] of joint `index`.
+
+        Where it acts explicitly, more than inertia / time step would drive the joint instead of damping it.
+        """
 
     @abstractmethod
     def set_limits(self, index: int, lower: float, upper: float) -> None:
@@ -84,18 +86,18 @@ class Body(ABC):
 
     @abstractmethod
     def set_motor(self, index: int, velocity: float, effort: float) -> None:
-        """Lets a motor of at most `effort` [N m, N] drive joint `index` at `velocity` [rad/s, m/s].
+        """Has a motor drive joint `index` at `velocity` [rad/s, m/s] with at most `effort` [N m, N].
 
-        At velocity 0 that is dry friction.
+        At velocity 0 it is dry friction.
         """
 
     @abstractmethod
     def set_friction(self, link: str, factor: float) -> None:
-        """Gives the collisions of `link` so many times the friction that they were loaded with."""
+        """Multiplies the friction that the collisions of `link` were loaded with by `factor`."""
 
     @abstractmethod
     def reset_joint(self, index: int, position: float, velocity: float = 0.0) -> None:
-        """Puts joint `index` at `position` with `velocity`, without touching the other joints."""
+        """Puts joint `index` at `position` with `velocity`; the other joints stay."""
 
     @abstractmethod
     def reset_base(self, pose: Pose, twist: Twist = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))) -> None:
@@ -121,7 +123,7 @@ class Body(ABC):
 class Engine(ABC):
     """A dynamics engine with velocity-stepped articulated bodies.
 
-    A velocity beyond FURTHEST in a step, or FASTEST, is cut before positions follow it.
+    Velocities are cut at FURTHEST in a step, or at FASTEST, before they are integrated.
     """
 
     @abstractmethod
@@ -137,10 +139,10 @@ class Engine(ABC):
         """Takes a body out of the world."""
 
     def renewed(self, bodies: Sequence[tuple[ModelDescription, Body]]) -> list[Body]:
-        """Returns what to go on with instead of `bodies`, which are all there are, in the same state.
+        """Returns bodies in the same state to use instead of `bodies`, which are all of the world's.
 
-        To be called before a model is loaded. An engine that can't free all that removed bodies have taken
-        begins anew once that has become much; motors and dampings have to be set again then.
+        The world calls it before it loads a model. An engine that can't free the memory of removed bodies
+        moves into a new world now and then; motors and dampings then have to be set again.
         """
         return [body for _, body in bodies]
 
@@ -154,17 +156,17 @@ class Engine(ABC):
 
     @abstractmethod
     def set_iterations(self, count: int) -> None:
-        """Sets how often the solver of contacts, stops and motors goes over them in a step."""
+        """Sets the number of iterations of the solver in a step."""
 
     @abstractmethod
     def step(self) -> None:
         """Integrates the world by one time step."""
 
     def forget_contacts(self) -> None:
-        """Takes bodies for never having touched: the next step goes by where they are, not where they were.
+        """Forgets contacts of earlier steps, so that an episode depends on nothing before it.
 
-        To be called when an episode begins, before bodies are placed. An engine that remembers nothing of
-        contacts from one step to the next has nothing to do.
+        It is called when an episode begins, before bodies are placed. An engine that keeps no contacts from
+        one step to the next has nothing to do.
         """
 
     @abstractmethod

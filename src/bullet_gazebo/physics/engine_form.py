@@ -1,4 +1,4 @@
-"""The form that the engine takes a model in: each link's frame is that of the joint that carries it."""
+"""Prepares a model for an engine: checks bounds, moves link frames onto joints, sets one friction a link."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -13,17 +13,17 @@ MOST_JOINTS = 127  # of one body in PyBullet, fixed ones included
 MOST_COORDINATES = 128  # a free base has 7
 FREE_BASE = 7
 MOST_SHAPES = 5000  # beyond that, PyBullet takes seconds to load a model
-FURTHEST = 1e7  # [m], of anything in a model
+FURTHEST = 1e7  # [m]; no length in a model may be larger
 MASSES = (1e-9, 1e9)  # [kg]
 LARGEST_MOMENT = 1e15  # [kg m²]
 STRONGEST = 1e12  # damping [N m s/rad, N s/m] and friction [N m, N]
 
 
 def check_bounds(model: ModelDescription) -> None:
-    """Refuses a model that no engine takes.
+    """Refuses a model that would crash or hang an engine, or make it lose the world.
 
     Raises:
-        DescriptionError: if `model` is beyond what the engine takes; it names the place.
+        DescriptionError: if a value is out of bounds; it names the place.
     """
     _check_counts(model)
     for link in model.links.values():
@@ -43,7 +43,7 @@ def _check_counts(model: ModelDescription) -> None:
 
 
 def check_shapes(links: Iterable[Link]) -> None:
-    """Refuses links with too many shapes; before they are lumped, which would take long, and after it.
+    """Refuses links with too many shapes. It is called before lumping, which would take long, and after it.
 
     Raises:
         DescriptionError: if there are more than MOST_SHAPES.
@@ -107,13 +107,14 @@ def _check_joint(joint: Joint) -> None:
 
 
 def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose]]:
-    """Returns the model with link frames moved onto their joints, and where the links' own frames are.
+    """Returns the model with link frames moved onto their joints.
 
-    The second result, by link name, holds the frames that were moved, as seen from the new ones; it is
-    empty for a model that has that form already, as every URDF has.
+    Returns:
+        The model, and by link name the original frames as seen from the new ones, where they differ. Every
+        URDF has that form already.
 
     Raises:
-        DescriptionError: if the engine can't compute with it.
+        DescriptionError: if a value is out of bounds.
     """
     if model.static:
         model = _rigid(model)
@@ -132,10 +133,10 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
 
 
 def one_friction_each(model: ModelDescription) -> ModelDescription:
-    """Returns the model with each link's collisions alike in friction: the engine has one figure for a
-    link. Other ones, a caster's under a base, go to massless links that are fixed to it.
+    """Returns the model with one friction for each link, as PyBullet has it.
 
-    Beyond what the engine takes, a link keeps its first collision's.
+    Collisions with another friction, such as a caster's under a base, move to massless links that are fixed
+    to theirs. Where there would be too many links, the first collision's friction counts.
     """
     pieces = [piece for link in model.links.values() for piece in _pieces(link)]
     if len(model.joints) + len(pieces) > MOST_JOINTS:
@@ -151,7 +152,7 @@ def one_friction_each(model: ModelDescription) -> ModelDescription:
 
 
 def _pieces(link: Link) -> list[Link]:
-    """One link for each friction of `link` but the first."""
+    """Returns a link for each friction of `link` but the first."""
     groups: dict[float, list[Shape]] = defaultdict(list)
     for shape in link.collisions:
         groups[shape.mu].append(shape)
@@ -167,18 +168,16 @@ def _pieces(link: Link) -> list[Link]:
 
 
 def parents_first(model: ModelDescription) -> ModelDescription:
-    """Returns the model with each link after the one that carries it: the engine crashes otherwise."""
-    below = defaultdict(list)
-    for joint in model.joints.values():
-        below[joint.parent].append(joint.child)
+    """Returns the model with each link after its parent: PyBullet crashes otherwise."""
+    below = model.joints_by_parent()
     order = [model.root]
     for name in order:
-        order.extend(below[name])  # the list grows while it is walked
+        order.extend(joint.child for joint in below[name])  # the list grows while it is walked
     return replace(model, links={name: model.links[name] for name in order})
 
 
 def _rigid(model: ModelDescription) -> ModelDescription:
-    """A static model: all its joints fixed, and its islands fixed to the root."""
+    """Returns a static model with all joints fixed, and its islands fixed to the root."""
     joints = {
         name: replace(joint, kind="fixed", anchor=Pose()) for name, joint in model.joints.items()
     }

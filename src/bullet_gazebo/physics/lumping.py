@@ -1,7 +1,8 @@
-"""Fixed-joint lumping, as sdformat does it when Gazebo loads a URDF (docs/contract/gazebo.md 2.4).
+"""The tree of links and joints, and its fixed joints, lumped as sdformat does for a URDF.
 
-The child of a fixed joint melts into its parent: inertia, shapes and the joints below it move up, and
-its name is gone. A root link called `world` stands for the world itself. Links without mass are dropped.
+See docs/contract/gazebo.md 2.4. The child of a fixed joint becomes part of its parent: its inertia, shapes
+and the joints below it move up, and its name disappears. A root link called `world` is the world itself.
+Links without mass are dropped.
 """
 
 from collections import defaultdict
@@ -20,16 +21,20 @@ from bullet_gazebo.physics.description import (
 from bullet_gazebo.physics.dynamics import combine, is_positive_definite
 from bullet_gazebo.physics.pose import Pose
 
-MAX_LINKS = 1000  # in the file; robots have some hundreds, and melting fixed joints is quadratic
+MAX_LINKS = 1000  # in the file; robots have some hundreds, and lumping takes quadratic time
 
 Named = TypeVar("Named", Link, Joint)
+
+
+WORLD = "world"
+LUMPED = "_fixed_joint_lump__"
 
 
 def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
     """Returns `items` by name.
 
     Raises:
-        DescriptionError: for a name that is there twice.
+        DescriptionError: if two have the same name.
     """
     found: dict[str, Named] = {}
     for item in items:
@@ -40,7 +45,7 @@ def unique(items: Iterable[Named], what: str) -> dict[str, Named]:
 
 
 def check_count(links: int) -> None:
-    """Refuses a model of too many links, before time is spent on them.
+    """Refuses a model with too many links, before time is spent on them.
 
     Raises:
         DescriptionError: if there are more than MAX_LINKS.
@@ -50,7 +55,7 @@ def check_count(links: int) -> None:
 
 
 def find_roots(links: dict[str, Link], joints: dict[str, Joint]) -> list[str]:
-    """Returns the links that are nobody's child, in document order; all others hang from one of them.
+    """Returns the links without a parent joint, in document order; all others hang from one of them.
 
     Raises:
         DescriptionError: for missing links, a link with two parents, and loops.
@@ -88,12 +93,8 @@ def _children(links: dict[str, Link], joints: dict[str, Joint]) -> dict[str, lis
     return below
 
 
-WORLD = "world"
-LUMPED = "_fixed_joint_lump__"
-
-
 def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
-    """Returns `model` with its fixed joints lumped and its massless links gone (changed in place)."""
+    """Lumps fixed joints and drops massless links, in place; returns `model`."""
     detach_from_world(model)
     lumped = [j.name for j in model.joints.values() if j.kind == "fixed" and not j.kept]
     for name in lumped[::-1]:
@@ -109,7 +110,7 @@ def lump_fixed_joints(model: ModelDescription) -> ModelDescription:
 
 
 def _named(link: Link, shapes: list[Shape], suffix: str) -> list[Shape]:
-    """Names shapes as sdformat does: after themselves or their link, numbered from the second one on."""
+    """Names shapes as sdformat does: by their own or their link's name, numbered from the second one on."""
     names = []
     for count, shape in enumerate(shapes):
         stem = link.name + shape.name if shape.name.startswith(LUMPED) else shape.name or link.name
@@ -118,7 +119,7 @@ def _named(link: Link, shapes: list[Shape], suffix: str) -> list[Shape]:
 
 
 def detach_from_world(model: ModelDescription) -> None:
-    """A single fixed joint from the link `world` makes the model's base immovable; `world` is dropped."""
+    """Fixes the base of a model whose root is the link `world`; with a single fixed joint, drops `world`."""
     if model.root != WORLD:
         return
     anchors = [joint for joint in model.joints.values() if joint.parent == WORLD]
@@ -157,7 +158,7 @@ def _lumped(shape: Shape, pose: Pose, link: str) -> Shape:
 
 
 def _drop_free_joints(model: ModelDescription) -> None:
-    """Gazebo makes no joint of a floating or planar one; a robot that hangs from the world by it is free."""
+    """Drops a floating or planar joint to the world, as Gazebo does: the robot has a free base."""
     for joint in [j for j in model.joints.values() if not j.movable and not j.kept]:
         if (
             not joint.parent == model.root == WORLD
@@ -171,9 +172,9 @@ def _drop_free_joints(model: ModelDescription) -> None:
 
 
 def mend_moments(model: ModelDescription) -> None:
-    """Gives links whose moments no body has, all of them 0 for the most part, those that ODE gives them: 1.
+    """Replaces moments of inertia that no body has (mostly zeros) by 1 kg m², as ODE does.
 
-    With the file's own the world would be lost to the first step.
+    With those of the file the first step would give NaN.
     """
     for link in model.links.values():
         inertia = link.inertia

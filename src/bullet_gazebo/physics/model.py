@@ -1,4 +1,4 @@
-"""A model in the world: a description, a body in the engine, and where it stands."""
+"""A model in the world: its description, its body in the engine, and its state."""
 
 from collections.abc import Mapping
 from math import isfinite
@@ -16,11 +16,11 @@ AT_REST: Twist = (ZERO, ZERO)
 
 
 class Model:
-    """One model. Its frame is the one it was spawned in; the root link stands in it at `root_pose`."""
+    """A model. Its frame is the one that it was spawned in; the root link is in it at `root_pose`."""
 
     def __init__(self, name: str, description: ModelDescription, body: Body, pose: Pose) -> None:
         self.name = name
-        self.number = 0  # the world's, of this very model: another one of its name has another
+        self.number = 0  # unique in the world, also among models that have had the same name
         self.description = description
         self.body = body
         self.initial_pose = pose
@@ -33,7 +33,7 @@ class Model:
 
     @property
     def link_names(self) -> list[str]:
-        """Names of the links that Gazebo would show: all but a massless `world`."""
+        """Names of the links that Gazebo shows: all but a massless `world`."""
         return [name for name in self.body.link_names if name != WORLD]
 
     @property
@@ -43,13 +43,13 @@ class Model:
 
     @property
     def all_joints(self) -> list[str]:
-        """Names of all joints that Gazebo would list, fixed ones included."""
+        """Names of all joints that Gazebo lists, fixed ones included."""
         anchors = [name for name in self.description.world_joints if name != WORLD]
         others = [name for name in self.description.joints if name not in anchors]
         return anchors + others
 
     def joint_index(self, name: str) -> int:
-        """Returns the place of a movable joint in the body's list.
+        """Returns the index of a movable joint in the body.
 
         Raises:
             KeyError: if there is no such joint.
@@ -62,12 +62,8 @@ class Model:
 
     def carriers(self, link: str) -> list[str]:
         """Names of the movable joints between the root and `link`, from the root on."""
-        found: list[str] = []
-        parents = {joint.child: joint for joint in self.description.joints.values()}
-        while link in parents:
-            found.insert(0, parents[link].name)
-            link = parents[link].parent
-        return [name for name in found if name in self._joints]
+        joints = self.description.carriers(link)
+        return [joint.name for joint in joints if joint.name in self._joints]
 
     def link_state(self, name: str) -> tuple[Pose, Twist]:
         """Returns pose and twist of the frame of link `name`, in world axes."""
@@ -98,9 +94,9 @@ class Model:
         return state[0], state[1]
 
     def set_joint_positions(self, positions: Mapping[str, float]) -> None:
-        """Puts joints at `positions` [rad, m], clamped to their limits, at rest with all they carry.
+        """Puts joints at `positions` [rad, m], clamped to their limits, at rest with all that they carry.
 
-        Unknown names are ignored and joints are taken in order of name (docs/contract/gazebo.md 2.16).
+        Unknown names are ignored, and joints are set in order of name (docs/contract/gazebo.md 2.16).
         """
         for name in sorted(set(positions) & set(self._joints)):
             joint = self.description.joints[name]
@@ -108,7 +104,7 @@ class Model:
             self._rest(self._below(joint.child))
 
     def set_joint_velocities(self, velocities: Mapping[str, float]) -> None:
-        """Lets joints move at `velocities` [rad/s, m/s] from where they are; unknown names are ignored."""
+        """Sets the `velocities` [rad/s, m/s] of joints; unknown names are ignored."""
         states = self.body.joint_states()
         for name in sorted(set(velocities) & set(self._joints)):
             index = self._joints[name]
@@ -122,7 +118,7 @@ class Model:
         return max(joint.lower, min(joint.upper, position))
 
     def set_stops(self, name: str, lower: float | None, upper: float | None) -> None:
-        """Sets a joint's stops [rad, m]; None leaves one. Crossed stops are none, as in ODE."""
+        """Sets a joint's stops [rad, m]; None keeps one. Crossed stops don't act, as in ODE."""
         joint = self.description.joints[name]
         if not joint.bounded:
             joint.kind, joint.lower, joint.upper = "revolute", -NO_STOP, NO_STOP
@@ -131,9 +127,9 @@ class Model:
         self.body.set_limits(self._joints[name], joint.lower, joint.upper)
 
     def set_motor(self, name: str, velocity: float | None, effort: float | None) -> None:
-        """Sets speed [rad/s, m/s] and most effort [N m, N] of a joint's own motor; None leaves one.
+        """Sets speed [rad/s, m/s] and maximum effort [N m, N] of a joint's own motor; None keeps one.
 
-        ODE's dry friction is such a motor of speed 0, so a new effort takes the friction's place.
+        ODE's dry friction is such a motor at speed 0, so a new effort replaces the friction.
         """
         old = self._motors.get(name, (0.0, self.description.joints[name].friction))
         speed = old[0] if velocity is None else velocity
@@ -142,14 +138,14 @@ class Model:
         self.body.set_motor(self._joints[name], *self._motors[name])
 
     def set_friction(self, link: str, factor: float) -> None:
-        """Gives the collisions of `link` so many times the friction of its file."""
+        """Multiplies the friction of the file for the collisions of `link` by `factor`."""
         self._grip[link] = factor
         self.body.set_friction(link, factor)
 
     def apply_damping(self, time_step: float) -> None:
-        """Hands the joints' damping to the engine, which would blow up if it were stiffer than a step.
+        """Sets the joints' damping in the engine, cut where a step of `time_step` [s] couldn't follow it.
 
-        Where that begins is taken with all joints at zero: it must not depend on what was before.
+        The bound is that with all joints at zero, so that it doesn't depend on the history.
         """
         self.time_step = time_step
         joints = self.description.joints
@@ -166,14 +162,18 @@ class Model:
             self.body.set_damping(self._joints[name], self._damped[name])
 
     def add_damping(self, added: Mapping[str, float]) -> None:
-        """Damps joints by [N m s/rad, N s/m] beside what the file says, in place of what was added before."""
+        """Adds damping [N m s/rad, N s/m] to the file's, replacing what was added before."""
         if added != self.damping_added:
             self.damping_added = added
             self.apply_damping(self.time_step)
 
     def calm(self, kept: Mapping[str, float]) -> None:
-        """Leaves joints the given share of their speeds, puts them onto stops that they are beyond, and
-        stills a free base that spins."""
+        """Calms a robot that has blown up.
+
+        Args:
+            kept: the share of their speed that joints keep, by name. Joints beyond a stop are put onto it,
+                and a free base stops spinning.
+        """
         states = self.joint_states()
         for name, share in kept.items():
             position, speed = (x if isfinite(x) else 0.0 for x in states[self._joints[name]])
@@ -184,7 +184,7 @@ class Model:
                 self.body.reset_base(pose, (linear, ZERO))
 
     def move_into(self, body: Body) -> None:
-        """Goes on in another body of the engine, loaded from the same description, in the same state."""
+        """Moves its state into another body of the engine, of the same description, and uses that."""
         pose, twist = self.root_state()
         states = self.joint_states()
         body.reset_base(pose, twist)
@@ -193,7 +193,7 @@ class Model:
         self.go_on_in(body)
 
     def go_on_in(self, body: Body) -> None:
-        """Goes on in another body of the engine, which is in the same state already."""
+        """Uses another body of the engine, which is in the same state already."""
         self.body = body
         for name, motor in self._motors.items():
             body.set_motor(self._joints[name], *motor)
@@ -207,7 +207,7 @@ class Model:
         return [(state[0], state[1]) for state in self.body.joint_states()]
 
     def rest_joints(self) -> None:
-        """Takes the velocity out of all joints; the root link keeps its own."""
+        """Stops all joints; the root link keeps its velocity."""
         self._rest(list(self._joints))
 
     def reset(self, joints: bool) -> None:
@@ -226,5 +226,5 @@ class Model:
 
     def _below(self, link: str) -> list[str]:
         """Names of the joints on the child side of `link`."""
-        below = [j for j in self.description.joints.values() if j.parent == link]
+        below = self.description.joints_by_parent()[link]
         return [name for joint in below for name in (joint.name, *self._below(joint.child))]

@@ -1,7 +1,7 @@
-"""Places one link of an articulated model, as near as its joints allow.
+"""Places one link of an articulated model, as near to the wanted pose as its joints allow.
 
-Gazebo's links are free bodies that joints pull back together; PyBullet's can't come apart. So a wanted pose
-is projected onto the joints that carry the link, and a wanted velocity onto their speeds.
+Gazebo's links are free bodies, which joints pull back together; PyBullet's can't come apart. So the pose is
+projected onto the joints that carry the link, and the velocity onto their speeds.
 """
 
 import math
@@ -13,8 +13,8 @@ from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.pose import Pose, conjugate, multiply, subtract
 
 ITERATIONS = 30
-CLOSE = 1e-10  # [m, rad]; smaller corrections are none
-LONGEST = 0.5  # [rad] of a joint in one iteration: a linearised rotation holds no further
+CLOSE = 1e-10  # [m, rad]; no smaller corrections are made
+LONGEST = 0.5  # [rad] of a joint in one iteration: a linearised rotation is valid no further
 
 
 def place_link(model: Model, link: str, pose: Pose, twist: Twist) -> None:
@@ -61,7 +61,7 @@ def _match(model: Model, carriers: list[str], link: str, twist: Twist) -> None:
 
 
 def _jacobian(model: Model, carriers: list[str], link: str) -> np.ndarray:
-    """The link's velocity (6,) for each carrier's unit speed (n): the engine itself tells, exactly."""
+    """Returns the link's velocity for unit speed of each carrier (6, n), exactly as the engine has it."""
     speeds = [model.joint_state(name)[1] for name in carriers]
     _speed_up(model, carriers, np.zeros(len(carriers)))
     rest = np.array(sum(model.link_state(link)[1], ()))
@@ -80,7 +80,7 @@ def _speed_up(model: Model, carriers: list[str], speeds: np.ndarray) -> None:
 
 
 def _rotation(now: Pose, wanted: Pose) -> tuple[float, float, float]:
-    """The rotation vector [rad] in world axes that turns `now` into `wanted`, the short way."""
+    """Returns the shortest rotation [rad], a vector in world axes, from `now` to `wanted`."""
     x, y, z, w = multiply(wanted.orientation, conjugate(now.orientation))
     length = math.sqrt(x * x + y * y + z * z)
     if length < 1e-15:

@@ -12,12 +12,12 @@ GAZEBO_INERTIA = Inertia(mass=1.0, ixx=1.0, iyy=1.0, izz=1.0)  # of a link that 
 
 
 class PropertyError(ValueError):
-    """A property that no body can have; the text says which and why."""
+    """No body can have a property; the text says which and why."""
 
 
 @dataclass(frozen=True)
 class JointProperties:
-    """What of a joint is to change; None leaves it. [N m s/rad, N s/m], [rad, m], [N m, N], [rad/s, m/s]."""
+    """New properties of a joint; None keeps one. [N m s/rad, N s/m], [rad, m], [N m, N], [rad/s, m/s]."""
 
     damping: float | None = None
     lower: float | None = None
@@ -27,17 +27,17 @@ class JointProperties:
 
 
 def link_inertia(model: Model, link: str) -> Inertia:
-    """Returns mass, centre of mass and tensor of a link, as Gazebo would tell them."""
+    """Returns mass, centre of mass and tensor of a link, as Gazebo reports them."""
     return model.description.links[link].inertia or GAZEBO_INERTIA
 
 
 def set_link_properties(
     world: World, model: Model, link: str, inertia: Inertia, gravity: bool
 ) -> None:
-    """Gives a link another inertia and gravity mode. A static one keeps them without effect.
+    """Sets a link's inertia and gravity mode. They have no effect on a static model.
 
     Raises:
-        PropertyError: if no body can have them; the world is as it was then.
+        PropertyError: if no body can have them; nothing changes then.
     """
     if not is_positive_definite(inertia):
         raise PropertyError(
@@ -52,17 +52,17 @@ def set_link_properties(
 def set_joint_properties(
     model: Model, name: str, wanted: JointProperties, time_step: float
 ) -> None:
-    """Changes a joint's damping, stops and motor, as far as `wanted` names them.
+    """Changes a joint's damping, stops and motor, as far as they are given.
 
     Raises:
-        PropertyError: if no joint can have them; the joint is as it was then.
+        PropertyError: if no joint can have them; nothing changes then.
     """
     if wanted.damping is not None and wanted.damping < 0.0:
         raise PropertyError(f"a damping of {wanted.damping} would drive the joint; it must be >= 0")
     if wanted.motor_effort is not None and wanted.motor_effort < 0.0:
         raise PropertyError(f"fmax is {wanted.motor_effort}; it must be >= 0")
     if name not in model.joint_names:
-        return  # a fixed joint: there is nothing that could move
+        return  # a fixed joint has none of them
     if wanted.damping is not None:
         model.description.joints[name].damping = wanted.damping
         model.apply_damping(time_step)
@@ -73,7 +73,7 @@ def set_joint_properties(
 
 
 def set_link_friction(model: Model, link: str, factor: float) -> None:
-    """Gives the collisions of a link so many times the friction of its file.
+    """Multiplies the friction of the file for the collisions of a link by `factor`.
 
     Raises:
         PropertyError: if it is negative, or not finite.

@@ -15,12 +15,16 @@ from bullet_gazebo.physics.engine import Engine, Twist
 from bullet_gazebo.physics.model import AT_REST, Model
 from bullet_gazebo.physics.pose import Pose, Vector, conjugate, rotate, subtract
 
+GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
+TIME_STEP = 0.001  # [s], Gazebo's default
+WORLD_FRAMES = ("", "world", "map", "/map")
+
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """ODE's figures, with sdformat's defaults (docs/contract/gazebo.md 2.20).
+    """ODE's solver parameters, with sdformat's defaults (docs/contract/gazebo.md 2.20).
 
-    PyBullet's solver is another one: only `iterations` acts on it. The others are kept for who reads them.
+    Our engines have other solvers: only `iterations` has an effect. Clients read the others back.
     """
 
     auto_disable_bodies: bool = False
@@ -34,19 +38,14 @@ class SolverSettings:
     max_contacts: int = 20
 
 
-GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
-TIME_STEP = 0.001  # [s], Gazebo's default
-WORLD_FRAMES = ("", "world", "map", "/map")
-
-
 class NameTaken(ValueError):
-    """A model of that name is in the world already."""
+    """The world already has a model of that name."""
 
 
 class Entity(NamedTuple):
-    """What a name stands for: `kind` is model, link, collision or joint; `name` is plain.
+    """What a name refers to: `kind` is model, link, collision or joint; `name` is plain.
 
-    `link` is the link that a collision belongs to.
+    `link` is the link of a collision.
     """
 
     kind: str
@@ -56,7 +55,7 @@ class Entity(NamedTuple):
 
 
 class World:
-    """All models and the engine under them. Not thread-safe: its owner serialises access."""
+    """All models, and the engine that simulates them. Not thread-safe: its owner serialises access."""
 
     def __init__(
         self, engine: Engine, gravity: Vector = GRAVITY, time_step: float = TIME_STEP
@@ -133,7 +132,7 @@ class World:
         return pose.compose(entity.model.collisions(entity.link)[entity.name].pose), twist
 
     def is_world_frame(self, name: str) -> bool:
-        """Returns whether `name` stands for the world itself: an entity of that name goes first."""
+        """Returns whether `name` refers to the world itself: an entity of that name takes precedence."""
         return name in WORLD_FRAMES and name not in self._entities
 
     def set_gravity(self, gravity: Vector) -> None:
@@ -149,7 +148,7 @@ class World:
             model.apply_damping(time_step)
 
     def set_solver(self, solver: SolverSettings) -> None:
-        """Keeps the solver's settings; the number of iterations acts."""
+        """Stores the solver's settings, and sets the engine's number of iterations."""
         self.solver = solver
         self.engine.set_iterations(solver.iterations)
 
@@ -190,7 +189,7 @@ class World:
         self.engine.close()
 
     def _renew(self) -> None:
-        """Lets the engine free what removed bodies have left behind."""
+        """Lets the engine free the memory of removed bodies."""
         models = list(self.models.values())
         bodies = self.engine.renewed([(model.description, model.body) for model in models])
         for model, body in zip(models, bodies, strict=True):
@@ -198,8 +197,10 @@ class World:
                 model.go_on_in(body)
 
     def _index(self, *models: Model) -> None:
-        """After models came or went: maps plain and scoped names to what a depth-first walk from the world's
-        root finds first. What came last is found last, so it takes no look at the others."""
+        """Maps plain and scoped names of new models to what a depth-first search from the world's root finds.
+
+        It finds new models last, so existing entries stay.
+        """
         self.version += 1
         for model in models:
             self._entities.setdefault(model.name, Entity("model", model, model.name))

@@ -33,7 +33,7 @@ class Rig:
         self.manager = ControllerManager(self.hardware)
         self.told = []
         robot = ControlledRobot(
-            self.model, self.hardware, self.manager, tell=lambda *told: self.told.append(told)
+            self.model, self.hardware, self.manager, log=lambda *entry: self.told.append(entry)
         )
         self.sim.add_robot(robot)
 

@@ -65,7 +65,7 @@ def test_the_check_finds_what_it_looks_for(tmp_path: Path) -> None:
 @pytest.mark.parametrize("scheme", ["http", "https", "ftp"])
 def test_nothing_is_fetched_from_a_network(entity: str, scheme: str) -> None:
     uri = f"{scheme}://127.0.0.1:9/thing.stl"
-    with pytest.raises(DescriptionError, match=f"{scheme}:// is not read here"):
+    with pytest.raises(DescriptionError, match=f"{scheme}:// is not supported"):
         spawn(entity.format(uri))
 
 

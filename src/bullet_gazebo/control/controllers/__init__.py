@@ -1,6 +1,13 @@
-"""The controllers, by the type name that a parameter file gives them."""
+"""The controllers, by the type name that a parameter file gives them.
 
-from bullet_gazebo.control.controllers.base import Controller
+To add one: a module beside this one, and its class in BUILT_IN. Users write their own as `type:
+my_package/MyController`, a Python class (docs/controllers.md).
+"""
+
+import importlib
+import importlib.util
+
+from bullet_gazebo.control.controllers.base import Controller, Input, Output
 from bullet_gazebo.control.controllers.forward import (
     EffortGroup,
     EffortJoint,
@@ -21,6 +28,9 @@ from bullet_gazebo.control.controllers.pid_controllers import (
     EffortJointVelocity,
     VelocityJointPosition,
 )
+from bullet_gazebo.control.errors import ControlError, faults
+
+__all__ = ["BUILT_IN", "Controller", "Input", "Output", "find_type"]
 
 BUILT_IN: dict[str, type[Controller]] = {
     controller.type_name: controller
@@ -41,3 +51,37 @@ BUILT_IN: dict[str, type[Controller]] = {
         VelocityTrajectory,
     )
 }
+
+
+def find_type(type_name: str) -> type[Controller] | None:
+    """Returns a user's controller: class `MyController` of module `my_package` for "my_package/MyController".
+
+    Returns:
+        None if there is no such module.
+
+    Raises:
+        ControlError: if the module can't be imported, or has no such subclass of Controller.
+    """
+    package, _, name = type_name.partition("/")
+    if not package.isidentifier() or not name.isidentifier():
+        return None
+    try:
+        spec = importlib.util.find_spec(package)
+        found = getattr(importlib.import_module(package), name, None) if spec else None
+    except faults() as error:
+        raise ControlError(f"controller type '{type_name}': {package} raised {error!r}") from error
+    if spec is None:
+        return None
+    where = f"{package} (of {spec.origin})"
+    if found is None:
+        raise ControlError(
+            f"controller type '{type_name}' does not exist: {where} has no class {name}"
+        )
+    if not isinstance(found, type) or not issubclass(found, Controller):
+        raise ControlError(
+            f"controller type '{type_name}': {name} of {where} is no subclass of "
+            "bullet_gazebo.control.controllers.base.Controller"
+        )
+    if getattr(found, "type_name", None) != type_name:
+        raise ControlError(f"controller type '{type_name}': its class must say so as type_name")
+    return found

@@ -1,4 +1,4 @@
-"""What a controller is: a life cycle, an update on each control tick, inputs and outputs."""
+"""The base of controllers: a life cycle, an update on each control tick, inputs and outputs."""
 
 import math
 from abc import ABC, abstractmethod
@@ -19,7 +19,7 @@ class Output:
     adapters convert: JointState, JointControllerState, ...
 
     `sink` takes the records, once a ROS adapter has set it. `listeners` returns the number of subscribers,
-    so that no record needs to be made for nobody.
+    so that a controller needs to make no record without any.
     """
 
     __slots__ = ("kind", "listeners", "shared", "sink", "topic")
@@ -33,21 +33,20 @@ class Output:
 
     @property
     def wanted(self) -> bool:
-        """Whether somebody hears what is given to `sink`, which there is then."""
+        """Whether there is a sink with listeners."""
         return self.sink is not None and self.listeners() > 0
 
     def send(self, record: Any) -> None:
-        """Gives a record to `sink`, if there is one."""
+        """Passes a record to `sink`, if there is one."""
         if self.sink is not None:
             self.sink(record)
 
 
 class Input:
-    """A topic that a controller reads, from load on.
+    """A topic that a controller subscribes to when it is loaded.
 
-    `kind` is Float64 (`receive` gets a number), Float64MultiArray (a sequence of numbers), or a ROS
-    message type (the message). `receive` is called between two ticks; if it raises ControlError, that
-    is told in the log.
+    `kind` is Float64 (`receive` takes a number), Float64MultiArray (a sequence of numbers), or a ROS message
+    type (the message). `receive` is called between two ticks; a ControlError that it raises is logged.
     """
 
     __slots__ = ("kind", "receive", "topic")
@@ -59,9 +58,9 @@ class Input:
 
 
 class Controller(ABC):
-    """One controller (docs/contract/ros_control.md 1 and 3). Times are in [ns], periods in [s].
+    """A controller (docs/contract/ros_control.md 1 and 3). Times are in [ns], periods in [s].
 
-    How to write one's own: docs/controllers.md.
+    docs/controllers.md explains how to write one.
     """
 
     type_name: ClassVar[str]
@@ -74,40 +73,38 @@ class Controller(ABC):
         self.inputs: list[Input] = []
         self.outputs: list[Output] = []
         self.pids: dict[str, Pid] = {}  # by namespace below the controller's; tunable while it runs
-        self.loops: list[
-            Loop
-        ] = []  # those whose gains a step of the physics must be able to follow
+        self.loops: list[Loop] = []  # whose gains the physics step must be able to follow
 
     @classmethod
     @abstractmethod
     def create(
         cls, name: str, params: Mapping[str, object], hardware: RobotHardware
     ) -> "Controller":
-        """Makes the controller from its parameters `<ns>/<name>`.
+        """Creates the controller from its parameters `<ns>/<name>`.
 
         Raises:
             ControlError: if a parameter or a joint is missing or wrong.
         """
 
     def starting(self, now: int) -> None:
-        """Called when the controller begins to run, and when a reset wants it to begin anew."""
+        """Called when the controller is started, and when a reset has it begin anew."""
 
     @abstractmethod
     def update(self, now: int, dt: float) -> None:
-        """One control tick."""
+        """Called on each control tick while the controller runs; it sets the joints' commands."""
 
     def stopping(self) -> None:
-        """Called when the controller ceases to run; the joint's command stays as it is."""
+        """Called when the controller is stopped; its joints keep their commands."""
 
     def joints_moved(self, now: int) -> None:
-        """Called when something other than time changed the joints' state."""
+        """Called when something other than time has changed the joints' state."""
 
 
 def text_param(params: Mapping[str, object], key: str, place: str) -> str:
     """Returns the string parameter `key`.
 
     Raises:
-        ControlError: if it is missing or no string.
+        ControlError: if it is missing or not a string.
     """
     value = params.get(key)
     if not isinstance(value, str) or not value:
@@ -119,7 +116,7 @@ def number_param(params: Mapping[str, object], key: str, place: str) -> float:
     """Returns the numeric parameter `key`.
 
     Raises:
-        ControlError: if it is missing or no finite number.
+        ControlError: if it is missing or not a finite number.
     """
     value = params.get(key)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
@@ -135,7 +132,7 @@ def joint_param(
     """Returns the joint that the parameter `joint` of controller `name` names.
 
     Raises:
-        ControlError: if there is none of that interface.
+        ControlError: if there is no such joint with that interface.
     """
     return hardware.joint(interface, text_param(params, "joint", name))
 
@@ -146,7 +143,7 @@ def joints_param(
     """Returns the joints that the parameter `joints` of controller `name` lists.
 
     Raises:
-        ControlError: if it is no list of joints of that interface, is empty, or repeats itself.
+        ControlError: if it isn't a list of joints with that interface, is empty, or names one twice.
     """
     names = params.get("joints")
     if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):

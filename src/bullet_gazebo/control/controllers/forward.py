@@ -1,4 +1,4 @@
-"""Controllers that hand their command to the joints as it is (docs/contract/ros_control.md 3.4)."""
+"""Controllers that forward their command to the joints (docs/contract/ros_control.md 3.4)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Self
@@ -12,7 +12,7 @@ from bullet_gazebo.control.joint import JointHandle
 class Forward(Controller):
     """Repeats the last command on each tick: positions [rad, m], velocities or efforts [N m, N].
 
-    It starts with the joints' positions, or with zeros.
+    It starts with the joints' positions for a position interface, else with zeros.
     """
 
     def __init__(self, name: str, joints: list[JointHandle]) -> None:
@@ -92,7 +92,11 @@ class VelocityGroup(ForwardGroup):
 
 
 def check_length(controller: Controller, values: Sequence[float], joints: int) -> None:
-    """Refuses a list of commands of the wrong length with a ControlError."""
+    """Checks the length of a list of commands.
+
+    Raises:
+        ControlError: if there isn't one for each joint.
+    """
     if len(values) != joints:
         raise ControlError(
             f"controller '{controller.name}' has {joints} joints, but {len(values)} commands came: ignored"

@@ -73,7 +73,7 @@ class JointStateController(Controller):
             self._report(now)
 
     def joints_moved(self, now: int) -> None:
-        """Reports at once: who reads the topic must not act on what is no longer true."""
+        """Reports at once, so that no reader of the topic acts on an old state."""
         if self._period is not None:
             self._last = now
             self._report(now)
@@ -95,7 +95,7 @@ class JointStateController(Controller):
 
 
 def _extra_joints(entries: object, names: list[str]) -> list[Extra]:
-    """Constant joints (name, position, velocity, effort); as upstream, a bad or repeated one is left out."""
+    """Returns constant joints (name, position, velocity, effort). Bad and repeated ones are left out."""
     extra: list[Extra] = []
     seen = set(names)
     for entry in entries if isinstance(entries, list) else []:

@@ -1,4 +1,4 @@
-"""The JointTrajectoryController of effort, position and velocity interfaces.
+"""JointTrajectoryController for effort, position and velocity interfaces.
 
 See docs/contract/ros_control.md 3.5.
 """
@@ -17,9 +17,9 @@ from bullet_gazebo.control.trajectory_goals import (
     INVALID_GOAL,
     Constraints,
     Goal,
-    GoalListener,
+    GoalObserver,
+    GoalOutcome,
     GoalRequest,
-    Outcome,
     Tolerance,
     Trajectory,
     TrajectoryRefused,
@@ -33,7 +33,7 @@ from bullet_gazebo.control.trajectory_goals import (
 
 SLOWEST = 1e-6  # [Hz]; below it, as at 0, no state is published
 STOPPED_VELOCITY = 0.01  # [rad/s, m/s]
-FOR_EVER = 1e12  # [s]; longer durations are cut, as no clock tells them
+FOR_EVER = 1e12  # [s]; longer durations are cut
 
 
 class Settings(NamedTuple):
@@ -114,9 +114,9 @@ def _number(params: Mapping[str, object], key: str, default: float, place: str) 
 
 
 class JointTrajectoryController(Controller):
-    """Leads joints along trajectories; without one it holds them.
+    """Moves joints along trajectories, and holds them when there is none.
 
-    Its time is uptime [ns], the sum of its periods since it was started, so the clock may jump.
+    Its time is uptime [ns], the sum of its periods since it was started: the clock may jump.
     """
 
     def __init__(self, name: str, axes: list[Axis], settings: Settings) -> None:
@@ -143,7 +143,7 @@ class JointTrajectoryController(Controller):
         return cls(name, read_axes(params, joints, name), settings)
 
     def starting(self, now: int) -> None:
-        self._end_goal("the controller began anew: a restart, or the joints were put elsewhere")
+        self._end_goal("the controller began anew: it was restarted, or its joints were moved")
         self._now = now
         self._uptime = 0
         self._next_state = 0
@@ -154,7 +154,7 @@ class JointTrajectoryController(Controller):
         self._end_goal("the controller was stopped")
 
     def joints_moved(self, now: int) -> None:
-        self._now = now  # stamps are counted from here, also after the clock went back
+        self._now = now  # stamps count from here, also after the clock was set back
 
     def update(self, now: int, dt: float) -> None:
         self._now = now
@@ -170,7 +170,7 @@ class JointTrajectoryController(Controller):
                 self._state.send(self.sample())
 
     def sample(self) -> TrajectorySample:
-        """Returns where the joints are wanted and where they are, as of the last tick."""
+        """Returns desired and actual state of the joints in the last tick."""
         axes = self._axes
         positions, velocities, accelerations = zip(*(axis.desired for axis in axes), strict=True)
         return TrajectorySample(
@@ -182,13 +182,13 @@ class JointTrajectoryController(Controller):
         )
 
     def follow(self, trajectory: Trajectory) -> str:
-        """Takes a trajectory as the topic `command` would; one without points holds the joints.
+        """Follows a trajectory of the topic `command`; one without points holds the joints.
 
         Returns:
-            A warning for the log, mostly empty.
+            A warning for the log, empty if there is none.
 
         Raises:
-            TrajectoryRefused: if it can't be followed; then nothing changes.
+            TrajectoryRefused: if it can't be followed; nothing changes then.
         """
         self._check_running("take a trajectory")
         if trajectory.points:
@@ -197,8 +197,8 @@ class JointTrajectoryController(Controller):
         self._end_goal("a trajectory came by the command topic")
         return warning
 
-    def pursue(self, key: str, request: GoalRequest, listener: GoalListener) -> str:
-        """Takes a goal of follow_joint_trajectory; returns and raises as follow()."""
+    def pursue(self, key: str, request: GoalRequest, listener: GoalObserver) -> str:
+        """Pursues a goal of follow_joint_trajectory; returns and raises like follow()."""
         self._check_running("take a goal")
         check_joints(request.trajectory.names, self.joint_names, self._settings.partial)
         check_tolerances(request)
@@ -210,13 +210,13 @@ class JointTrajectoryController(Controller):
         return warning
 
     def cancel(self, key: str) -> None:
-        """Holds the joints if `key` is the active goal, as its client wishes."""
+        """Holds the joints if `key` is the active goal."""
         if self._goal is not None and self._goal.key == key:
             self._hold()
             self._end_goal("canceled by its client")
 
     def query(self, time: int) -> list[State]:
-        """Returns what is wanted of the joints at `time` [ns] of the clock, in order of joint_names.
+        """Returns the desired states of the joints at `time` [ns] of the clock, in order of joint_names.
 
         Raises:
             TrajectoryRefused: if the controller isn't running.
@@ -232,8 +232,8 @@ class JointTrajectoryController(Controller):
             )
 
     def _lead(self, trajectory: Trajectory) -> tuple[int, str]:
-        """Puts the joints on the trajectory; returns the uptime at which it begins [ns], and a warning."""
-        tick = self._uptime + self._period  # before the first tick its period isn't known: 0
+        """Starts a trajectory; returns the uptime at which it begins [ns], and a warning."""
+        tick = self._uptime + self._period  # the period is 0 before the first tick
         if not trajectory.points:
             self._hold()
             return tick, ""
@@ -254,7 +254,7 @@ class JointTrajectoryController(Controller):
             axis.hold(self._uptime + self._period, self._settings.stop_duration)
 
     def _monitor(self, goal: Goal) -> None:
-        """Aborts at once; tells of progress and success at the monitor's rate."""
+        """Aborts a goal at once; reports progress and success at the monitor's rate."""
         if goal.outcome is None:
             goal.outcome = goal.check(self._uptime)
             if goal.outcome is not None and goal.outcome.code:
@@ -269,28 +269,28 @@ class JointTrajectoryController(Controller):
             self._end_goal("")
 
     def _end_goal(self, reason: str) -> None:
-        """Tells the outcome of the active goal: what was found, else that it is canceled for `reason`."""
+        """Ends the active goal with its outcome; without one, as canceled for `reason`."""
         goal, self._goal = self._goal, None
         if goal is not None:
-            goal.listener.finished(goal.outcome or Outcome(CANCELED, text=reason))
+            goal.listener.finished(goal.outcome or GoalOutcome(CANCELED, text=reason))
 
 
 class EffortTrajectory(JointTrajectoryController):
-    """A PID from the errors of position and velocity to an effort."""
+    """Follows trajectories by a PID from the errors of position and velocity to an effort."""
 
     type_name = "effort_controllers/JointTrajectoryController"
     interface = EFFORT
 
 
 class PositionTrajectory(JointTrajectoryController):
-    """Positions, as they are wanted."""
+    """Follows trajectories by commanding positions."""
 
     type_name = "position_controllers/JointTrajectoryController"
     interface = POSITION
 
 
 class VelocityTrajectory(JointTrajectoryController):
-    """A PID from the errors of position and velocity to a velocity."""
+    """Follows trajectories by a PID from the errors of position and velocity to a velocity."""
 
     type_name = "velocity_controllers/JointTrajectoryController"
     interface = VELOCITY

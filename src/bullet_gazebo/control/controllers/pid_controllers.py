@@ -1,6 +1,6 @@
-"""effort_controllers/JointGroupPositionController: a position loop for each joint.
+"""Controllers with a PID for each joint, on its position or velocity.
 
-See docs/contract/ros_control.md 3.4.
+See docs/contract/ros_control.md 3.2 to 3.4.
 """
 
 from abc import abstractmethod
@@ -40,7 +40,7 @@ class JointControllerSample(NamedTuple):
 
 
 class PositionLoop:
-    """Holds a joint at its set-point [rad, m] (docs/contract/ros_control.md 3.2)."""
+    """A PID that holds a joint at its set-point [rad, m] (docs/contract/ros_control.md 3.2)."""
 
     __slots__ = ("_straight", "joint", "pid", "set_point", "target")
 
@@ -51,7 +51,7 @@ class PositionLoop:
         self.command(0.0)
 
     def command(self, set_point: float) -> None:
-        """Takes a new set-point, and clamps it: here, not on each tick."""
+        """Takes a new set-point and clamps it, once instead of on each tick."""
         self.set_point = set_point
         self.target = self.joint.clamped(set_point)
 
@@ -61,16 +61,16 @@ class PositionLoop:
         self.pid.clear()
 
     def update(self, dt: float) -> float:
-        """Commands the joint; returns the error [rad, m]: the way to the clamped set-point."""
+        """Commands the joint; returns the error to the clamped set-point [rad, m]."""
         joint, target = self.joint, self.target
-        # The short way for a rail: this runs on every tick.
+        # A shortcut for a rail: this runs on every tick.
         error = target - joint.position if self._straight else joint.way_to(target)
         joint.command = self.pid.compute(error, dt)
         return error
 
 
 class StateReport:
-    """The topic `state` of a controller with one joint: on every tenth update since it was loaded."""
+    """The topic `state` of a controller with one joint, published on every tenth update since its load."""
 
     __slots__ = ("_joint", "_pid", "_updates", "output")
 
@@ -81,7 +81,7 @@ class StateReport:
         self._updates = 0
 
     def due(self) -> bool:
-        """Counts an update; returns whether it is one to report, and somebody listens."""
+        """Counts an update; returns whether to report it."""
         count = self._updates
         self._updates = count + 1
         return count % REPORT_EVERY == 0 and self.output.wanted
@@ -137,7 +137,7 @@ class EffortJointPosition(PidJoint):
 
     @property
     def set_point(self) -> float:
-        """Where the joint is wanted [rad, m], as it was commanded."""
+        """The commanded position [rad, m], not clamped."""
         return self._loop.set_point
 
     def command(self, value: float) -> None:
@@ -154,14 +154,14 @@ class EffortJointPosition(PidJoint):
 
 
 class VelocityJointPosition(EffortJointPosition):
-    """As the effort controller, with a velocity [rad/s, m/s] for its output."""
+    """The same with a velocity [rad/s, m/s] as output."""
 
     type_name = "velocity_controllers/JointPositionController"
     interface = VELOCITY
 
 
 class EffortJointVelocity(PidJoint):
-    """Keeps a joint at its commanded velocity [rad/s, m/s], which is 0 at the start."""
+    """Keeps a joint at its commanded velocity [rad/s, m/s], initially 0."""
 
     type_name = "effort_controllers/JointVelocityController"
     interface = EFFORT
@@ -184,7 +184,7 @@ class EffortJointVelocity(PidJoint):
         error = self._set_point - velocity
         self.joint.command = self._pid.compute(error, dt)
         if self._report.due():
-            # As upstream, the acceleration is not told.
+            # As upstream, without the acceleration.
             self._report.send(now, dt, self._set_point, velocity, 0.0, error)
 
 

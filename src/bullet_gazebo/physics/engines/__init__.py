@@ -1,4 +1,7 @@
-"""Physics engines by the names that `physics:=` knows. Each is imported when it is asked for."""
+"""Physics engines by the names of `physics:=`. Each is imported when it is first used.
+
+To add one: a module with subclasses of Engine and Body (../engine.py), and its name in `make_engine`.
+"""
 
 import importlib.util
 import os
@@ -13,14 +16,14 @@ ENGINES = (*BULLET, MUJOCO)
 
 
 class EngineError(ValueError):
-    """A physics engine that is not known, or not installed; the text says what to do."""
+    """A physics engine is unknown or not installed; the text says what to do."""
 
 
 def make_engine(name: str = BULLET[0]) -> Engine:
     """Returns a new, empty engine.
 
     Raises:
-        EngineError: if there is none of that name, or it isn't installed.
+        EngineError: if it is unknown or not installed.
     """
     if name == MUJOCO:
         return _mujoco()
@@ -32,7 +35,7 @@ def make_engine(name: str = BULLET[0]) -> Engine:
 
 
 def _installing() -> str:
-    """The command that installs MuJoCo, for whoever reads it: `ws` says in CARTPOLE_WS where it is."""
+    """Returns the command that installs MuJoCo. `ws` sets CARTPOLE_WS to its own path."""
     workspace = os.environ.get("CARTPOLE_WS")
     command = (
         [workspace, "extras"] if workspace else [sys.executable, "-m", "pip", "install", "mujoco"]

@@ -1,4 +1,4 @@
-"""A model inside PyBullet."""
+"""A model in PyBullet, and the contacts of PyBullet's bodies."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -10,56 +10,15 @@ from bullet_gazebo.physics.description import (
     Inertia,
     Link,
     ModelDescription,
-    Shape,
 )
 from bullet_gazebo.physics.engine import FASTEST, FURTHEST, Body, Contact, Side, Twist
 from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, add, cross, scale, subtract
 
-
-def set_friction(
-    client: int,
-    body: int,
-    links: Mapping[str, int],
-    description: ModelDescription,
-    of: str | None = None,
-    factor: float = 1.0,
-) -> None:
-    """Hands friction to the engine, which has one figure for a link (engine_form.py).
-
-    Args:
-        client: the world.
-        body: the model's.
-        links: the engine's number of each.
-        description: in the engine's form.
-        of: the link, with the pieces that it was split into; None: all.
-        factor: of the description's friction.
-    """
-    for name, link in description.links.items():
-        if name in links and link.collisions and of in (None, name, link.part_of):
-            friction = factor * _friction(link.collisions[0], description.static)
-            pybullet.changeDynamics(
-                body, links[name], lateralFriction=friction, physicsClientId=client
-            )
-
-
-def choose_self_collisions(
-    client: int, body: int, links: Mapping[str, int], description: ModelDescription
-) -> None:
-    """Lets two links of the model meet if either of them wants it, and no joint connects them (SDF's rule).
-
-    The engine, asked for self-collision at all, lets all of them meet but parent and child.
-    """
-    if not collides_with_itself(description):
-        return
-    joined = {frozenset((joint.parent, joint.child)) for joint in description.joints.values()}
-    solid = [link for name, link in description.links.items() if name in links and link.collisions]
-    for a, b in combinations(solid, 2):
-        owners = frozenset(link.part_of or link.name for link in (a, b))
-        meet = (a.self_collide or b.self_collide) and len(owners) == 2 and owners not in joined
-        pybullet.setCollisionFilterPair(
-            body, body, links[a.name], links[b.name], int(meet), physicsClientId=client
-        )
+BASE = -1
+# PyBullet's defaults for which links collide: bits of a link's group, and of the groups that it meets.
+DYNAMIC, STATIC, EVERYTHING = 1, 2, -1
+NO_STOP = 1e16  # [rad, m]
 
 
 def collides_with_itself(description: ModelDescription) -> bool:
@@ -67,45 +26,19 @@ def collides_with_itself(description: ModelDescription) -> bool:
     return any(link.self_collide for link in description.links.values())
 
 
-def check_meshes(
-    client: int, body: int, links: Mapping[str, int], description: ModelDescription
-) -> None:
-    """Refuses what the engine has left out without a word.
-
-    Raises:
-        DescriptionError: for a link whose meshes the engine has made nothing of.
-    """
-    for name, link in description.links.items():
-        meshes = [shape.mesh for shape in link.collisions if shape.mesh]
-        if name not in links or not meshes or len(meshes) < len(link.collisions):
-            continue
-        if not pybullet.getCollisionShapeData(body, links[name], client):
-            raise DescriptionError(
-                f"link '{name}': the physics engine finds nothing to touch in mesh '{meshes[0]}'"
-            )
-
-
-def _friction(shape: Shape, static: bool) -> float:
-    """PyBullet multiplies the coefficients of two bodies where ODE takes the smaller one.
-
-    What stands still counts as 1 at most, so that a box on a ground of 100 keeps its own coefficient.
-    """
-    return min(shape.mu, 1.0) if static else shape.mu
-
-
 def contacts(client: int, sides: Mapping[tuple[int, int], Side]) -> list[Contact]:
-    """Returns where bodies touched in the last step; not where they only are near.
+    """Returns where bodies touched in the last step, without those that were only near.
 
     Args:
         client: the world.
-        sides: what the engine's bodies and links are.
+        sides: what PyBullet's bodies and links are.
     """
     found = pybullet.getContactPoints(physicsClientId=client)
     return [_contact(each, sides) for each in found if each[9] > 0.0]
 
 
 def _contact(found: Sequence[Any], sides: Mapping[tuple[int, int], Side]) -> Contact:
-    """PyBullet tells links, not shapes; the point on the second body, and the normal towards the first."""
+    """PyBullet has links, not shapes; the point on the second body, and the normal towards the first."""
     _, first, second, first_link, second_link, _, point, normal, distance, force = found[:10]
     along, direction, across, other = found[10:14]
     friction: Vector = add(scale(direction, along), scale(other, across))
@@ -115,14 +48,8 @@ def _contact(found: Sequence[Any], sides: Mapping[tuple[int, int], Side]) -> Con
     )  # fmt: skip
 
 
-BASE = -1
-# Which links collide, as PyBullet has it where nothing else was said: bits of groups, and of those seen.
-DYNAMIC, STATIC, EVERYTHING = 1, 2, -1
-NO_STOP = 1e16  # [rad, m]
-
-
 class BulletBody(Body):
-    """A multi-body of PyBullet; its default motors and dampings are off."""
+    """A multi-body of PyBullet, without PyBullet's default motors and damping."""
 
     implicit_damping = False
 
@@ -135,12 +62,48 @@ class BulletBody(Body):
         weightless: set[tuple[int, int]],
         offsets: Mapping[str, Pose],
     ) -> None:
-        """`offsets` are frames of links, as seen from the engine's, where they differ."""
+        """
+        Args:
+            client: the world.
+            body: PyBullet's number.
+            description: in the engine's form.
+            pose: of the root link.
+            weightless: bodies and links of the world on which gravity doesn't act.
+            offsets: frames of links, as seen from PyBullet's, where they differ.
+        """
         self.id = body
         self._client = client
         self._weightless = weightless
         self._description = description
         self._offsets = offsets
+        self._fixed = description.fixed_base
+        self._map_names()
+        self.touching = {
+            index: _touching(description.links[name]) for name, index in self._links.items()
+        }
+        dynamics = pybullet.getDynamicsInfo(body, BASE, client)
+        self._check_meshes()
+        self._com = Pose(dynamics[3], dynamics[4])  # the engine turns it onto the principal axes
+        if is_plane(description):
+            self._com = description.links[description.root].collisions[0].pose
+        self._remove_defaults()
+        self._states: Callable[[], Sequence[Sequence[float]]] = tuple  # of a body without joints
+        if self._indices:
+            self._states = partial(pybullet.getJointStates, body, self._indices, client)
+        # All arguments by position, though torques need neither targets nor gains: keywords take half as
+        # long again.
+        unused = [0.0] * len(self._indices)
+        self._torques = partial(
+            pybullet.setJointMotorControlArray, body, self._indices, pybullet.TORQUE_CONTROL, unused, unused
+        )  # fmt: skip
+        self._unused = unused
+        self._base = pose.compose(self._com)  # where the centre of mass was put last
+        if not is_plane(description):
+            self.reset_base(pose)
+
+    def _map_names(self) -> None:
+        """Finds PyBullet's indices of joints and links."""
+        description = self._description
         joints = {name: i for i, name in enumerate(self._engine_joints())}
         self.joint_names = tuple(
             name for name, joint in description.joints.items() if joint.movable and name in joints
@@ -154,33 +117,12 @@ class BulletBody(Body):
             for name, link in description.links.items()
             if name in self._links and not link.part_of
         )
-        self.touching = {
-            index: _touching(description.links[name]) for name, index in self._links.items()
-        }
-        self._fixed = description.fixed_base
-        dynamics = pybullet.getDynamicsInfo(body, BASE, client)
-        check_meshes(client, body, self._links, description)
-        self._com = Pose(dynamics[3], dynamics[4])  # the engine turns it onto the principal axes
-        if is_plane(description):
-            self._com = description.links[description.root].collisions[0].pose
-        self._free_from_defaults(description)
-        self._states: Callable[[], Sequence[Sequence[float]]] = tuple  # of a body without joints
-        if self._indices:
-            self._states = partial(pybullet.getJointStates, body, self._indices, client)
-        # All by position, though torques need neither targets nor gains: PyBullet takes half as long again
-        # to look for names.
-        unused = [0.0] * len(self._indices)
-        self._torques = partial(
-            pybullet.setJointMotorControlArray, body, self._indices, pybullet.TORQUE_CONTROL, unused, unused
-        )  # fmt: skip
-        self._unused = unused
-        self._base = pose.compose(self._com)  # where the centre of mass was put last
-        if not is_plane(description):
-            self.reset_base(pose)
 
     def forget_contacts(self) -> None:
-        """PyBullet keeps the points at which bodies touched, while they are near, and what forces were
-        there, whatever places the bodies anew. A link that is told its collision filter loses them."""
+        """Makes PyBullet drop the points and forces of contacts, which it keeps even if bodies are placed.
+
+        Setting a link's collision filter has that effect.
+        """
         for index in self._links.values():
             fixed = self._fixed and index == BASE
             group, mask = (STATIC, EVERYTHING ^ STATIC) if fixed else (DYNAMIC, EVERYTHING)
@@ -191,13 +133,13 @@ class BulletBody(Body):
         count = pybullet.getNumJoints(self.id, physicsClientId=self._client)
         return [pybullet.getJointInfo(self.id, i, self._client)[1].decode() for i in range(count)]
 
-    def _free_from_defaults(self, description: ModelDescription) -> None:
-        """Nothing acts but what the model says: no damping, no friction motors."""
+    def _remove_defaults(self) -> None:
+        """Removes all damping and motors that the model doesn't have."""
         pybullet.changeDynamics(
             self.id, BASE, linearDamping=0.0, angularDamping=0.0, physicsClientId=self._client
         )
         for name, index in zip(self.joint_names, self._indices, strict=True):
-            joint = description.joints[name]
+            joint = self._description.joints[name]
             pybullet.changeDynamics(
                 self.id, index, linearDamping=0.0, angularDamping=0.0, jointDamping=joint.damping,
                 physicsClientId=self._client,
@@ -208,16 +150,54 @@ class BulletBody(Body):
                 physicsClientId=self._client,
             )  # fmt: skip
 
-        set_friction(self._client, self.id, self._links, description)
-        choose_self_collisions(self._client, self.id, self._links, description)
         for name in self.link_names:
-            link = description.links[name]
+            self.set_friction(name, 1.0)
+        self._choose_self_collisions()
+        for name in self.link_names:
+            link = self._description.links[name]
             self.set_link_gravity(name, link.gravity)
-            if link.inertia is not None and not description.static:
+            if link.inertia is not None and not self._description.static:
                 self._keep_moments(self._links[name], link.inertia)
 
+    def _check_meshes(self) -> None:
+        """Refuses links whose meshes PyBullet has silently left out.
+
+        Raises:
+            DescriptionError: for such a link.
+        """
+        for name, link in self._description.links.items():
+            meshes = [shape.mesh for shape in link.collisions if shape.mesh]
+            if name not in self._links or not meshes or len(meshes) < len(link.collisions):
+                continue
+            if not pybullet.getCollisionShapeData(self.id, self._links[name], self._client):
+                raise DescriptionError(
+                    f"link '{name}': the physics engine finds nothing to touch in mesh '{meshes[0]}'"
+                )
+
+    def _choose_self_collisions(self) -> None:
+        """Lets two links of the model meet if either wants it and no joint connects them (SDF's rule).
+
+        With self-collision, PyBullet lets all of them meet but parent and child.
+        """
+        description = self._description
+        if not collides_with_itself(description):
+            return
+        joined = {frozenset((joint.parent, joint.child)) for joint in description.joints.values()}
+        solid = [
+            link
+            for name, link in description.links.items()
+            if name in self._links and link.collisions
+        ]
+        for a, b in combinations(solid, 2):
+            owners = frozenset(link.part_of or link.name for link in (a, b))
+            meet = (a.self_collide or b.self_collide) and len(owners) == 2 and owners not in joined
+            pybullet.setCollisionFilterPair(
+                self.id, self.id, self._links[a.name], self._links[b.name], int(meet),
+                physicsClientId=self._client,
+            )  # fmt: skip
+
     def _keep_moments(self, index: int, inertia: Inertia) -> None:
-        """PyBullet takes moments that no real body has (a > b + c) for none at all, ODE as they are.
+        """Sets moments that no real body has (a > b + c): PyBullet drops them, ODE doesn't.
 
         The products of such a tensor are left out.
         """
@@ -244,7 +224,7 @@ class BulletBody(Body):
         self._torques(efforts, unused, unused, self._client)
 
     def add_effort(self, index: int, effort: float) -> None:
-        # The engine sums torques up until the step, and forgets them then.
+        # PyBullet sums torques up until the step.
         pybullet.setJointMotorControl2(
             self.id, self._indices[index], pybullet.TORQUE_CONTROL, force=effort,
             physicsClientId=self._client,
@@ -265,7 +245,7 @@ class BulletBody(Body):
         if self._offsets.get(link, Pose()) != Pose():
             return False  # the engine's link has other axes
         if old is None or old.com != new.com or not (_is_diagonal(old) and _is_diagonal(new)):
-            return False  # the engine can't move or turn a link's principal axes
+            return False  # PyBullet can't move or turn a link's principal axes
         axes = pybullet.getDynamicsInfo(self.id, index, self._client)[2]
         if max(abs(a - b) for a, b in zip(axes, _moments(old), strict=True)) > 1e-9 * max(axes):
             return False
@@ -281,17 +261,27 @@ class BulletBody(Body):
         )
 
     def set_time_step(self, dt: float) -> None:
-        """Cuts speeds at what a step of `dt` [s] can bear; the engine has one figure for joints and base."""
+        """Limits speeds for a step of `dt` [s]. PyBullet has one limit for joints and base."""
         fastest = FURTHEST / dt if self._indices else FASTEST
         pybullet.changeDynamics(
             self.id, BASE, maxJointVelocity=fastest, physicsClientId=self._client
         )
 
     def set_friction(self, link: str, factor: float) -> None:
-        set_friction(self._client, self.id, self._links, self._description, link, factor)
+        # PyBullet has one friction for a link (engine_form.py), so a link may have been split into pieces.
+        for name, piece in self._description.links.items():
+            if name in self._links and piece.collisions and link in (name, piece.part_of):
+                mu = piece.collisions[0].mu
+                # PyBullet multiplies the coefficients of two bodies, ODE takes the smaller one. Static
+                # bodies count as 1 at most, so that a box on a ground of 100 keeps its own coefficient.
+                mu = min(mu, 1.0) if self._description.static else mu
+                pybullet.changeDynamics(
+                    self.id, self._links[name], lateralFriction=factor * mu,
+                    physicsClientId=self._client,
+                )  # fmt: skip
 
     def set_limits(self, index: int, lower: float, upper: float) -> None:
-        if lower > upper:  # the engine would keep those that it has
+        if lower > upper:  # PyBullet would keep the present ones
             lower, upper = -NO_STOP, NO_STOP
         pybullet.changeDynamics(
             self.id, self._indices[index], jointLowerLimit=lower, jointUpperLimit=upper,
@@ -324,8 +314,10 @@ class BulletBody(Body):
         pybullet.resetBasePositionAndOrientation(self.id, *com, physicsClientId=self._client)
 
     def go_on_from(self, other: "BulletBody") -> None:
-        """Takes over the state of a body of the same description: to the bit, but for the orientation of a
-        free base, which the engine doesn't tell to the last one."""
+        """Copies the state of a body of the same description.
+
+        It is bit-identical but for the orientation of a free base, which PyBullet doesn't return exactly.
+        """
         if self._fixed:
             self._put_base(other._base)
         else:
@@ -357,7 +349,7 @@ class BulletBody(Body):
         poses = dict.fromkeys(self.link_names, Pose()) | {
             name: self._base_state()[0] for name in self.link_names if name not in names
         }
-        if names:  # one call for all: each looks at the whole body
+        if names:  # one call for all: each call visits the whole body
             states = pybullet.getLinkStates(
                 self.id, [self._links[name] for name in names], 0, 1, physicsClientId=self._client
             )
@@ -374,7 +366,7 @@ class BulletBody(Body):
 
 
 def _touching(link: Link) -> tuple[str, tuple[str, ...]]:
-    """What of the model may touch where a link of the engine does: the model's link, and collisions."""
+    """Returns the link and collisions of the model that may touch where PyBullet's link does."""
     return link.part_of or link.name, tuple(shape.name for shape in link.collisions)
 
 
@@ -387,6 +379,6 @@ def _is_diagonal(inertia: Inertia) -> bool:
 
 
 def is_plane(description: ModelDescription) -> bool:
-    """Whether the model is a plane and nothing else: that needs no file."""
+    """Returns whether the model is just a plane, which needs no file."""
     shapes = [shape for link in description.links.values() for shape in link.collisions]
     return len(description.links) == len(shapes) == 1 and shapes[0].kind == "plane"

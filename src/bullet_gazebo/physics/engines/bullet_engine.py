@@ -23,13 +23,16 @@ from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector, scale
 from bullet_gazebo.scratch import scratch_folder
 
-MOST_ITERATIONS = 1000  # of the solver in a step; more would only hold the world
-PLANE = 1200  # [bytes] of a file, had it been loaded from one
+MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
+PLANE = 1200  # [bytes] of a file, if it had been loaded from one
+
+
+MOST_WASTE = 1_000_000  # [bytes] of files that removed bodies were loaded from: 5 MB of memory
 
 
 @dataclass
 class BulletSettings:
-    """Gravity [m/s²], length of a step [s], iterations of the solver; at first PyBullet's own."""
+    """Gravity [m/s²], length of a step [s] and iterations of the solver; the defaults are PyBullet's."""
 
     gravity: Vector = ZERO
     time_step: float = 1.0 / 240.0
@@ -37,15 +40,15 @@ class BulletSettings:
 
 
 class BulletClient:
-    """A connection to PyBullet, in this process, without a window.
+    """A PyBullet world in this process, without a window.
 
-    `live` and `waste` are the bytes of files that the bodies were loaded from, and those that were removed.
+    `live` and `waste` are the sizes of the files that present and removed bodies were loaded from [bytes].
     """
 
     def __init__(self, settings: BulletSettings) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
-        # The order of contact pairs decides the solver's result: keep it the same in every run. And each
-        # body has files of its own, so it is of no use to keep them.
+        # The solver's result depends on the order of contact pairs: make it the same in every run. Each
+        # body has its own files, so caching them is of no use.
         pybullet.setPhysicsEngineParameter(
             deterministicOverlappingPairs=1, enableFileCaching=0, physicsClientId=self._client
         )
@@ -64,7 +67,7 @@ class BulletClient:
         return sum(self._sizes.values())
 
     def apply(self, settings: BulletSettings) -> None:
-        """Hands the settings to the engine."""
+        """Applies settings to the world."""
         self._gravity, self._time_step = settings.gravity, settings.time_step
         iterations = max(1, min(settings.iterations, MOST_ITERATIONS))
         pybullet.setGravity(*settings.gravity, physicsClientId=self._client)
@@ -85,15 +88,24 @@ class BulletClient:
             flags |= (
                 pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
             )
+        body = self._load_files(engine_form, pose, flags)
+        try:
+            made = BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
+        except DescriptionError:
+            self.remove(body)
+            raise
+        return self._keep(made)
+
+    def _load_files(self, model: ModelDescription, pose: Pose, flags: int) -> int:
+        """Loads a model in the engine's form by way of files; returns PyBullet's number of the body."""
         try:
             with scratch_folder() as folder:
                 path = folder / "model.urdf"
-                text = write_urdf(parents_first(engine_form), folder)
-                path.write_text(text, encoding="utf-8")
+                path.write_text(write_urdf(parents_first(model), folder), encoding="utf-8")
                 size = _size(folder)
                 with _decimal_points():
-                    body = pybullet.loadURDF(
-                        str(path), pose.position, pose.orientation, useFixedBase=description.fixed_base,
+                    body: int = pybullet.loadURDF(
+                        str(path), pose.position, pose.orientation, useFixedBase=model.fixed_base,
                         flags=flags, physicsClientId=self._client,
                     )  # fmt: skip
         except pybullet.error as error:
@@ -104,12 +116,7 @@ class BulletClient:
                 f"the physics engine's files can't be written: {error.strerror or error}"
             ) from error
         self._sizes[body] = size
-        try:
-            made = BulletBody(self._client, body, engine_form, pose, self._weightless, offsets)
-        except DescriptionError:
-            self.remove(body)
-            raise
-        return self._keep(made)
+        return body
 
     def _load_plane(self, description: ModelDescription, pose: Pose) -> BulletBody:
         shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
@@ -151,7 +158,7 @@ class BulletClient:
             body.forget_contacts()
 
     def _hold_up(self) -> None:
-        """PyBullet's gravity acts on everything: a weightless link is held by a force against it."""
+        """Cancels gravity on weightless links by a force: PyBullet's gravity acts on all of them."""
         for body, link in self._weightless:
             mass = pybullet.getDynamicsInfo(body, link, self._client)[0]
             if link == BASE:
@@ -163,14 +170,16 @@ class BulletClient:
             )
 
     def close(self) -> None:
-        """Frees all of it."""
+        """Frees the world's memory."""
         pybullet.disconnect(self._client)
 
 
 @contextlib.contextmanager
 def _decimal_points() -> Iterator[None]:
-    """Has the C library read 0.5 as one half. Where Qt or a user's code has chosen a language that writes
-    0,5 it reads 0."""
+    """Has the C library read 0.5 as one half.
+
+    If Qt or a user's code has set a locale with decimal commas, it would read 0.
+    """
     before = locale.setlocale(locale.LC_NUMERIC)
     locale.setlocale(locale.LC_NUMERIC, "C")
     try:
@@ -180,15 +189,12 @@ def _decimal_points() -> Iterator[None]:
 
 
 def _size(folder: Path) -> int:
-    """Bytes that the engine reads: what was written into `folder`."""
+    """Returns the size of the files in `folder` [bytes]."""
     return sum(path.stat().st_size for path in folder.iterdir())
 
 
-MOST_WASTE = 1_000_000  # [bytes] of files that removed bodies were loaded from: 5 MB of memory
-
-
 class BulletEngine(Engine):
-    """PyBullet worlds, one after the other: a new one frees what removed bodies have left in the old one."""
+    """PyBullet worlds, one after the other: a new one frees the memory that removed bodies leave behind."""
 
     def __init__(self) -> None:
         self._settings = BulletSettings()
@@ -208,7 +214,7 @@ class BulletEngine(Engine):
         fresh = BulletClient(self._settings)
         try:
             moved = [_moved(description, body, fresh) for description, body in bodies]
-        except DescriptionError:  # no room for their files: the old world goes on
+        except DescriptionError:  # no space for their files: the old world goes on
             fresh.close()
             self._most_waste = 2 * self._client.waste
             return super().renewed(bodies)
@@ -243,7 +249,7 @@ class BulletEngine(Engine):
 
 
 def _moved(description: ModelDescription, body: Body, client: BulletClient) -> Body:
-    """Returns `body` loaded anew, in the same state."""
+    """Returns `body` reloaded into another world, in the same state."""
     assert isinstance(body, BulletBody)
     fresh = client.load(description, body.link_state(description.root)[0])
     fresh.go_on_from(body)

@@ -1,4 +1,4 @@
-"""Writes a ModelDescription as the URDF that the engine reads: lumped, without Gazebo's extensions."""
+"""Writes models as the URDF and mesh files that PyBullet loads."""
 
 import math
 from dataclasses import replace
@@ -14,11 +14,21 @@ SIDES = 128  # of what stands for a cylinder
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of STL
 
 
-def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
-    """Returns the name of a file in `folder`: the triangles if they are to be `concave`, else the hulls.
+MARGIN = 0.001  # [m]; PyBullet's, around convex hulls
 
-    PyBullet sorts the points of an OBJ file's `objects`, and takes those of an STL file as they come. Which
-    of two equal ones touches first decides on the last bits, so what was an OBJ file becomes one again.
+
+def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
+    """Writes a mesh into `folder` and returns the file's name.
+
+    PyBullet loads large meshes, and several in a link, only from files. It sorts the points of an OBJ file,
+    and takes those of an STL file in their order. The order affects the last bits of contacts, so a mesh
+    from an OBJ file is written as one.
+
+    Args:
+        mesh: the mesh.
+        folder: the folder.
+        concave: whether to write its triangles instead of its hulls.
+        objects: whether it came from an OBJ file.
     """
     path = folder / f"{mesh.digest}.{'stl' if concave or not objects else 'obj'}"
     if path.exists():
@@ -34,7 +44,7 @@ def write_mesh(mesh: Mesh, folder: Path, concave: bool, objects: bool) -> str:
 
 
 def drum(folder: Path) -> Path:
-    """Returns a file in `folder`: a cylinder of radius 1 and length 1 about z. It rests on a flat side."""
+    """Returns a file in `folder` with a cylinder of radius 1 and length 1 about z, with a flat side below."""
     path = folder / "drum.obj"
     if not path.exists():
         angles = [2.0 * math.pi * (side + 0.5) / SIDES for side in range(SIDES)]
@@ -46,14 +56,14 @@ def drum(folder: Path) -> Path:
 
 
 def _stl(corners: np.ndarray) -> bytes:
-    """Facets in binary STL, which the engine reads fastest; normals are left to it."""
+    """Returns facets as binary STL, which PyBullet reads fastest, without normals."""
     facets = np.zeros(corners.size // 9, FACET)
     facets["corners"] = corners.reshape(-1, 3, 3)
     return bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
 
 
 def _obj(mesh: Mesh) -> str:
-    """An object for each hull: the engine makes a convex body of each. Faces only list the points."""
+    """Returns an OBJ text with an object for each hull. Faces only list the points."""
     lines, start = [], 1
     for number, points in enumerate(mesh.hulls):
         lines.append(f"o {number}")
@@ -64,33 +74,30 @@ def _obj(mesh: Mesh) -> str:
     return "\n".join([*lines, ""])
 
 
-MARGIN = 0.001  # [m]; PyBullet's, around convex hulls
-
-
 def write_urdf(model: ModelDescription, folder: Path | None = None) -> str:
     """Returns URDF text with the numbers of `model` to the last digit.
 
-    Visuals are left out: nothing is drawn. Meshes are written into `folder`, if one is given: the engine
-    never opens a user's file, which it would crash on or take from its memory of files.
+    Visuals are left out: nothing is drawn. Meshes are written into `folder`, if one is given. PyBullet never
+    opens a user's file: it would crash over a broken one, and cache an old one.
     """
     robot = Element("robot", name="model")
     for link in model.links.values():
         _write_link(robot, link, model.static, folder)
     for joint in model.joints.values():
         _write_joint(robot, joint)
-    indent(robot)  # the engine reads lines of up to 8 KiB and breaks longer ones anywhere
+    indent(robot)  # PyBullet breaks lines of more than 8 KiB anywhere
     return tostring(robot, encoding="unicode")
 
 
 def _write_link(robot: Element, link: Link, static: bool, folder: Path | None) -> None:
     element = SubElement(robot, "link", name=link.name)
-    # Without an inertial the engine would assume 1 kg; only the immovable link `world` has none.
+    # Without an inertial PyBullet would assume 1 kg; only the immovable link `world` has none.
     _write_inertia(element, link.inertia or Inertia(mass=0.0))
     for given in link.collisions:
         shape = _finer(given, folder)
         written = SubElement(element, "collision")
         if static and shape.kind == "mesh":
-            written.set("concave", "yes")  # what moves collides by its convex hull
+            written.set("concave", "yes")  # moving bodies collide by their convex hulls
         if shape.solid is not None and folder is not None:
             objects = Path(shape.mesh).suffix.lower() == ".obj"
             written_mesh = write_mesh(shape.solid, folder, concave=static, objects=objects)
@@ -99,9 +106,9 @@ def _write_link(robot: Element, link: Link, static: bool, folder: Path | None) -
 
 
 def _finer(shape: Shape, folder: Path | None) -> Shape:
-    """The engine's own cylinder has 32 sides: a wheel rocks on them, and each one brakes it.
+    """Returns a cylinder as a mesh with more sides than PyBullet's own, on whose 32 sides a wheel rocks.
 
-    Around a mesh the engine keeps a margin, by which a wheel would roll too far.
+    PyBullet adds a margin around a mesh, by which a wheel would be too large.
     """
     if shape.kind != "cylinder" or folder is None:
         return shape

@@ -1,4 +1,4 @@
-"""A model inside MuJoCo."""
+"""A model in MuJoCo, and the state that all models of a world share."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,8 +17,11 @@ FREE = 6  # degrees of freedom of a body without joints
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
 
 
+FREE_POSITIONS, FREE_VELOCITIES = 7, 6  # of a free base
+
+
 class BodyArrays(NamedTuple):
-    """State of one body, and what acts on it during the next step; each an array of MuJoCo's."""
+    """State of one body, and what acts on it during the next step, as arrays of MuJoCo."""
 
     positions: np.ndarray
     velocities: np.ndarray
@@ -28,26 +31,26 @@ class BodyArrays(NamedTuple):
 
 @dataclass
 class MujocoState:
-    """Shared by the engine and its bodies."""
+    """MuJoCo's model and data of the world, shared by the engine and its bodies."""
 
     model: mujoco.MjModel
     data: mujoco.MjData
-    stale: bool = True  # poses and twists are those of another state
-    loaded: bool = False  # efforts or wrenches wait for the next step
-    speeds: dict[int, float] = field(default_factory=dict)  # that motors want, by degree of freedom
+    stale: bool = True  # whether poses and twists are those of another state
+    loaded: bool = False  # whether efforts or wrenches act in the next step
+    speeds: dict[int, float] = field(default_factory=dict)  # of motors, by degree of freedom
 
     def __post_init__(self) -> None:
         self._watch()
 
     def replace(self, model: mujoco.MjModel) -> None:
-        """Goes on with another model; its bodies have to be bound to it."""
+        """Uses another model; the bodies have to be bound to it."""
         self.model, self.data = model, mujoco.MjData(model)
         self._watch()
         self.stale, self.loaded = True, False
         self.speeds.clear()
 
     def step(self) -> None:
-        """Integrates by one time step, after which nothing acts any more."""
+        """Integrates by one time step; efforts and wrenches end with it."""
         np.copyto(self._before, self._positions)
         if self.speeds:
             mujoco.mj_step1(self.model, self.data)
@@ -56,7 +59,7 @@ class MujocoState:
         else:
             mujoco.mj_step(self.model, self.data)
         self.stale = True
-        if not hypot(*self._speeds()) < self._fast:  # also if one of them is no number
+        if not hypot(*self._speeds()) < self._fast:  # also if one of them is NaN
             self._slow_down()
         if self.loaded:
             self.data.qfrc_applied[:] = 0.0
@@ -73,24 +76,26 @@ class MujocoState:
         self._fast = FURTHEST / dt
 
     def _watch(self) -> None:
-        # Each of MuJoCo's attributes is an array object made anew.
+        # Each access to an attribute of MuJoCo makes a new array object.
         self._positions, self._speeds = self.data.qpos, self.data.qvel.tolist
         self._before = self._positions.copy()
         self.set_time_step(self.model.opt.timestep)
 
     def _slow_down(self) -> None:
-        """Cuts what is too fast, and takes the positions' step anew. What is no number counts as rest: it
-        would spread over the whole world."""
+        """Limits speeds, and integrates the positions again.
+
+        NaN counts as rest: it would spread to the whole world.
+        """
         model, data, fastest = self.model, self.data, self._fastest
         if (np.abs(data.qvel) <= fastest).all():
-            return  # there are many, and none of them is too fast
+            return  # only their sum is large
         data.qvel[np.isnan(data.qvel)] = 0.0
         np.clip(data.qvel, -fastest, fastest, out=data.qvel)
         np.copyto(data.qpos, self._before)
         mujoco.mj_integratePos(model, data.qpos, data.qvel, model.opt.timestep)
 
     def _drive(self) -> None:
-        """Dry friction brakes towards speed 0; a motor is dry friction towards another speed."""
+        """Drives motors: dry friction brakes towards speed 0, a motor towards another speed."""
         data = self.data
         for row in np.flatnonzero(data.efc_type == FRICTION):
             speed = self.speeds.get(int(data.efc_id[row]))
@@ -112,7 +117,7 @@ class MujocoState:
         return Pose((x, y, z), xyzw(data.xquat[index])), ((vx, vy, vz), (ax, ay, az))
 
     def contacts(self, sides: Mapping[int, Side]) -> list[Contact]:
-        """Returns where bodies touched in the last step; not where they only are near.
+        """Returns where bodies touched in the last step, without those that were only near.
 
         Args:
             sides: what the geoms are, by number.
@@ -141,12 +146,9 @@ def _vector(numbers: Sequence[float]) -> Vector:
     return (x, y, z)
 
 
-FREE_POSITIONS, FREE_VELOCITIES = 7, 6  # of a free base
-
-
 @dataclass
 class JointSettings:
-    """What can be changed of a joint: [N m s/rad, N s/m], [rad, m], [rad/s, m/s], [N m, N]."""
+    """Settings of a joint that change: [N m s/rad, N s/m], [rad, m], [rad/s, m/s], [N m, N]."""
 
     damping: float
     lower: float
@@ -161,7 +163,7 @@ class JointSettings:
 
 
 class MujocoBody(Body):
-    """The bodies and joints of one model; `bind` finds them again after the world was compiled anew."""
+    """The bodies and joints of one model. `bind` finds them again after the world was recompiled."""
 
     implicit_damping = True
 
@@ -172,7 +174,13 @@ class MujocoBody(Body):
         pose: Pose,
         compile_anew: Callable[[], None],
     ) -> None:
-        """`compile_anew` makes the world's model from its bodies' present settings."""
+        """
+        Args:
+            state: the world's.
+            description: the model.
+            pose: of the root link.
+            compile_anew: recompiles the world's model from its bodies' present settings.
+        """
         self.description = description
         self.pose = pose  # of the root link; of one that is free, where it was loaded
         self.link_names = tuple(description.links)
@@ -186,7 +194,7 @@ class MujocoBody(Body):
         self._compile_anew = compile_anew
 
     def bind(self, elements: Elements) -> None:
-        """Takes its places in a newly compiled model, and puts its settings into it."""
+        """Finds its indices in a newly compiled model, and applies its settings."""
         model, data = self._state.model, self._state.data
         self._ids = {name: body.id for name, body in elements.bodies.items()}
         self.touching = dict(self._geoms())
@@ -210,20 +218,20 @@ class MujocoBody(Body):
             self.set_motor(index, joint.speed, joint.effort)
 
     def _geoms(self) -> Iterator[tuple[int, tuple[str, tuple[str, ...]]]]:
-        """MuJoCo's shapes by their number: those of a link follow one another, in their order."""
+        """Yields MuJoCo's shapes by number: those of a link follow one another in their order."""
         for link, index in self._ids.items():
             first = int(self._state.model.body_geomadr[index])
             for place, shape in enumerate(self.description.links[link].collisions):
                 yield first + place, (link, (shape.name,))
 
     def motion(self) -> BodyArrays:
-        """Returns a copy of its state, joint by joint and base last."""
+        """Returns a copy of its state, with the base last."""
         q, v = self._places()
         wrenches = self._state.data.xfrc_applied[list(self._ids.values())]
         return BodyArrays(self._qpos[q], self._qvel[v], self._qfrc[v], wrenches)
 
     def move(self, motion: BodyArrays) -> None:
-        """Takes over a state of its own from before the world was compiled anew."""
+        """Restores its state after the world was recompiled."""
         q, v = self._places()
         self._qpos[q], self._qvel[v] = motion.positions, motion.velocities
         self._qfrc[v] = motion.efforts

@@ -1,4 +1,4 @@
-"""MuJoCo behind the engine interface: one model of the whole world, compiled anew when it changes."""
+"""MuJoCo as physics engine: one model of the whole world, which is recompiled when it changes."""
 
 import logging
 from itertools import count
@@ -12,12 +12,12 @@ from bullet_gazebo.physics.engines.mujoco_body import MujocoBody, MujocoState
 from bullet_gazebo.physics.engines.mujoco_model import Elements, ModelWriter, compile_spec
 from bullet_gazebo.physics.pose import ZERO, Pose, Vector
 
-MOST_ITERATIONS = 1000  # of the solver in a step; more would only hold the world
+MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
 DEFAULT_STEP = 0.001  # [s]
 STIFFEST = 2.0  # steps: MuJoCo's shortest time constant of a constraint
-# Constraints give way to a ten-thousandth of what acts against them, the least that MuJoCo knows.
+# Constraints yield to a ten-thousandth of what acts against them, MuJoCo's minimum.
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-IMPRATIO = 10.0  # how much stiffer friction is than the contact: what rests doesn't creep
+IMPRATIO = 10.0  # how much stiffer friction is than the contact, so that nothing at rest creeps
 
 logger = logging.getLogger(__name__)
 
@@ -26,7 +26,10 @@ class MujocoEngine(Engine):
     """One MuJoCo world. It is integrated by semi-implicit Euler, joint damping implicitly."""
 
     def __init__(self, runge_kutta: bool = False) -> None:
-        """`runge_kutta` integrates by RK4: for comparisons, without motors that have a speed."""
+        """
+        Args:
+            runge_kutta: integrate by RK4, for comparisons; motors with a speed don't work then.
+        """
         # By default MuJoCo writes warnings into a file in the current folder.
         mujoco.set_mju_user_warning(logger.warning)
         self._runge_kutta = runge_kutta
@@ -73,10 +76,10 @@ class MujocoEngine(Engine):
         self._state.replace(compile_spec(mujoco.MjSpec()))
 
     def _compile(self, fresh: dict[str, MujocoBody] | None = None) -> None:
-        """Makes the model of the bodies and of `fresh` ones; what moves, goes on.
+        """Recompiles the model with `fresh` bodies added; the state stays.
 
         Raises:
-            DescriptionError: if MuJoCo can't take it; the world is as it was then.
+            DescriptionError: if MuJoCo refuses it; nothing changes then.
         """
         bodies = self._bodies | (fresh or {})
         spec = mujoco.MjSpec()
@@ -120,7 +123,8 @@ class MujocoEngine(Engine):
         # MuJoCo 4.0.0's sparse factorisation gives wrong accelerations (mujoco#3767).
         option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         option.enableflags |= mujoco.mjtEnableBit.mjENBL_DIAGEXACT
-        # Without warm starts a state has one future, whatever was before. A reset is nobody's wish.
+        # Without warm starts the future depends on the state alone, not on the history. MuJoCo must not
+        # reset the world by itself.
         option.disableflags |= (
             mujoco.mjtDisableBit.mjDSBL_WARMSTART | mujoco.mjtDisableBit.mjDSBL_AUTORESET
         )

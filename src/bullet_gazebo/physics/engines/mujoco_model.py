@@ -1,6 +1,5 @@
 """Writes a ModelDescription into MuJoCo's model of the whole world."""
 
-from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -31,7 +30,7 @@ FASTENED = Inertia(mass=1.0, ixx=1.0, iyy=1.0, izz=1.0)  # of links that nothing
 
 @dataclass
 class Elements:
-    """What a model has become: bodies by link, joints by name, and its free joint, if it has one."""
+    """A model in MuJoCo: bodies by link, joints by name, and its free joint, if it has one."""
 
     bodies: dict[str, mujoco.MjsBody] = field(default_factory=dict)
     joints: dict[str, mujoco.MjsJoint] = field(default_factory=dict)
@@ -40,7 +39,7 @@ class Elements:
 
 
 class ModelWriter:
-    """Writes one model. Names begin with `key`, so that they are unique in the world."""
+    """Writes one model. Names begin with `key` to be unique in the world."""
 
     def __init__(
         self,
@@ -49,7 +48,13 @@ class ModelWriter:
         model: ModelDescription,
         inertias: Mapping[str, Inertia | None],
     ) -> None:
-        """`inertias`, by link, go before those of the description."""
+        """
+        Args:
+            spec: of the world.
+            key: prefix of names.
+            model: the model.
+            inertias: of links, which replace those of the description.
+        """
         self._spec = spec
         self._key = key
         self._model = model
@@ -66,9 +71,7 @@ class ModelWriter:
         base = self._add_link(self._spec.worldbody, model.root, pose)
         if not model.fixed_base:
             self._elements.free = base.add_freejoint()
-        below = defaultdict(list)
-        for joint in model.joints.values():
-            below[joint.parent].append(joint)
+        below = model.joints_by_parent()
         for link, where in model.islands.items():
             self._add_link(base, link, where)
         order = [model.root, *model.islands]
@@ -91,7 +94,7 @@ class ModelWriter:
         axes, moments = principal(inertia)
         body.mass, body.ipos, body.iquat = inertia.mass, inertia.com.position, wxyz(axes)
         body.inertia = moments
-        if not is_real(moments):  # MuJoCo refuses them, ODE takes them: they are put in later
+        if not is_real(moments):  # MuJoCo refuses them, ODE doesn't: they are set after compiling
             body.inertia = (max(moments),) * 3
             self._elements.moments[link] = moments
         for shape in self._model.links[link].collisions:
@@ -109,7 +112,7 @@ class ModelWriter:
             type=mujoco.mjtJoint.mjJNT_SLIDE if slide else mujoco.mjtJoint.mjJNT_HINGE,
             pos=joint.anchor.position,
             axis=rotate(joint.anchor.orientation, joint.axis),
-            limited=mujoco.mjtLimited.mjLIMITED_FALSE,  # the body sets stops itself, also impossible ones
+            limited=mujoco.mjtLimited.mjLIMITED_FALSE,  # MujocoBody sets stops, also crossed ones
         )
 
     def _add_shape(self, body: mujoco.MjsBody, shape: Shape) -> None:
@@ -128,12 +131,12 @@ class ModelWriter:
         elif shape.kind == "sphere":
             geom.size = [shape.size[0], 0.0, 0.0]
         else:
-            geom.size = [0.0, 0.0, 1.0]  # without end
+            geom.size = [0.0, 0.0, 1.0]  # infinite
 
     def _add_mesh(self, shape: Shape) -> str:
         """Adds the points of a mesh, once for each scale; returns their name."""
         assert shape.solid is not None  # collisions are read
-        name = f"{shape.mesh}:{shape.solid.digest}:{shape.size}"  # refusals show it
+        name = f"{shape.mesh}:{shape.solid.digest}:{shape.size}"  # MuJoCo's errors show it
         if self._spec.mesh(name) is None:
             points = np.unique(np.concatenate(shape.solid.hulls), axis=0) * np.array(shape.size)
             self._spec.add_mesh(
@@ -143,7 +146,7 @@ class ModelWriter:
         return name
 
     def _keep_apart(self) -> None:
-        """Two links of a model meet if either of them wants it, and no joint connects them (SDF's rule)."""
+        """Excludes contacts of links unless one wants self-collision and no joint connects them (SDF)."""
         model = self._model
         joined = {frozenset((joint.parent, joint.child)) for joint in model.joints.values()}
         solid = [link for link in model.links.values() if link.collisions]
@@ -156,7 +159,7 @@ class ModelWriter:
 
 
 def principal(inertia: Inertia) -> tuple[Quaternion, Vector]:
-    """Returns the principal axes, seen from the link, and the moments [kg m²] about them."""
+    """Returns the principal axes seen from the link, and the moments [kg m²] about them."""
     if inertia.ixy == inertia.ixz == inertia.iyz == 0.0:
         return inertia.com.orientation, (inertia.ixx, inertia.iyy, inertia.izz)
     moments, axes = np.linalg.eigh(tensor_in(inertia, IDENTITY))
@@ -167,22 +170,22 @@ def principal(inertia: Inertia) -> tuple[Quaternion, Vector]:
 
 
 def is_real(moments: Vector) -> bool:
-    """Returns whether a body can have these moments: none is above the sum of the others."""
+    """Returns whether a body can have these moments: none exceeds the sum of the others."""
     return max(moments) <= sum(moments) - max(moments)
 
 
 def wxyz(q: Quaternion) -> Quaternion:
-    """MuJoCo's order of a quaternion."""
+    """Returns a quaternion in MuJoCo's order."""
     return (q[3], q[0], q[1], q[2])
 
 
 def xyzw(q: np.ndarray) -> Quaternion:
-    """Our order of a quaternion."""
+    """Returns MuJoCo's quaternion in our order."""
     return (float(q[1]), float(q[2]), float(q[3]), float(q[0]))
 
 
 def priority(mu: float) -> int:
-    """Of two coefficients of friction ODE takes the smaller one, and MuJoCo that of the higher priority."""
+    """Returns the priority with which MuJoCo uses the smaller of two friction coefficients, as ODE does."""
     return -int(min(mu * MU_STEPS, MOST_PRIORITY))
 
 
@@ -190,7 +193,7 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """Returns the model.
 
     Raises:
-        DescriptionError: if MuJoCo refuses it, in its words.
+        DescriptionError: if MuJoCo refuses it, with its text.
     """
     try:
         return spec.compile()

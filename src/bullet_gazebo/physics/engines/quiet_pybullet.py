@@ -1,7 +1,7 @@
-"""PyBullet's module, which is imported here and nowhere else.
+"""Imports pybullet without its greeting. Import it only from here.
 
-It greets every process with a line about when it was built, written from C to the C library's `stderr`,
-where Python can't filter it.
+pybullet greets every process with its build time, written in C to the C library's `stderr`, where Python
+can't filter it.
 """
 
 import contextlib
@@ -17,10 +17,10 @@ GREETING = b"pybullet build time:"
 
 @contextlib.contextmanager
 def _without_greeting() -> Iterator[None]:
-    """Leaves out the line.
+    """Drops the line.
 
-    Only what C writes to its stream `stderr` is held, in memory. The file descriptor stays as it is, so that
-    nobody else's output is touched: another thread may be within a write at any moment.
+    Only C's stream `stderr` is redirected, into memory. The file descriptor stays, so that other threads,
+    which may be writing at any moment, aren't affected.
     """
     library = ctypes.CDLL(None)
     try:

@@ -1,4 +1,4 @@
-"""Reading XML model files: numbers and names, with the place that they stand at."""
+"""Numbers and names in XML model files; errors name the place."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -9,11 +9,15 @@ from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
 from files.content import FileError, TooLarge
 from files.xml_text import parse
 
-SHOWN = 80  # characters of a faulty value that a message repeats
+SHOWN = 80  # characters of a faulty value that an error quotes
 
 
 def parse_xml(text: str | bytes, count: Callable[[int], None] | None = None) -> Element:
-    """Returns the root element of a text, or of what a file holds; `count` is told of the elements.
+    """Returns the root element of a text, or of the content of a file.
+
+    Args:
+        text: the text or content.
+        count: called now and then with the number of further elements; it may raise.
 
     Raises:
         DescriptionError: if it isn't well-formed, or has a document type.
@@ -29,7 +33,7 @@ def parse_xml(text: str | bytes, count: Callable[[int], None] | None = None) -> 
 
 @contextmanager
 def place(where: str) -> Iterator[None]:
-    """Puts `where` before the text of a DescriptionError that is raised inside."""
+    """Prefixes `where` to the text of a DescriptionError that is raised in the block."""
     try:
         yield
     except DescriptionError as error:
@@ -38,7 +42,7 @@ def place(where: str) -> Iterator[None]:
 
 @contextmanager
 def files_named_by_a_model(where: str) -> Iterator[None]:
-    """Makes what the system says to a strange file name, one too long for it, a DescriptionError."""
+    """Turns the system's errors over strange file names, such as too long ones, into DescriptionError."""
     try:
         yield
     except DescriptionError:
@@ -51,7 +55,7 @@ def finite(text: str, where: str) -> float:
     """Returns the number in `text`.
 
     Raises:
-        DescriptionError: if it is none; the text begins with `where`.
+        DescriptionError: if it isn't a finite number; the text begins with `where`.
     """
     try:
         value = float(text)
@@ -64,7 +68,7 @@ def finite(text: str, where: str) -> float:
 
 def numbers(text: str | None, where: str, count: int) -> tuple[float, ...]:
     """Returns `count` numbers separated by blanks. `where` names them in the error's text."""
-    words = (text or "").split(None, count)  # of a text of millions no more than are wanted
+    words = (text or "").split(None, count)  # a long text isn't split further
     if len(words) != count:
         raise DescriptionError(f"{where} must hold {count} numbers, not '{shown(text or '')}'")
     return tuple(finite(word, where) for word in words)
@@ -80,7 +84,7 @@ def named(element: Element, what: str) -> str:
     """Returns the attribute `name`.
 
     Raises:
-        DescriptionError: if it is missing, or too long for the engine, which knows links and joints by it.
+        DescriptionError: if it is missing, or too long for an engine.
     """
     name = element.get("name", "")
     if not name:
@@ -91,7 +95,7 @@ def named(element: Element, what: str) -> str:
 
 
 def shown(text: str) -> str:
-    """Returns `text` as one line, cut to a length that suits a message."""
+    """Returns `text` as one line, cut to a length for an error."""
     line = " ".join(text[: 4 * SHOWN].split())
     return line if len(line) <= SHOWN else f"{line[:SHOWN]}…"
 
@@ -100,7 +104,7 @@ def positive(sizes: tuple[float, ...], where: str) -> tuple[float, ...]:
     """Returns `sizes` [m].
 
     Raises:
-        DescriptionError: if one of them is not above zero.
+        DescriptionError: if one of them isn't positive.
     """
     if min(sizes) <= 0.0:
         raise DescriptionError(f"{where}: sizes must be above 0, not {sizes}")

@@ -1,12 +1,12 @@
-"""The points that a convex body is made of, as few as an engine can compute with in time."""
+"""Convex hulls with as few points as an engine can handle in time."""
 
 import numpy as np
 
 MOST_POINTS = 4096  # of a hull; PyBullet walks through all of them at each contact, in each step
-PIECE = 50_000  # points that are looked at together: memory
-LEFT = 0.9  # of the points; where more are left it is of no use to look again
-# Points and directions of one product: larger ones are shared among threads, which wait for each other on a
-# busy machine.
+PIECE = 50_000  # points that are processed together, to bound memory
+LEFT = 0.9  # of the points; if more are left, another pass is of no use
+# Points and directions of one product: NumPy splits larger ones among threads, which wait for each other on
+# a busy machine.
 BLOCK = 256
 
 
@@ -27,14 +27,14 @@ def hull_points(points: np.ndarray) -> np.ndarray:
 
 
 def _different(points: np.ndarray) -> np.ndarray:
-    """Each point once. np.unique does it too, and holds all other threads for as long as it sorts rows."""
+    """Returns each point once. np.unique would block all other threads while it sorts rows."""
     order = np.lexsort(points.T)
     new = np.append(True, (np.diff(points[order], axis=0) != 0.0).any(axis=1))
     return points[np.sort(order[new])]
 
 
 def _corners(points: np.ndarray) -> np.ndarray:
-    """The corners of the convex hull; all points, if it has no inside."""
+    """Returns the corners of the convex hull; all points, if they are flat."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -44,7 +44,7 @@ def _corners(points: np.ndarray) -> np.ndarray:
 
 
 def _outermost(points: np.ndarray) -> np.ndarray:
-    """The farthest points in `MOST_POINTS` directions that a spiral spreads evenly over the sphere."""
+    """Returns the farthest points in `MOST_POINTS` directions, spread evenly over the sphere by a spiral."""
     turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(MOST_POINTS)
     height = 1.0 - (2.0 * np.arange(MOST_POINTS) + 1.0) / MOST_POINTS
     ring = np.sqrt(1.0 - height**2)

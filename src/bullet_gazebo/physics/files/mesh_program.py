@@ -334,13 +334,13 @@ def _leave_positions(mesh: Element) -> None:
     sources = [e for e in mesh if e.tag == "source" and e.get("id") == name][:1]
     if not sources:
         raise DescriptionError(f"the source '{shown(name)}' of its positions is missing")
-    # NumPy stops at what is no number, without an error.
+    # NumPy silently stops at anything else.
     if NO_NUMBER.search(sources[0].findtext("float_array", "")):
-        raise DescriptionError(f"source '{shown(name)}' holds what is no number")
+        raise DescriptionError(f"source '{shown(name)}' holds something that isn't a number")
     lists = [each for each in mesh if each.tag in FACES]
     for each in (element for faces in lists for element in faces.iter()):
         if each.tag in ("p", "vcount") and NO_INDEX.search(each.text or ""):
-            raise DescriptionError(f"a <{each.tag}> holds what is no index")
+            raise DescriptionError(f"a <{each.tag}> holds something that isn't an index")
         if each.tag == "input" and each.get("semantic") != "VERTEX":
             # It only tells how many indices a corner has; its own source may be missing.
             each.set("semantic", "TANGENT")

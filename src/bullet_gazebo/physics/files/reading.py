@@ -1,4 +1,4 @@
-"""How much one model or world may make its reader read, and the files that it names."""
+"""What reading one model or world needs: the files that it names, and limits on their number and size."""
 
 import os
 import time
@@ -15,7 +15,14 @@ from files.content import MAX_BYTES, FileError, TooLarge, read_file
 from files.xml_text import MAX_ELEMENTS
 
 MeshFile = tuple[str, Mesh | None]
-"""A file's path, and what it holds if it was read."""
+"""A file's path, and its mesh if it was read."""
+
+
+# Limits on the text and all that it includes, counted each time it is included.
+MAX_FILES = 1000  # different ones
+MAX_MESH_BYTES = 400_000_000  # of different mesh files, which take about twice that of memory
+MAX_MODELS = 5000  # in a world, or nested in a model
+MAX_SECONDS = 60.0  # [s] of computing, however busy the machine is otherwise
 
 
 def _no_packages(name: str) -> str:
@@ -24,7 +31,7 @@ def _no_packages(name: str) -> str:
 
 @dataclass(frozen=True)
 class Resources:
-    """Where the URIs of model files lead: folders of models, of media, and ROS packages by name.
+    """Resolves the URIs in model files: folders of models, of media, and ROS packages by name.
 
     `package` returns a package's folder, or raises LookupError.
     """
@@ -37,18 +44,16 @@ class Resources:
         """Returns the existing file or folder of `uri`, relative names being looked up in `folder`.
 
         Raises:
-            DescriptionError: if it isn't found; the text says where it was looked for.
+            DescriptionError: if it isn't found; the text lists where it was looked for.
         """
-        with files_named_by_a_model(
-            f"'{shown(uri)}' is not found"
-        ):  # ~ of somebody with a null character
+        with files_named_by_a_model(f"'{shown(uri)}' is not found"):  # ~ and a null character
             tried = list(self._candidates(unquote(uri.strip()), folder))
         reason = ""
         for path in tried:
             try:
                 if path.exists():
                     return path
-            except (OSError, ValueError) as error:  # too long for a name, or where nobody may look
+            except (OSError, ValueError) as error:  # a name that is too long, or no permission
                 reason = f"; {getattr(error, 'strerror', None) or error}"
         where = ", ".join(str(path) for path in tried[:5]) or "no folder to look in"
         raise DescriptionError(f"'{uri[:200]}' is not found (looked for: {where[:1000]}{reason})")
@@ -65,13 +70,13 @@ class Resources:
         if scheme == "file":
             path = Path(rest)
             return [path] if path.is_absolute() else [f / path for f in self._relative(folder)]
-        raise DescriptionError(f"'{uri[:200]}': {scheme[:20]}:// is not read here")
+        raise DescriptionError(f"'{uri[:200]}': {scheme[:20]}:// is not supported")
 
     def _relative(self, folder: Path | None) -> list[Path]:
         return [*([] if folder is None else [folder]), *self.media]
 
     def _in_package(self, rest: str) -> list[Path]:
-        """sdformat turns a URDF's package:// into model://, so both are looked up in packages too."""
+        """Looks a URI up in ROS packages: sdformat turns a URDF's package:// into model://."""
         name, _, inside = rest.partition("/")
         try:
             return [Path(self.package(name), inside)]
@@ -81,7 +86,7 @@ class Resources:
 
 @dataclass
 class MeshFinder:
-    """Finds the mesh files of one model; those of visuals may be missing, with a warning."""
+    """Finds the mesh files of one model. Those of visuals may be missing, with a warning."""
 
     resources: Resources
     read: Callable[[Path, Submesh | None], Mesh]
@@ -91,9 +96,9 @@ class MeshFinder:
     def find(
         self, uri: str, where: str, needed: bool, submesh: Submesh | None = None
     ) -> MeshFile | None:
-        """Returns the file's path and what it holds, or its `submesh`; None for one that is left out.
+        """Returns the file's path and its mesh, or the `submesh`; None for one that is left out.
 
-        What isn't `needed`, that of a visual, is looked for and not read: nothing is drawn in here.
+        A visual's isn't `needed`: it is looked for but not read, since nothing is drawn here.
 
         Raises:
             DescriptionError: if it is `needed` and can't be used.
@@ -113,27 +118,24 @@ class MeshFinder:
             return None
 
 
-# All of it together: the text itself and what it includes, each time that it includes it.
-MAX_FILES = 1000  # different ones
-MAX_MESH_BYTES = 400_000_000  # of different mesh files, which take about twice that of memory
-MAX_MODELS = 5000  # in a world, or nested in a model
-MAX_SECONDS = 60.0  # [s] of computing, however busy the machine is otherwise
-
-
 def _never() -> bool:
     return False
 
 
 class Reading:
-    """What reading one model or world has taken so far; beyond a limit it ends with LimitExceeded.
+    """Counts what reading one model or world takes, and ends it with LimitExceeded beyond a limit.
 
-    The limits: MAX_BYTES, MAX_ELEMENTS, MAX_FILES, MAX_MESH_BYTES, MAX_MODELS and MAX_SECONDS. A file is
-    parsed once, however often it is included; its elements count each time. So is a mesh file, by however
-    many models it is named; each named part of it is read by itself.
+    The limits are MAX_BYTES, MAX_ELEMENTS, MAX_FILES, MAX_MESH_BYTES, MAX_MODELS and MAX_SECONDS. Each file
+    is parsed once, but its elements count each time it is included. Each mesh file, or named part of one, is
+    read once.
     """
 
     def __init__(self, cancelled: Callable[[], bool] = _never) -> None:
-        """Made in the thread that reads; it ends as well once `cancelled` returns true."""
+        """
+        Args:
+            cancelled: ends the reading when it returns true. The reading thread makes this object, since
+                its processor time counts.
+        """
         self._cancelled = cancelled
         self._end = time.thread_time() + MAX_SECONDS
         self._bytes = self._elements = self._models = self._mesh_bytes = 0
@@ -153,11 +155,11 @@ class Reading:
         return parse_xml(text, self._count)
 
     def open(self, path: Path) -> Element:
-        """Returns the root element of a file, which is the same object each time: don't change it.
+        """Returns the root element of a file. It is the same object each time: don't change it.
 
         Raises:
             DescriptionError: if it can't be read; the text names it.
-            LimitExceeded: if it is too much.
+            LimitExceeded: if it exceeds a limit.
         """
         with place(str(path)):
             if path in self._files:
@@ -178,11 +180,11 @@ class Reading:
             return root
 
     def mesh(self, path: Path, submesh: Submesh | None = None) -> Mesh:
-        """Returns what a mesh file, or a named part of it, holds, which is the same object each time.
+        """Returns the mesh of a file or of a named part of it. It is the same object each time.
 
         Raises:
             DescriptionError: if it can't be simulated; the text names it.
-            LimitExceeded: if it is too much.
+            LimitExceeded: if it exceeds a limit.
         """
         if (path, submesh) not in self._meshes:
             with files_named_by_a_model(f"mesh '{path}'"):
@@ -195,10 +197,10 @@ class Reading:
         return self._meshes[path, submesh]
 
     def model(self) -> None:
-        """Counts one model more.
+        """Counts one more model.
 
         Raises:
-            LimitExceeded: if that is one too many.
+            LimitExceeded: if there are too many.
         """
         self._models += 1
         if self._models > MAX_MODELS:
@@ -206,10 +208,10 @@ class Reading:
         self.check()
 
     def check(self) -> None:
-        """For everybody who reads one thing after the other.
+        """Checks the time. Readers call it before each link, joint or shape.
 
         Raises:
-            LimitExceeded: if it has taken too long, or was cancelled.
+            LimitExceeded: if reading has taken too long or was cancelled.
         """
         if time.thread_time() > self._end:
             raise LimitExceeded(f"reading takes more than {MAX_SECONDS:g} s (MAX_SECONDS)")

@@ -1,7 +1,7 @@
 """Reads SDF models, version 1.4 to 1.7 (sdformat.org), into a ModelDescription.
 
-Links keep their frames; joints become parent-relative. Nested and included models melt into the outer
-one, their links and joints named `nested::name`. In a static model links may stand by themselves.
+Links keep their frames; joints become parent-relative. Nested and included models become part of the outer
+one, with links and joints named `nested::name`. Links of a static model need no joints.
 """
 
 import math
@@ -48,14 +48,21 @@ from bullet_gazebo.physics.lumping import (
 from bullet_gazebo.physics.pose import Pose, Vector, conjugate, rotate
 
 OVERRIDES = ("pose", "static")
-BUILT_IN = "model://"
-NEWEST_FILE = (1, 7)
-FILE_VERSION = re.compile(r"(\d{1,9})\.(\d{1,9})", re.ASCII)
+MODEL_URI = "model://"
+
+
+KINDS = ("revolute", "continuous", "prismatic", "fixed")
+NO_LIMIT = 1e16  # [rad, m, N m, N, rad/s, m/s]; SDF's own figure for "none"
+WORLD = "world"
+JOINT_FRAME_SINCE = (1, 5)  # before that, axes were given in the model's frame
+MAX_NESTING = 10
+VERSION = re.compile(r"(\d{1,9})\.(\d{1,9})(\.\d+)?", re.ASCII)
+NEWEST = (1, 7)
 
 
 @dataclass(frozen=True)
 class FileContext:
-    """Where an element of a model file comes from: what its URIs and its version mean."""
+    """The file of an element: how its URIs are resolved, and its version of SDF."""
 
     resources: Resources
     reading: Reading
@@ -80,7 +87,7 @@ def open_include(include: Element, context: FileContext) -> tuple[Element, FileC
 def included_name(include: Element) -> str:
     """Returns the plain name behind the URI: `sun` of `model://sun`."""
     uri = (include.findtext("uri") or "").strip()
-    return uri.removeprefix(BUILT_IN).strip("/") if uri.startswith(BUILT_IN) else ""
+    return uri.removeprefix(MODEL_URI).strip("/") if uri.startswith(MODEL_URI) else ""
 
 
 def _open(uri: str, context: FileContext) -> tuple[Element, FileContext]:
@@ -99,7 +106,7 @@ def _open(uri: str, context: FileContext) -> tuple[Element, FileContext]:
 
 
 def _overridden(entity: Element, include: Element) -> Element:
-    """A copy of the model's top element; what lies deeper is shared, and nobody changes it."""
+    """Returns a copy of the model's top element. Its children are shared: nobody changes them."""
     given = [child for child in include if child.tag in OVERRIDES]
     tags = {child.tag for child in given}
     copy = Element(entity.tag, entity.attrib)
@@ -113,7 +120,7 @@ def _overridden(entity: Element, include: Element) -> Element:
 
 
 def _model_file(folder: Path, reading: Reading) -> Path:
-    """The newest file that model.config offers for a version that is read here; else model.sdf."""
+    """Returns the newest file of model.config whose version is supported; without one, model.sdf."""
     config = folder / "model.config"
     if not config.is_file():
         return folder / "model.sdf"
@@ -125,12 +132,12 @@ def _model_file(folder: Path, reading: Reading) -> Path:
         ]
         if not files:
             raise DescriptionError("it names no <sdf> file")
-        readable = [file for file in files if file[0] <= NEWEST_FILE] or files
+        readable = [file for file in files if file[0] <= NEWEST] or files
         return folder / max(readable)[1]
 
 
 def _version(text: str) -> tuple[int, int] | None:
-    match = FILE_VERSION.fullmatch(text.strip())
+    match = VERSION.fullmatch(text.strip())
     return None if match is None else (int(match.group(1)), int(match.group(2)))
 
 
@@ -141,15 +148,9 @@ def renamed(entity: Element, name: str) -> Element:
     return copy
 
 
-KINDS = ("revolute", "continuous", "prismatic", "fixed")
-NO_LIMIT = 1e16  # [rad, m, N m, N, rad/s, m/s]; SDF's own figure for "none"
-WORLD = "world"
-JOINT_FRAME_SINCE = (1, 5)  # before that, axes were given in the model's frame
-
-
 @dataclass(frozen=True)
 class JointReader:
-    """Reads joints of a model whose frames are known."""
+    """Reads the joints of a model whose frames are known."""
 
     frames: Frames
     version: tuple[int, int]
@@ -159,7 +160,7 @@ class JointReader:
         """Reads one joint.
 
         Raises:
-            DescriptionError: if it is broken, or of a kind that the engine hasn't.
+            DescriptionError: if it is broken, or of a kind that isn't simulated.
         """
         name = named(element, "joint")
         where = f"joint '{name}'"
@@ -212,7 +213,7 @@ class JointReader:
             self.warnings.append(f"{where}: the spring is left out")
 
     def _direction(self, joint: Joint, axis: Element | None, where: str) -> Vector:
-        """The axis in the joint's frame, of length 1."""
+        """Returns the axis in the joint's frame, of length 1."""
         xyz = None if axis is None else axis.find("xyz")
         text = "0 0 1" if xyz is None else xyz.text
         x, y, z = numbers(text, f"{where}: <xyz>", 3)
@@ -240,14 +241,9 @@ def ends(joint: Element, role: str) -> str:
     return name
 
 
-MAX_NESTING = 10
-VERSION = re.compile(r"1\.(\d{1,9})(\.\d+)?", re.ASCII)
-NEWEST = (1, 7)
-
-
 @dataclass
 class _Parts:
-    """What a model and the models in it consist of, in the outer model's frame."""
+    """The contents of a model and its nested models, in the outer model's frame."""
 
     links: list[Link] = field(default_factory=list)
     poses: dict[str, Pose] = field(default_factory=dict)
@@ -283,12 +279,12 @@ def sdf_version(root: Element) -> tuple[int, int]:
     """
     if root.tag not in ("sdf", "gazebo"):
         raise DescriptionError(f"the root element is <{shown(root.tag)}>, not <sdf>")
-    match = VERSION.fullmatch(root.get("version", "1.4").strip())
-    if match is None:
+    version = _version(root.get("version", "1.4"))
+    if version is None or version[0] != 1:
         raise DescriptionError(
-            f"<sdf version>: '{shown(root.get('version', ''))}' is no version 1.x"
+            f"<sdf version>: '{shown(root.get('version', ''))}' isn't a version 1.x"
         )
-    return 1, int(match.group(1))
+    return version
 
 
 def first_entity(root: Element) -> Element:
@@ -342,7 +338,7 @@ def _assemble(name: str, parts: _Parts, static: bool) -> ModelDescription:
 
 
 def _read_parts(model: Element, context: FileContext, static: bool, depth: int) -> _Parts:
-    """`depth` models may still be nested in this one."""
+    """Reads the contents of a model, in which `depth` levels of models may still be nested."""
     if depth == 0:
         raise LimitExceeded(f"models are nested more than {MAX_NESTING} deep (MAX_NESTING)")
     context.reading.model()
@@ -391,7 +387,7 @@ def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
     for joint in inner.joints:
         joint.name, joint.child = f"{prefix}::{joint.name}", f"{prefix}::{joint.child}"
         joint.parent = joint.parent if joint.parent == WORLD else f"{prefix}::{joint.parent}"
-        # The nested model's own frame was the world to it; a joint to the world has to know better.
+        # The nested model was read in its own frame, so its joints to the world would be misplaced.
         if joint.parent == WORLD:
             raise DescriptionError(
                 f"joint '{joint.name}': a nested model can't be joined to the world"

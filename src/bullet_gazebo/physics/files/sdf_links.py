@@ -1,4 +1,4 @@
-"""Inertia and shapes of an SDF link (sdformat.org, specification 1.4 to 1.7)."""
+"""Poses, inertia and shapes of SDF links (sdformat.org, specification 1.4 to 1.7)."""
 
 import math
 from collections.abc import Iterator
@@ -12,6 +12,7 @@ from bullet_gazebo.physics.files.elements import (
     numbers,
     positive,
     shown,
+    truth,
 )
 from bullet_gazebo.physics.files.meshes import Submesh
 from bullet_gazebo.physics.files.reading import MeshFile, MeshFinder, Reading
@@ -20,8 +21,12 @@ from bullet_gazebo.physics.pose import Pose, Quaternion, cross, from_rpy, normal
 MODEL = "__model__"
 
 
+NO_NAME = "__default__"  # of a submesh: as if it weren't there
+MOMENTS = {"ixx": 1.0, "ixy": 0.0, "ixz": 0.0, "iyy": 1.0, "iyz": 0.0, "izz": 1.0}  # defaults
+
+
 def read_pose(parent: Element, where: str) -> tuple[Pose, str]:
-    """Returns the `<pose>` of `parent` and the frame that it names ('' for the usual one)."""
+    """Returns the `<pose>` of `parent`, and the frame that it is relative to ('' for the default)."""
     element = parent.find("pose")
     if element is None or not (element.text or "").strip():
         return Pose(), "" if element is None else element.get("relative_to", "")
@@ -37,14 +42,14 @@ class Frames:
         self._known: dict[str, Pose] = {MODEL: Pose()}
 
     def add(self, name: str, pose: Pose, relative_to: str) -> None:
-        """Records that frame `name` is at `pose`, seen from `relative_to` (the model's if empty)."""
+        """Adds frame `name` at `pose`, seen from `relative_to` (the model's frame if empty)."""
         self._given.setdefault(name, (pose, relative_to or MODEL))
 
     def resolve(self, name: str) -> Pose:
         """Returns frame `name` seen from the model's.
 
         Raises:
-            DescriptionError: if unknown or circular.
+            DescriptionError: if it is unknown or circular.
         """
         chain: dict[str, Pose] = {}
         while name not in self._known:
@@ -59,10 +64,6 @@ class Frames:
         for inner, step in reversed(chain.items()):
             self._known[inner] = pose = pose.compose(step)
         return pose
-
-
-NO_NAME = "__default__"  # of a submesh: as if it weren't there
-MOMENTS = {"ixx": 1.0, "ixy": 0.0, "ixz": 0.0, "iyy": 1.0, "iyz": 0.0, "izz": 1.0}  # defaults
 
 
 def value(parent: Element | None, path: str, where: str, default: float) -> float:
@@ -86,7 +87,7 @@ def read_inertia(link: Element, where: str, static: bool) -> Inertia:
 
 @dataclass
 class ShapeReader:
-    """Reads the collisions or visuals of the links of one model."""
+    """Reads the collisions and visuals of the links of one model."""
 
     meshes: MeshFinder
     frames: Frames
@@ -132,15 +133,8 @@ class ShapeReader:
             pose = pose.compose(Pose(orientation=_onto_normal(solid, where)))
         else:
             positive(size, f"{where}, {solid.tag}")
-        shape = Shape(
-            solid.tag,
-            size,
-            pose,
-            mesh[0],
-            _color(element, where),
-            element.get("name", ""),
-            solid=mesh[1],
-        )
+        color, name = _color(element, where), element.get("name", "")
+        shape = Shape(solid.tag, size, pose, mesh[0], color, name, solid=mesh[1])
         return replace(shape, mu=_friction(element, where)) if collides else shape
 
 
@@ -148,7 +142,7 @@ def _submesh(mesh: Element) -> Submesh | None:
     name = (mesh.findtext("submesh/name") or "").strip()
     if name in ("", NO_NAME):
         return None
-    return Submesh(name, (mesh.findtext("submesh/center") or "").strip().lower() in ("1", "true"))
+    return Submesh(name, truth(mesh.findtext("submesh/center")))
 
 
 def _friction(collision: Element, where: str) -> float:
@@ -174,7 +168,7 @@ def _size(solid: Element, where: str) -> tuple[float, ...]:
 
 
 def _onto_normal(plane: Element, where: str) -> Quaternion:
-    """The shortest rotation that takes z onto the plane's normal."""
+    """Returns the shortest rotation of z onto the plane's normal."""
     x, y, z = numbers(plane.findtext("normal", "0 0 1"), f"{where}: <normal>", 3)
     length = (x * x + y * y + z * z) ** 0.5
     if not 0.0 < length < math.inf:

@@ -1,4 +1,8 @@
-"""A whole URDF: its links, joints and extensions, its fixed joints lumped as Gazebo does."""
+"""Reads URDF text (wiki.ros.org/urdf/XML) into a ModelDescription, its fixed joints lumped as Gazebo does.
+
+Faults are treated as urdfdom and sdformat do (docs/differences.md lists exceptions): a shape or inertial
+that can't be read is left out of its link with a warning; a joint that can't be read refuses the robot.
+"""
 
 import math
 from collections.abc import Callable, Iterator
@@ -32,9 +36,20 @@ from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
 from bullet_gazebo.physics.lumping import check_count, find_roots, lump_fixed_joints, unique
 from bullet_gazebo.physics.pose import Pose, from_rpy
 
+KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+UNUSED = {  # elements that urdfdom reads and the physics doesn't use, with their numbers
+    "mimic": ("multiplier", "offset"),
+    "calibration": ("rising", "falling"),
+    "safety_controller": ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"),
+}
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+Part = TypeVar("Part")
+YES = ("true", "yes", "1")
+NO = ("false", "no", "0")
+
 
 def read_origin(element: Element, place: str) -> Pose:
-    """Returns the `<origin>` of `element`; none, or an attribute that is missing, is zero."""
+    """Returns the `<origin>` of `element`; what is missing is zero."""
     origin = element.find("origin")
     if origin is None:
         return Pose()
@@ -57,14 +72,6 @@ def read_numbers(element: Element, key: str, place: str, count: int) -> tuple[fl
     return numbers(element.get(key), f"{place}: <{element.tag} {key}>", count)
 
 
-KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-UNUSED = {  # what the physics doesn't act on, and urdfdom reads: element, its numbers
-    "mimic": ("multiplier", "offset"),
-    "calibration": ("rising", "falling"),
-    "safety_controller": ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"),
-}
-
-
 def read_joint(element: Element, warnings: list[str]) -> Joint:
     """Returns the joint of a `<joint>` element.
 
@@ -75,7 +82,7 @@ def read_joint(element: Element, warnings: list[str]) -> Joint:
     place = f"joint '{name}'"
     kind = element.get("type", "")
     if kind not in KINDS:
-        raise DescriptionError(f"{place}: type '{shown(kind)}' is none of {', '.join(KINDS)}")
+        raise DescriptionError(f"{place}: type '{shown(kind)}' is not one of {', '.join(KINDS)}")
     joint = Joint(
         name=name,
         kind=kind,
@@ -126,7 +133,7 @@ def _set_dynamics(joint: Joint, element: Element, place: str) -> None:
 
 
 def _check_unused(element: Element, place: str) -> None:
-    """A robot that no other program could read is refused here, too."""
+    """Refuses values that other programs couldn't read."""
     for tag, keys in UNUSED.items():
         child = element.find(tag)
         if child is None:
@@ -144,11 +151,6 @@ def _referred_link(element: Element, role: str, place: str) -> str:
     return child.get("link", "")
 
 
-MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-
-Part = TypeVar("Part")
-
-
 @dataclass
 class LinkReader:
     """Reads the links of one robot."""
@@ -159,7 +161,7 @@ class LinkReader:
     _materials: dict[str, Color | None] = field(default_factory=dict)
 
     def learn_materials(self, robot: Element) -> None:
-        """Keeps the colours that visuals refer to by name."""
+        """Collects the colours that visuals refer to by name."""
         for material in robot.findall("material"):
             name = material.get("name", "")
             self._materials[name] = self._or_none(_rgba, material, f"material '{shown(name)}'")
@@ -168,7 +170,7 @@ class LinkReader:
         ):  # the first link that gives a colour
             name = material.get("name", "")
             if name and name not in self._materials:
-                with suppress(DescriptionError):  # its link's reading tells
+                with suppress(DescriptionError):  # reading its link will report it
                     color = _rgba(material, name)
                     if color is not None:
                         self._materials[name] = color
@@ -194,7 +196,7 @@ class LinkReader:
     def _or_none(
         self, read: Callable[[Element, str], Part | None], element: Element, place: str
     ) -> Part | None:
-        """What `read` makes of `element`; None, and a warning, if that can't be read."""
+        """Returns `read(element, place)`; None, and a warning, if the element can't be read."""
         try:
             return read(element, place)
         except LimitExceeded:
@@ -214,7 +216,7 @@ class LinkReader:
                 yield replace(shape, rgba=self._color(element, place))
 
     def _with_mesh(self, shape: Shape, element: Element, place: str) -> Shape | None:
-        """None for a visual whose mesh is missing."""
+        """Returns the shape with its mesh; None for a visual whose mesh is missing."""
         uri, needed = _solid(element, place).get("filename", ""), element.tag == "collision"
         try:
             with files_named_by_a_model(place):
@@ -246,16 +248,16 @@ def _inertia(inertial: Element, place: str) -> Inertia:
 
 
 def _check_possible(inertia: Inertia, place: str) -> None:
-    """What can be read, and no body has, refuses the robot: Gazebo's engine ends there."""
+    """Refuses a negative mass or moment of inertia: Gazebo's engine crashes over it."""
     if min(inertia.mass, inertia.ixx, inertia.iyy, inertia.izz) < 0.0:
         raise DescriptionError(f"{place}: mass and moments of inertia can't be negative")
 
 
 def _shape(element: Element, place: str) -> Shape:
-    """The shape without its mesh file and colour."""
+    """Returns the shape without its mesh and colour."""
     solid = _solid(element, place)
     size = _size(solid, place)
-    if element.tag == "collision":  # of size 0 there is nothing to touch
+    if element.tag == "collision":  # a visual may have size 0
         positive(tuple(map(abs, size)) if solid.tag == "mesh" else size, f"{place}, {solid.tag}")
     name = element.get("name", "")
     return Shape(solid.tag, size, read_origin(element, place), name=name)
@@ -290,14 +292,11 @@ def _rgba(material: Element, place: str) -> Color | None:
     return (r, g, b, a)
 
 
-YES = ("true", "yes", "1")
-NO = ("false", "no", "0")
-
-
 def apply_extensions(model: ModelDescription, robot: Element) -> None:
-    """Writes what the `<gazebo>` children of `robot` say into `model`, before its joints are lumped.
+    """Applies the `<gazebo>` children of `robot` to `model`, before its joints are lumped.
 
-    A reference to nothing is a warning, as in Gazebo.
+    They have plugins, friction, gravity, kept fixed joints (docs/contract/gazebo.md 2.4). A value is the
+    attribute `value`, or else the text. A reference to an unknown link or joint is a warning, as in Gazebo.
 
     Raises:
         DescriptionError: if a value can't be read.
@@ -321,7 +320,7 @@ def read_plugin(element: Element) -> Plugin:
 
 
 def name_sensor(element: Element, owner: str) -> str:
-    """Returns what to call a sensor that is left out."""
+    """Returns a description of a sensor that is left out."""
     kind, name = shown(element.get("type", "unknown")), shown(element.get("name", ""))
     return f"{kind} sensor '{name}' of {owner}"
 
@@ -345,7 +344,7 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
         elif element.tag == "turnGravityOff":
             link.gravity = (
                 _value(element) in NO
-            )  # whatever else stands there, or nothing, turns it off
+            )  # anything else turns it off, also an empty element
         elif element.tag == "gravity":
             link.gravity = _value(element) in ("", *YES)
         elif element.tag == "selfCollide":
@@ -358,7 +357,7 @@ def _apply_to_link(model: ModelDescription, link: Link, block: Element) -> None:
 
 
 def _apply_to_joint(joint: Joint, block: Element) -> None:
-    """A fixed joint is kept as it is, or as a hinge that can't turn."""
+    """Keeps a fixed joint as it is, or as a hinge that can't turn."""
     if joint.kind != "fixed":
         return
     if _value(block.find("preserveFixedJoint")) in YES:
@@ -368,7 +367,7 @@ def _apply_to_joint(joint: Joint, block: Element) -> None:
 
 
 def _value(element: Element | None) -> str:
-    """The value of an extension, without blanks, in small letters."""
+    """Returns the value of an extension, stripped and in lower case."""
     if element is None:
         return ""
     return (element.get("value", element.text) or "").strip().lower()
@@ -425,5 +424,5 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
     except DescriptionError as error:
         if not warnings:
             raise
-        # An inertial that was left out is what a root without mass comes from.
+        # A root without mass is the consequence of an inertial that was left out.
         raise DescriptionError(f"{error}. Before that: {warnings[0]}") from error

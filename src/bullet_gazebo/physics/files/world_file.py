@@ -1,4 +1,4 @@
-"""Reads whatever a spawn request holds: a URDF robot, an SDF model or an SDF light."""
+"""Reads SDF world files, and the models and lights of spawn requests, URDF or SDF."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -35,7 +35,7 @@ NOT_SIMULATED = ("actor", "population", "road", "plugin", "joint")
 
 @dataclass
 class WorldDescription:
-    """What a world file holds. `left_out` names what nothing here simulates."""
+    """The contents of a world file. `left_out` names what isn't simulated."""
 
     name: str = "default"
     models: dict[str, ModelDescription] = field(default_factory=dict)
@@ -84,14 +84,14 @@ def load_world(
 
 
 def parse_world(text: str | bytes, resources: Resources) -> WorldDescription:
-    """As load_world, from the text."""
+    """Reads the text of a world file like `load_world`."""
     reading = Reading()
     root = reading.parse(text)
     return _read(root, FileContext(resources, reading, sdf_version(root)))
 
 
 def _read(root: Element, context: FileContext) -> WorldDescription:
-    """As load_world, from the root element."""
+    """Reads a world file from its root element."""
     element = root.find("world")
     if element is None:
         raise DescriptionError("there is no <world>")
@@ -132,7 +132,7 @@ def read_light(element: Element) -> Light:
 
 
 def _add(world: WorldDescription, element: Element, context: FileContext) -> None:
-    """One model or light; its faults leave out it alone."""
+    """Adds one model or light. If it is broken, it alone is left out."""
     try:
         if element.tag == "include":
             found = included(element, context)
@@ -152,7 +152,7 @@ def _add(world: WorldDescription, element: Element, context: FileContext) -> Non
 def included(
     include: Element, context: FileContext
 ) -> Light | ModelDescription | tuple[Element, FileContext]:
-    """What an `<include>` brings; ground_plane and sun are there without any file."""
+    """Returns the model or light of an `<include>`. ground_plane and sun need no file."""
     try:
         return open_include(include, context)
     except LimitExceeded:
@@ -180,7 +180,7 @@ def _keep(world: WorldDescription, entity: Light | ModelDescription) -> None:
 
 
 def _read_physics(world: WorldDescription, element: Element) -> None:
-    """Gravity and the physics profile, the default one if there are several."""
+    """Reads gravity and the physics profile: the default one, if there are several."""
     profiles = element.findall("physics")
     profile = next(
         (p for p in profiles if truth(p.get("default"))), profiles[0] if profiles else None
@@ -213,7 +213,7 @@ def read_entity(
     Raises:
         UnknownFormat: if it is neither.
         DescriptionError: if it can't be simulated: the place and the fault, in one line.
-        LimitExceeded: if it is more than one model may have (docs/gazebo.md).
+        LimitExceeded: if it exceeds the limits of one model (docs/gazebo.md).
     """
     try:
         root = reading.parse(text)

@@ -137,13 +137,6 @@ def test_a_velocity_motor_has_no_more_than_its_effort(make):
     assert lift.joint.position == pytest.approx(0.5 * (10.0 - WEIGHT) / 2.0 * 0.1**2, rel=0.03)
 
 
-def test_velocities_are_cut_at_the_limit(make):
-    lift = make("Velocity", VELOCITY)
-    lift.command(50.0)
-    lift.advance(0.2)
-    assert lift.joint.velocity == pytest.approx(2.0, abs=1e-6)
-
-
 def test_velocity_joint_position_controller_goes_to_its_set_point(make):
     lift = make("Velocity", "velocity_controllers/JointPositionController", {"pid": {"p": 10.0}})
     lift.command(0.3)

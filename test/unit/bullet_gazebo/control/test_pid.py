@@ -78,18 +78,6 @@ def test_the_integral_term_never_leaves_its_clamp(errors, i, clamp, antiwindup):
         assert abs(pid.compute(error, 0.01)) <= clamp * (1 + 1e-9) + 1e-12
 
 
-@given(st.lists(finite, min_size=1, max_size=30), finite, finite)
-def test_p_and_d_alone_are_what_they_say(errors, p, d):
-    last = 0.0
-    pid = Pid(Gains(p, 0.0, d))
-    pid.clear()
-    for error in errors:
-        assert pid.compute(error, 0.5) == pytest.approx(
-            p * error + d * (error - last) / 0.5, abs=1e-9
-        )
-        last = error
-
-
 @pytest.mark.parametrize(
     ("params", "gains"),
     [

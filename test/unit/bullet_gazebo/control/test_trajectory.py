@@ -54,14 +54,6 @@ def test_derivatives_are_those_of_the_position(first, last, tenth):
     assert here.acceleration == pytest.approx((after.velocity - before.velocity) / 2e-4, abs=1e-1)
 
 
-@given(values, values)
-def test_positions_alone_make_a_line(first, last):
-    middle = Segment(0, Waypoint(first), 2 * S, Waypoint(last)).sample(S)
-    assert near(middle.position, (first + last) / 2)
-    assert near(middle.velocity, (last - first) / 2)
-    assert middle.acceleration == 0.0
-
-
 def test_closed_forms_of_a_move_from_rest_to_rest():
     quarter = S // 4
     cubic = Segment(0, Waypoint(0.0, 0.0), S, Waypoint(1.0, 0.0))
@@ -194,11 +186,6 @@ def test_joints_that_do_not_match_are_refused(names, partial, text):
     with pytest.raises(TrajectoryRefused, match=text) as refusal:
         check_joints(names, ["a", "b"], partial)
     assert refusal.value.code == INVALID_JOINTS
-
-
-def test_joints_may_come_in_any_order_and_some_of_them_if_allowed():
-    check_joints(["b", "a"], ["a", "b"], partial=False)
-    check_joints(["b"], ["a", "b"], partial=True)
 
 
 def test_past_points_are_dropped_with_a_warning_but_for_a_first_one_now():

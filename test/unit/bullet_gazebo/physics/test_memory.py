@@ -100,7 +100,9 @@ def test_models_that_the_engine_refuses_leave_no_memory_behind(often, monkeypatc
         raise DescriptionError("no")
 
     world = World(bullet.BulletEngine())
-    monkeypatch.setattr("bullet_gazebo.physics.engines.bullet_body.check_meshes", refuse)
+    monkeypatch.setattr(
+        "bullet_gazebo.physics.engines.bullet_body.BulletBody._check_meshes", refuse
+    )
 
     def cycle(number: int) -> None:
         with pytest.raises(DescriptionError):

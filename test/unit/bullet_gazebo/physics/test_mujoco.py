@@ -5,7 +5,7 @@ import math
 import pytest
 from support.robots.cartpole import cartpole_urdf
 
-from bullet_gazebo.physics.description import DescriptionError, Inertia, Shape
+from bullet_gazebo.physics.description import DescriptionError, Shape
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.files.sdf import parse_sdf
 from bullet_gazebo.physics.files.urdf import parse_urdf
@@ -101,16 +101,6 @@ def test_a_model_that_is_refused_leaves_the_world_as_it_was(world, tmp_path):
     assert list(world.models) == ["a"]
 
 
-@pytest.mark.parametrize("speed", [0.5, -2.0])
-def test_a_motor_drives_with_no_more_than_its_effort(world, speed):
-    model = world.spawn("a", slider(), Pose())
-    model.set_motor("j", speed, 4.0)
-    run(world, 0.1)
-    assert model.joint_state("j")[1] == pytest.approx(math.copysign(0.2, speed), rel=1e-3)
-    run(world, 1.5)
-    assert model.joint_state("j")[1] == pytest.approx(speed, rel=1e-3)
-
-
 def test_dry_friction_holds_up_to_its_effort_and_brakes_with_it(world):
     model = world.spawn("a", slider(more='<dynamics friction="3"/>'), Pose())
     for force, speed in ((2.9, 0.0), (5.0, (5.0 - 3.0) / 2.0)):
@@ -124,23 +114,6 @@ def test_dry_friction_holds_up_to_its_effort_and_brakes_with_it(world):
     assert model.joint_state("j")[1] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_damping_slows_as_its_equation_says(world):
-    model = world.spawn("a", slider(more='<dynamics damping="4"/>'), Pose())
-    model.body.reset_joint(0, 0.0, 1.0)
-    run(world, 0.5)
-    assert model.joint_state("j")[1] == pytest.approx(math.exp(-0.5 * 4.0 / 2.0), rel=2e-3)
-
-
-def test_an_effort_acts_in_one_step_only(world):
-    model = world.spawn("a", slider(), Pose())
-    model.body.apply_efforts((3.0,))
-    model.body.add_effort(0, 1.0)
-    model.body.add_wrench("s", (2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    for _ in range(2):
-        world.step()
-        assert model.joint_state("j")[1] == pytest.approx(6.0 / 2.0 * 0.001, rel=1e-9)
-
-
 def test_stops_that_leave_no_room_hold_the_joint(world):
     limit = '<limit lower="0" upper="0" effort="9" velocity="9"/>'
     model = world.spawn("a", slider(limit=limit), Pose())
@@ -148,29 +121,6 @@ def test_stops_that_leave_no_room_hold_the_joint(world):
         model.body.apply_efforts((5.0,))
         world.step()
     assert model.joint_state("j")[0] == pytest.approx(0.0, abs=1e-3)
-
-
-def test_another_inertia_acts_at_once_and_the_motion_goes_on(world):
-    model = world.spawn("a", slider(), Pose())
-    model.body.reset_joint(0, 0.1, 0.5)
-    world.set_inertia(model, "s", Inertia(4.0, Pose((0.0, 0.0, 0.3)), ixx=1.0, iyy=1.0, izz=1.0))
-    assert model.joint_states() == [(0.1, 0.5)]
-    model.body.apply_efforts((4.0,))
-    world.step()
-    assert model.joint_state("j")[1] == pytest.approx(0.501, abs=1e-9)
-
-
-def test_moments_that_no_body_has_are_taken_as_they_are(world):
-    wheel = parse_urdf(
-        '<robot name="r"><link name="world"/><link name="w"><inertial><mass value="1"/>'
-        '<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.5"/></inertial></link>'
-        '<joint name="j" type="continuous"><parent link="world"/><child link="w"/>'
-        '<axis xyz="0 0 1"/></joint></robot>'
-    )
-    model = world.spawn("a", wheel, Pose())
-    model.body.apply_efforts((1.0,))
-    world.step()
-    assert model.joint_state("j")[1] == pytest.approx(0.001 / 0.5, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """PyBullet comes without its line about when it was built, and without hiding what others write."""
 
-import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -75,14 +74,3 @@ def test_a_library_that_cannot_be_loaded_says_why(tmp_path: Path) -> None:
 def test_without_a_standard_error() -> None:
     code = "from bullet_gazebo.physics.engines import make_engine; make_engine(); print('made')"
     assert outcome(code, "sh", "-c", 'exec "$@" 2>&-', "sh").stdout == "made\n"
-
-
-def test_it_is_imported_in_one_place() -> None:
-    def imports(path: Path) -> bool:
-        nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        return any(
-            isinstance(node, ast.Import) and any(each.name == "pybullet" for each in node.names)
-            for node in nodes
-        )
-
-    assert [path for path in sorted(SRC.rglob("*.py")) if imports(path)] == [LIBRARY]

@@ -182,23 +182,6 @@ def test_limits_dynamics_defaults_and_surfaces_are_read():
     assert (model.links["c"].collisions[0].mu, model.links["c"].gravity) == (0.3, False)
 
 
-def test_a_link_without_gravity_stays_where_it_is(new_engine):
-    world, model = spawn(
-        new_engine(),
-        sdf(link("a", more="<gravity>false</gravity>")),
-        Pose((0.0, 0.0, 1.0)),
-        (0.0, 0.0, -9.8),
-    )
-    for _ in range(500):
-        world.step()
-    assert model.state()[0].position == pytest.approx((0.0, 0.0, 1.0), abs=1e-9)
-    model.body.set_link_gravity("a", True)
-    for _ in range(500):
-        world.step()
-    assert model.state()[0].position[2] == pytest.approx(1.0 - 0.5 * 9.8 * 0.25, abs=0.01)
-    world.close()
-
-
 def test_a_model_may_stand_on_the_world_by_a_movable_joint(new_engine):
     world, model = spawn(
         new_engine(),
@@ -303,7 +286,7 @@ def test_what_is_not_simulated_is_named():
         ("<!DOCTYPE x [<!ENTITY a 'aa'>]><sdf>&a;</sdf>", "<!DOCTYPE>"),
         ("<a>" * 1000 + "</a>" * 1000, "nested more than 100 deep"),
         ("<robot/>", "root element is <robot>"),
-        ('<sdf version="2.0"/>', "no version 1.x"),
+        ('<sdf version="2.0"/>', "isn't a version 1.x"),
         ('<sdf version="1.6"/>', "there is no <model>"),
         (sdf(), "model 'm': there is no <link>"),
         (sdf(link("a"), link("a")), "link 'a' is there twice"),
@@ -338,13 +321,6 @@ def test_a_fault_is_one_line_with_its_place(text, fault):
     assert str(raised.value).startswith("my.sdf: ")
     assert fault in str(raised.value)
     assert "\n" not in str(raised.value)
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.text(alphabet="<>/sdfmolink =\"'1&;![]-", max_size=200))
-def test_no_text_is_anything_but_a_model_or_a_fault(text):
-    with pytest.raises(DescriptionError):
-        parse_sdf(text)
 
 
 def pair(a="", b="", of_model=""):

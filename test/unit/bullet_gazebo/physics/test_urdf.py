@@ -145,7 +145,7 @@ def test_plugins_of_the_model_are_kept():
         (robot(link("a"), link("b")), "no parent joint; one root is needed"),
         (robot(link("a"), joint("j", "revolute", "a", "x")), "joint 'j': child link 'x' does not exist"),
         (robot(link("a"), joint("j", "revolute", "a", "a")), "loop"),
-        (robot(link("a"), joint("j", "bendy", "a", "a")), "joint 'j': type 'bendy' is none of"),
+        (robot(link("a"), joint("j", "bendy", "a", "a")), "joint 'j': type 'bendy' is not one of"),
         (robot(link("a", mass="much")), "link 'a', inertial: <mass value>: 'much' is not a number"),
         (robot(link("a", mass="nan")), "'nan' is not finite"),
         (robot(link("a", mass=-1)), "can't be negative"),

@@ -57,7 +57,7 @@ class AdvanceService:
                 request.node, request.subscriptions, request.publications
             )
         with self._one_at_a_time:
-            self._sim.post_goes_with_steps = True
+            self._sim.deliver_with_steps = True
             if request.reseed:
                 seed_random_numbers(request.seed, tell=False)
             faults = self._deliver(request)
@@ -96,11 +96,11 @@ class AdvanceService:
         """Returns how many ticks have passed; after each slice services that wait get their turn."""
         sim, mailboxes = self._sim, self._mailboxes
 
-        def has_post() -> bool:
-            return any(postman.has_post() for postman in sim.postmen)
+        def has_messages() -> bool:
+            return any(outbox.has_messages() for outbox in sim.outboxes)
 
         def ends_slice() -> bool:
-            return mailboxes.has_awaited or has_post()
+            return mailboxes.has_awaited or has_messages()
 
         passed = 0
         while True:
@@ -111,8 +111,8 @@ class AdvanceService:
                     with self._watchdog:
                         passed += sim.advance(min(SLICE, left), ends_slice)
                 goes_on = passed < ticks and not sim.paused
-                postmen = [each for each in sim.postmen if each.has_post()]
-            for postman in postmen:
-                postman.deliver()
+                outboxes = [each for each in sim.outboxes if each.has_messages()]
+            for outbox in outboxes:
+                outbox.deliver()
             if not goes_on or mailboxes.has_awaited:
                 return passed
