@@ -1,15 +1,14 @@
-"""Expands robot descriptions (xacro) and puts them on the parameter server."""
+"""Expand robot descriptions (xacro) and put them on the parameter server."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
-from files.expansion import CannotExpand, expand
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
-from ros_utils._internal import packages as _packages
 from ros_utils._internal import params as _params
+from ros_utils._internal import urdf as _urdf
+from ros_utils._internal.urdf import urdf_parse_from_path, urdf_parse_from_pkg
 
 __all__ = [
     "urdf_load_from_path",
@@ -42,7 +41,7 @@ def urdf_load_from_pkg(
         True if the parameter was set. False, with an error in the log, if the package or file is
         missing, the file is broken, or no master answers.
     """
-    path = _find("urdf_load_from_pkg", pkg_name, folder, model_name)
+    path = _urdf.find("urdf_load_from_pkg", pkg_name, folder, model_name)
     return path is not None and urdf_load_from_path(path, param_name, ns, args_xacro)
 
 
@@ -61,46 +60,3 @@ def urdf_load_from_path(
         _log.error(f"parameter {name}: {fault}")
         return False
     return True
-
-
-class BadArgument(ValueError):
-    """A xacro argument has another form; the text says which."""
-
-
-def urdf_parse_from_pkg(
-    pkg_name: str, model_name: str, folder: str = "/urdf", args_xacro: Sequence[str] | None = None
-) -> str | None:
-    """Expand a package's URDF or xacro file.
-
-    Returns:
-        The XML text, or None, with an error in the log, if the package or file is missing or the
-        file is broken.
-    """
-    path = _find("urdf_parse_from_pkg", pkg_name, folder, model_name)
-    return None if path is None else urdf_parse_from_path(path, args_xacro)
-
-
-def urdf_parse_from_path(model_path: str, args_xacro: Sequence[str] | None = None) -> str | None:
-    """Expand a URDF or xacro file, given by its path. See `urdf_parse_from_pkg`."""
-    try:
-        mappings = dict(_mapping(argument) for argument in args_xacro or [])
-        return expand(_packages.existing(model_path), mappings)
-    except (_packages.NotFound, BadArgument, CannotExpand) as fault:
-        _log.error(f"urdf: {fault}")
-        return None
-
-
-def _find(caller: str, package: str, folder: str, name: str) -> str | None:
-    """The path of a package's file, or None, with an error in the log that begins with `caller`."""
-    try:
-        return _packages.file(package, folder, name)
-    except _packages.NotFound as fault:
-        _log.error(f"{caller}: {fault}")
-        return None
-
-
-def _mapping(argument: str) -> tuple[str, str]:
-    name, sign, value = argument.partition(":=")
-    if not sign or not re.fullmatch(r"\w+", name):
-        raise BadArgument(f"xacro argument {argument!r}: expected 'name:=value'")
-    return name, value
