@@ -1,9 +1,9 @@
-"""The command pg_train.py: trains the cart-pole, over ROS in lock-step unless told otherwise."""
+"""The command pg_train.py: trains the cart-pole by policy gradient, over ROS in lock-step by default."""
 
 import argparse
 import contextlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,27 +23,23 @@ from robot_envs.errors import RobotEnvError
 NODE = "pg_train"
 PROG = f"{NODE}.py"
 ENV_ID = f"{NAMESPACE}/Balance-v0"
-WINDOWS = ("rviz", "headless")  # what a resumed training may have otherwise
+WINDOWS = ("rviz", "headless")  # options that a resumed training may change
 LARGEST_NOISE = 0.2  # [m], [rad]; just inside the angle at which an episode ends
 
 
 @dataclass(frozen=True)
 class RobotOptions:
-    """Where the robot is, and how its episodes start.
-
-    Raises:
-        WorkbenchError: if a value is beyond its limits.
-    """
+    """Where the robot is, and how its episodes start; raises WorkbenchError for a value beyond its limits."""
 
     backend: str | None = option(
-        None, "ros: the robot in a simulator over ROS, which is started if none runs; bullet: in this "
-        "process, with the same bits, several times as fast; ros where ROS is installed",
+        None, "ros: a simulator over ROS, which is started if none runs; bullet: in this process, "
+        "bit-identical and several times as fast (default: ros if it is installed)",
         choices=("ros", "bullet"),
     )  # fmt: skip
-    realtime: bool = option(False, "let the world run by itself, as the existing script does")
+    realtime: bool = option(False, "let the world run in real time, as the existing script does")
     start_noise: float = option(
-        0.0, "episodes start within +-X of the origin [m] and of upright [rad]; 0, as the existing "
-        "script does, starts them all alike", 0, LARGEST_NOISE,
+        0.0, "episodes start within +-X of the origin [m] and of upright [rad]; 0, as in the "
+        "existing script: all start alike", 0, LARGEST_NOISE,
     )  # fmt: skip
     rviz: bool = option(False, "show the robot in RViz")
     headless: bool = option(False, "no window")
@@ -52,22 +48,22 @@ class RobotOptions:
         check_options(self)
         if self.backend == "bullet" and (self.realtime or self.rviz):
             raise WorkbenchError(
-                "--realtime and --rviz are of a simulator over ROS: not with --backend bullet"
+                "--realtime and --rviz need a simulator over ROS: not with --backend bullet"
             )
 
     @property
     def environment(self) -> dict[str, Any]:
-        """What it comes to as options of the environment."""
+        """The same as options of the environment."""
         noise = {"noise": self.start_noise} if self.start_noise else {}
         if not self.realtime:
             installed = "ros" if has_ros() else "bullet"
             return {"backend": self.backend or installed, **noise}
-        # The newest joint state, without waiting for another one: as the existing script does.
+        # As the existing script does, take the newest joint state without waiting.
         return {"backend": "ros-realtime", "control_period": 0.0, **noise}
 
 
 ROBOT_OPTIONS = Options(RobotOptions)
-_ANYWHERE = (False, 0.0, "bullet")  # what goes for other environments, too
+_ANYWHERE = (False, 0.0, "bullet")  # values that every environment takes
 
 
 @reader_may_go()
@@ -81,12 +77,20 @@ def main(argv: list[str] | None = None) -> int:
         with contextlib.ExitStack() as beside:
 
             def begin(folder: Path) -> None:
-                if needs_session(options):
+                over_ros = needs_session(options)
+                if over_ros:
                     beside.enter_context(session(options, name, argv, robot, folder))
-                if not shows_itself(options):
+                # A single robot over ROS is seen in its simulator's window.
+                if not over_ros or options.run.num_envs > 1:
                     beside.enter_context(shown(options, folder, PROGRAM))
 
-            return _train(options, interrupt, begin)
+            try:
+                run_training(options, interrupt, begin)
+            except (
+                WorkbenchError
+            ) as error:  # printed before the session closes, which may take long
+                return _failed(error, interrupt)
+        return interrupt.exit_code
     except (WorkbenchError, RobotEnvError) as error:
         return _failed(error, interrupt)
     except KeyboardInterrupt:
@@ -96,22 +100,13 @@ def main(argv: list[str] | None = None) -> int:
         interrupt.defer()
 
 
-def _train(options: TrainingOptions, interrupt: Interrupt, begin: Callable[[Path], None]) -> int:
-    """Tells of a failure before the session is closed: a simulator that hangs takes its time."""
-    try:
-        run_training(options, interrupt, begin)
-        return interrupt.exit_code
-    except WorkbenchError as error:
-        return _failed(error, interrupt)
-
-
 def _failed(error: Exception, interrupt: Interrupt) -> int:
     print(f"{PROG}: {error}", file=sys.stderr, flush=True)
     return interrupt.exit_code or 1
 
 
 def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOptions, RobotOptions]:
-    """What the arguments say of the training and of the robot.
+    """Options of the training and of the robot, from flags and private parameters.
 
     Raises:
         SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
@@ -131,12 +126,12 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOption
         given = ROBOT_OPTIONS.read(own, "rosparam") | vars(known)
         robot = ROBOT_OPTIONS.make(RobotOptions, given)
         options = choose_training(rest, others, PROG, "reinforce", ENV_ID, parser)
-        return _joined(options, robot, given), robot
+        return _combined(options, robot, given), robot
     except WorkbenchError as error:
         parser.error(str(error))
 
 
-def _joined(
+def _combined(
     options: TrainingOptions, robot: RobotOptions, given: dict[str, Any]
 ) -> TrainingOptions:
     if robot.headless and options.session.gui:
@@ -144,7 +139,7 @@ def _joined(
     run = options.run
     for key in ("realtime", "rviz"):
         if getattr(robot, key) and run.num_envs > 1:
-            text = f"--{key} is of the robot of one simulator: num_envs is 1, not {run.num_envs}"
+            text = f"--{key} is for a single simulator: num_envs must be 1, not {run.num_envs}"
             raise WorkbenchError(text)
     recorded = [key for key in given if key not in WINDOWS]
     if options.resume:
@@ -157,28 +152,18 @@ def _joined(
         robots = [key for key in [*recorded, "rviz"] if getattr(robot, key) not in _ANYWHERE]
         if robots:
             raise WorkbenchError(
-                f"{flag(robots[0])} is of the robot: not with --env-id {run.env_id}"
+                f"{flag(robots[0])} is for the cart-pole: not with --env-id {run.env_id}"
             )
         return options
     environment = robot.environment
     if "backend" in run.training_environment and not (robot.backend or robot.realtime):
-        del environment["backend"]  # it is what those get who name none
+        del environment["backend"]  # the default must not override it
     return options._replace(run=replace(run, train_env_kwargs=run.train_env_kwargs | environment))
 
 
 def needs_session(options: TrainingOptions) -> bool:
-    """Whether a robot is trained that isn't in this process."""
-    of_robot = options.run.env_id.startswith(f"{NAMESPACE}/")
-    return of_robot and _backend(options) != "bullet"
-
-
-def shows_itself(options: TrainingOptions) -> bool:
-    """Whether the robot that is trained is seen in its simulator's window, not on a page beside the training.
-
-    Of several environments each has a simulator of its own; in the session's the policy is
-    evaluated.
-    """
-    return needs_session(options) and options.run.num_envs == 1
+    """Whether the cart-pole is trained over ROS."""
+    return options.run.env_id.startswith(f"{NAMESPACE}/") and _backend(options) != "bullet"
 
 
 def _backend(options: TrainingOptions) -> str:
@@ -189,14 +174,14 @@ def _backend(options: TrainingOptions) -> str:
 def session(
     options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions, folder: Path
 ) -> Iterator[None]:
-    """What the robot needs to be running, for as long as it is trained.
+    """Keeps running what the robot needs over ROS.
 
     Args:
-        options: of a training that needs it.
+        options: of the training.
         name: this node's full name.
         argv: the process's arguments, with roslaunch's remappings.
-        robot: whether RViz is to be opened.
-        folder: of the training, whose curves are shown in the simulator's window.
+        robot: whether RViz is opened.
+        folder: of the training, whose curves the simulator's window shows.
 
     Raises:
         RobotEnvError: if something can't be started, or what runs doesn't fit.
@@ -206,16 +191,10 @@ def session(
     from cartpole.robot import ROBOT
     from robot_envs.backends.ros.session import RosSession
 
-    opened = RosSession(
-        ROBOT,
-        name,
-        argv,
-        realtime=backend == "ros-realtime",
-        gui=options.session.gui and shows_itself(options),
-        seed=options.run.seed,
-        rviz=robot.rviz,
-        curves=folder,
-    )
+    # With several environments each has its own simulator, and the session's evaluates the policy.
+    gui = options.session.gui and options.run.num_envs == 1
+    realtime, seed = backend == "ros-realtime", options.run.seed
+    opened = RosSession(ROBOT, name, argv, realtime, gui, seed, robot.rviz, folder)
     try:
         opened.start(tell)
         yield

@@ -28,24 +28,24 @@ from robot_envs.task import Task
 NODE = "policy_node"
 OVER_ROS = (LOCKSTEP, REALTIME)
 DESCRIPTION = """\
-A trained policy moves a robot over ROS, simulated or real: it subscribes to /joint_states and publishes
-what the policy commands to the controllers, each control period of ROS time, with the robot and the task of
-the run's environment. Commands stay within the URDF's limits. Where joint states are late the robot is
-stopped, and goes on when they come; Ctrl-C stops it and ends. Nothing is started, spawned or set: robot and
-controllers have to run.
+A trained policy moves a robot over ROS, simulated or real. The node subscribes to /joint_states and publishes
+the policy's commands to the controllers, each control period of ROS time, with the robot and the task of the
+run's environment. Commands stay within the URDF's limits. When joint states are late the robot stops, and
+goes on when they come; Ctrl-C stops it and ends. Robot and controllers have to run: nothing is started or
+spawned.
 
-RUN is a run folder, or a file that `workbench.py export` has written."""
+RUN is a run folder, or a file written by `workbench.py export`."""
 EPILOG = """\
 Each option is a private parameter, too: <param name="late" value="0.2"/>, _late:=0.2
 Exit codes: 0 done, 1 failed, 2 wrong arguments; 130 after Ctrl-C."""
 
 
 class Deployed(NamedTuple):
-    """A policy with the robot and the task that it has learned."""
+    """A policy with its robot and task."""
 
     robot: Robot
     task: Task
-    act: Callable[[Any], Any]  # the action for an observation of the task's
+    act: Callable[[Any], Any]  # the action for the task's observation
     period: float  # [s] of control
 
 
@@ -71,7 +71,7 @@ def main(argv: list[str] | None = None) -> int:
             late, seed, goal = arguments.late, arguments.seed, arguments.goal
             return PolicyNode(robot, task, act, period, late, seed, goal, way)
 
-        with _told_in_one_line():
+        with _errors_in_one_line():
             run_node(name, argv, make, interrupt.requested)
         return interrupt.exit_code
     except (WorkbenchError, RobotEnvError) as error:
@@ -83,8 +83,8 @@ def main(argv: list[str] | None = None) -> int:
 
 
 @contextlib.contextmanager
-def _told_in_one_line() -> Iterator[None]:
-    """What the user's task raises, whatever it is, once the robot is stopped."""
+def _errors_in_one_line() -> Iterator[None]:
+    """Converts any error of the user's task, once the robot is stopped."""
     try:
         yield
     except RobotEnvError:
@@ -96,7 +96,7 @@ def _told_in_one_line() -> Iterator[None]:
 
 
 def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
-    """What flags and private parameters say; a flag counts more.
+    """Parses flags and private parameters; flags override parameters.
 
     Raises:
         SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
@@ -111,18 +111,24 @@ def parse(flags: list[str], parameters: dict[str, Any]) -> argparse.Namespace:
     add = parser.add_argument
     add("run", type=Path, metavar="RUN", help="a run folder, or an exported policy")
     add("--checkpoint", choices=WHICH, default="best",
-        help="of a run folder: by evaluation, or the newest (default best)")  # fmt: skip
+        help="checkpoint of a run folder: best by evaluation, or the newest (default best)")  # fmt: skip
     add("--late", type=_positive, metavar="S",
-        help="the robot is stopped where its joints' states are older (default 5 control periods, "
-        "and 0.1 at least)")  # fmt: skip
+        help="the robot stops when joint states are older [s] (default 5 control periods, "
+        "at least 0.1)")  # fmt: skip
     add("--max-speed", type=_positive_or_0, default=1.0, metavar="SHARE",
-        help="of the joints' velocity limits, that commanded positions go with at most (default 1; "
-        "0: no limit)")  # fmt: skip
+        help="how fast commanded positions may move, as a share of the joints' velocity limits "
+        "(default 1; 0: no limit)")  # fmt: skip
     add("--goal", type=_numbers, metavar="X,Y,...",
-        help="of a task with goals (default: it draws one); the topic ~goal takes others")  # fmt: skip
-    add("--seed", type=number(0), default=0, metavar="N", help="of what the task draws (default 0)")
+        help="goal of a task with goals (default: drawn); the topic ~goal takes others")  # fmt: skip
+    add(
+        "--seed",
+        type=number(0),
+        default=0,
+        metavar="N",
+        help="seed of what the task draws (default 0)",
+    )
     add("--env-kwargs", nargs="+", default=[], metavar="KEY=VALUE",
-        help="options of the environment, such as the task's; several with commas")  # fmt: skip
+        help="options of the environment, such as the task's; separate several by commas")  # fmt: skip
     named = [f"--{name.replace('_', '-')}={_text(value)}" for name, value in parameters.items()]
     return parser.parse_args([*named, *flags])
 
@@ -147,7 +153,7 @@ def _positive_or_0(text: str) -> float:
 
 
 def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
-    """The policy of a run folder, or of an exported file, with what it moves.
+    """Loads the policy of a run folder or an exported file, with its robot and task.
 
     Args:
         path: of the folder or file.
@@ -155,8 +161,8 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
         options: of the environment, on top of the training's own.
 
     Raises:
-        WorkbenchError: if there is no such policy, or no such environment.
-        RobotEnvError: if its environment isn't one of a robot.
+        WorkbenchError: if there is no such policy or environment.
+        RobotEnvError: if its environment has no robot, or several.
     """
     if path.is_dir():
         run = open_run(path)
@@ -183,10 +189,10 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
 
 
 def _in_process(options: dict[str, Any]) -> dict[str, Any]:
-    """The same without a simulator over ROS: the environment is asked for its robot and task alone."""
+    """The same options without a simulator over ROS: only robot and task are needed."""
     if options.get("backend") in OVER_ROS:
         options["backend"] = IN_PROCESS
-    if options.get("control_period") == 0.0:  # as fast as the joint states come
+    if options.get("control_period") == 0.0:  # in real time: as fast as joint states come
         options["control_period"] = None
     return options
 
@@ -203,7 +209,7 @@ def _check_same(path: Path, metadata: dict[str, Any], env: gymnasium.Env[Any, An
 
 
 def _of_task(env: gymnasium.Env[Any, Any], act: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """The policy for what the task observes, where the training flattened that."""
+    """The policy for the task's own observations, which the training may have flattened."""
     own = env.unwrapped.observation_space
     if env.observation_space == own:
         return lambda observation: act(as_float32(observation))

@@ -1,4 +1,4 @@
-"""The cart-pole's description: a cart that is moved along a rail, and a pole that swings on it."""
+"""The cart-pole's description: a cart that moves along a rail, and a pole that swings on it."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What is to be learned on the cart-pole: three tasks, the same for every backend and every learner."""
+"""The cart-pole's three tasks, the same for every backend and every learner."""
 
 import math
 from typing import ClassVar, NamedTuple, Self
@@ -33,7 +33,7 @@ class CartPoleState(NamedTuple):
         return cls(cart.position, cart.velocity, pole.position, pole.velocity)
 
     def to_begin(self, height: float = 0.0) -> InitialState:
-        """An episode that begins so, the stand raised by a height [m]."""
+        """An episode that begins in this state, with the stand raised by a height [m]."""
         joints = {CART_JOINT: (self[0], self[1]), POLE_JOINT: (self[2], self[3])}
         raised = {MODEL: Pose((0.0, 0.0, height))} if height else {}
         return InitialState(joints, raised)
@@ -46,11 +46,10 @@ class CartPoleTask(Task):
     episode, starting from where the cart stands.
 
     Args:
-        noise: half-width of what is drawn uniformly for the initial state; 0 starts every episode
-            alike.
+        noise: half-width of the uniform noise on the initial state; 0: every episode starts alike.
 
     Raises:
-        ValueError: if noise makes no sense.
+        ValueError: for an impossible noise.
     """
 
     start: ClassVar[CartPoleState] = CartPoleState(0.0, 0.0, 0.0, 0.0)  # without noise
@@ -62,13 +61,12 @@ class CartPoleTask(Task):
         self.noise = noise
 
     def draw(self, rng: np.random.Generator) -> CartPoleState:
-        """Draws where an episode starts: positions and velocities, up to `noise` off `start`."""
+        """Draws the initial state: positions and velocities within `noise` of `start`."""
         offsets = rng.uniform(-self.noise, self.noise, size=len(self.start))
         pairs = zip(self.start, offsets, strict=True)
         return CartPoleState(*(float(value + offset) for value, offset in pairs))
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
-        """What `draw` says."""
         return self.draw(rng).to_begin(self.height)
 
 
@@ -95,29 +93,25 @@ class BalanceTask(CartPoleTask):
         return gymnasium.spaces.Box(-high, high, dtype=np.float32)
 
     def draw(self, rng: np.random.Generator) -> CartPoleState:
-        """Draws where an episode starts; both joints are at rest."""
+        """Draws the initial state; both joints are at rest."""
         if self.noise == 0.0:
             return self.start
         position, angle = rng.uniform(-self.noise, self.noise, size=2)
         return CartPoleState(float(position), 0.0, float(angle), 0.0)
 
     def apply(self, action: int, state: WorldState) -> Commands:
-        """Moves the cart's set-point [m] as the action (0 or 1) says."""
         step = SET_POINT_STEP if action == 1 else -SET_POINT_STEP
         return {CONTROLLER: state.commands[CONTROLLER] + step}
 
     def observe(self, state: WorldState) -> np.ndarray:
-        """The state as the learner sees it: float32, shape (4,), in the order of `CartPoleState`."""
         cart, pole = state.joints[CART_JOINT], state.joints[POLE_JOINT]
         return np.array((*cart[:2], *pole[:2]), dtype=np.float32)
 
     def is_terminal(self, state: WorldState) -> bool:
-        """Whether the cart or the pole has left its range."""
         cart, pole = state.joints[CART_JOINT], state.joints[POLE_JOINT]
         return abs(cart.position) > POSITION_LIMIT or abs(pole.position) > ANGLE_LIMIT
 
     def reward(self, state: WorldState, action: int) -> float:
-        """The reward for arriving in a state."""
         cart, pole = state.joints[CART_JOINT], state.joints[POLE_JOINT]
         reward = ALIVE_REWARD + abs(pole.position) - abs(cart.position)
         return reward - FALL_PENALTY if self.is_terminal(state) else reward
@@ -136,11 +130,9 @@ class ClassicTask(BalanceTask):
         super().__init__(noise)
 
     def draw(self, rng: np.random.Generator) -> CartPoleState:
-        """Draws positions and velocities, all four from the same range."""
         return CartPoleTask.draw(self, rng)
 
     def reward(self, state: WorldState, action: int) -> float:
-        """1, whatever the state."""
         return 1.0
 
 
@@ -176,22 +168,18 @@ class SwingUpTask(CartPoleTask):
         return gymnasium.spaces.Box(-high, high, dtype=np.float32)
 
     def apply(self, action: np.ndarray, state: WorldState) -> Commands:
-        """Moves the cart's set-point [m] by the action times 0.02 m."""
         step = SET_POINT_STEP * float(action[0])
         return {CONTROLLER: state.commands[CONTROLLER] + step}
 
     def observe(self, state: WorldState) -> np.ndarray:
-        """Float32, shape (5,); see `observation_space`."""
         seen = CartPoleState.of(state)
         turned = (math.sin(seen.pole_angle), math.cos(seen.pole_angle), seen.pole_velocity)
         return np.array((seen.cart_position, seen.cart_velocity, *turned), dtype=np.float32)
 
     def is_terminal(self, state: WorldState) -> bool:
-        """Whether the cart has left its range."""
         return abs(state.joints[CART_JOINT].position) > POSITION_LIMIT
 
     def reward(self, state: WorldState, action: np.ndarray) -> float:
-        """The reward for arriving in a state."""
         cart, pole = state.joints[CART_JOINT], state.joints[POLE_JOINT]
         upright = (1.0 + math.cos(pole.position)) / 2.0
         centred = (1.0 + _bell(cart.position / POSITION_LIMIT)) / 2.0

@@ -22,16 +22,16 @@ _WORLD = ("", "world")
 
 
 class LinkView:
-    """Tells the links that a query names, of a robot that is fixed to the world where its description says.
+    """Computes the links of a query, for a robot that is fixed to the world where its description says.
 
-    Poses are those of the engine, by forward kinematics; twists are their derivatives.
+    Poses are the engine's, by forward kinematics; twists are their derivatives.
 
     Args:
         robot: the robot.
-        query: what is wanted beside the joints.
+        query: of a task.
 
     Raises:
-        RobotEnvError: if the query names what joints don't tell.
+        RobotEnvError: if the query asks for what the joints don't determine.
     """
 
     def __init__(self, robot: Robot, query: StateQuery) -> None:
@@ -50,7 +50,7 @@ class LinkView:
         """The links, each in the frame asked for, by the names of the query.
 
         Args:
-            joints: at least those that the links hang on.
+            joints: at least those that move the links.
         """
         if not self._wanted:
             return {}
@@ -67,7 +67,7 @@ class LinkView:
         return found
 
     def _poses(self, joints: Mapping[str, JointState], time: float) -> dict[str, Pose]:
-        """Of all links, so long from now on [s]."""
+        """Poses of all links at a time from now [s]."""
         positions = {name: each.position + time * each.velocity for name, each in joints.items()}
         return link_poses(self._links, self._root, positions)
 
@@ -88,12 +88,12 @@ def _check(robot: Robot, query: StateQuery) -> None:
     for what, asked in unknown.items():
         if asked:
             raise RobotEnvError(
-                f"the task asks for {what}, which nobody tells of a robot that isn't simulated"
+                f"the task asks for {what}, which aren't known of a robot that isn't simulated"
             )
     if query.links and not robot.links.fixed_base:
         raise RobotEnvError(
-            f"the task asks for links, and '{robot.model}' isn't fixed to the world: its joints don't tell "
-            "where it is"
+            f"the task asks for links, and '{robot.model}' isn't fixed to the world: its joints "
+            "don't determine where it is"
         )
 
 
@@ -102,10 +102,10 @@ def _of_frame(robot: Robot, query: LinkQuery) -> tuple[str, Pose] | None:
 
 
 def _of_link(robot: Robot, name: str) -> tuple[str, Pose]:
-    """A link that joints move, and where in it the one of that name is.
+    """The link that joints move, and the pose in it of the link of that name, which it may include.
 
     Raises:
-        RobotEnvError: if there is none, or it hangs on a joint that nobody tells.
+        RobotEnvError: if there is none, or it depends on a joint whose position isn't known.
     """
     model, _, plain = name.rpartition(SCOPE)
     links = robot.links
@@ -119,8 +119,8 @@ def _of_link(robot: Robot, name: str) -> tuple[str, Pose]:
         joint = parents[link]
         if joint.movable and joint.name not in robot.joints:
             raise RobotEnvError(
-                f"the link '{name}' hangs on the joint '{joint.name}', which has no transmission: "
-                "nobody tells where it is"
+                f"the link '{name}' depends on the joint '{joint.name}', which has no transmission: "
+                "its position isn't known"
             )
         link = joint.parent
     return whole, place

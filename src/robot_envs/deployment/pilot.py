@@ -21,23 +21,23 @@ class Limited(NamedTuple):
     """A command within its limits."""
 
     command: Command
-    beyond: tuple[str, ...]  # joints whose command was beyond the URDF's bounds
+    exceeded: tuple[str, ...]  # joints whose command was beyond the URDF's bounds
 
 
 class CommandLimits:
-    """Keeps the commands of a controller within what the URDF says of its joints.
+    """Keeps a controller's commands within the URDF's limits of its joints.
 
-    | command | stays within |
+    | command | limited to |
     |---|---|
-    | position | `lower` and `upper`, and the soft ones; and goes from one to the next at `velocity` at most |
+    | position | `lower` and `upper`, also the soft ones; and moves no faster than `velocity` |
     | velocity | `velocity` either way |
     | effort | `effort` either way |
 
     Args:
-        robot: has the limits.
+        robot: with these limits.
         port: of the controller.
-        way: how far a position may go from one command to the next, as a share of what the joint's
-            velocity limit allows meanwhile; infinity: as far as it likes.
+        way: largest move of a position from one command to the next, as a share of what the joint's velocity
+            limit allows; infinity: no limit.
         period: from one command to the next [s].
     """
 
@@ -51,23 +51,23 @@ class CommandLimits:
         ]
 
     def __call__(self, command: Command, held: Command) -> Limited:
-        """The nearest one that is allowed after the one that is held."""
-        beyond, numbers = [], []
+        """The nearest command that is allowed after the present one."""
+        exceeded, numbers = [], []
         wanted, before = self._numbers(command), self._numbers(held)
         for joint, value, start, (lower, upper), way in zip(
             self._port.joints, wanted, before, self._bounds, self._ways, strict=True
         ):
             bounded = min(max(value, lower), upper)
             if bounded != value:
-                beyond.append(joint)
+                exceeded.append(joint)
             numbers.append(min(max(bounded, start - way), start + way))
-        return Limited(numbers[0] if self._port.single else tuple(numbers), tuple(beyond))
+        return Limited(numbers[0] if self._port.single else tuple(numbers), tuple(exceeded))
 
     def _numbers(self, command: Command) -> list[float]:
         return [command] if self._port.single else list(command)  # type: ignore[list-item, arg-type]
 
     def stop(self, joints: Mapping[str, JointState]) -> Command:
-        """What has the joints stop: positions where they are, or no velocity, or no effort."""
+        """The command that stops the joints: their present positions, or zero velocity or effort."""
         return self._port.at_start({name: each.position for name, each in joints.items()})
 
 
@@ -86,26 +86,24 @@ Say = Callable[[str], None]
 
 
 class Pilot:
-    """Has a policy do a task, as in an environment, with what the robot's joints tell.
+    """Runs a policy on a task, as in an environment, from the robot's joint states.
 
-    The task's methods are called as an environment calls them, its reward, too, so that what a task keeps
-    for itself is as in the training. Where joints begin is where they are: what `initial_state` says
-    of them isn't done.
+    All methods of the task are called as in an environment, also its reward, so that data which a task
+    stores is as in the training. Joints aren't moved to the task's initial state.
 
     Args:
         robot: the robot.
         task: what the policy has learned.
         act: the policy: the action for an observation.
         period: from one step to the next [s].
-        seed: of what the task draws at the beginning, such as a goal.
+        seed: of what the task draws, such as a goal.
         goal: of a `GoalTask`; None: it draws one.
         way: see `CommandLimits`.
-        say: is told of commands beyond their limits, once for each controller.
+        say: reports commands beyond their limits, once for each controller.
 
     Raises:
-        RobotEnvError: if something is wrong in the robot's description, or the task asks for what can't be
-            known.
-        ValueError: if the goal is none.
+        RobotEnvError: if the robot's description is wrong, or the task asks for what joints don't determine.
+        ValueError: if the goal isn't one of the task's.
     """
 
     def __init__(
@@ -127,19 +125,15 @@ class Pilot:
         self._read_action = action_reader(task.action_space())
         self._read = observation_reader(task.observation_space(), type(task).__name__)
         self._generator = np.random.default_rng(seed)
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self._held: dict[str, Command] = {}
         self._action: Any = None  # None: no step yet
-        self._goal: np.ndarray | None = None  # that was given
+        self._goal: np.ndarray | None = None  # as given
         if goal is not None:
             self.aim(goal)
 
     def begin(self, joints: Joints) -> None:
-        """Begins: commands go on from where the joints are.
-
-        Raises:
-            ValueError: if the task draws a goal that is none.
-        """
+        """Begins an episode; commands start from the joints' positions."""
         self._task.initial_state(self._generator)
         self._action = None
         self.go_on(joints)
@@ -149,18 +143,14 @@ class Pilot:
             task.desired = checked_goal(task, drawn if self._goal is None else self._goal)
 
     def aim(self, goal: Any) -> None:
-        """Gives a `GoalTask` a goal, for good.
-
-        Raises:
-            ValueError: if it is none, or the task has none.
-        """
+        """Gives a `GoalTask` a goal for all episodes; raises ValueError if it isn't one of its goals."""
         task = self._task
         if not isinstance(task, GoalTask):
             raise ValueError(f"{type(task).__name__} has no goal; only a GoalTask does")
         task.desired = self._goal = checked_goal(task, goal)
 
     def go_on(self, joints: Joints) -> None:
-        """Has commands go on from where the joints are, after they were stopped."""
+        """Continues from the joints' positions, after they were stopped."""
         self._held = {name: limits.stop(joints) for name, limits in self._limits.items()}
 
     def _state(self, time: float, joints: Joints) -> WorldState:
@@ -171,13 +161,13 @@ class Pilot:
 
         Args:
             time: since the beginning [s].
-            joints: where they are.
+            joints: their states.
 
         Returns:
-            Commands by controller, those that are to be sent; None where the task's episode would be over.
+            Commands to send, by controller; None if the task's episode would have ended.
 
         Raises:
-            ValueError: if the policy or the task gives what can't be used.
+            ValueError: if the policy or the task returns something impossible.
         """
         task, state = self._task, self._state(time, joints)
         over = task.is_terminal(state)
@@ -192,11 +182,11 @@ class Pilot:
     def _limited(self, commands: Mapping[str, Command]) -> dict[str, Command]:
         found = {}
         for name, wanted in commands.items():
-            command, beyond = self._limits[name](wanted, self._held[name])
-            if beyond and name not in self._told:
-                self._told.add(name)
+            command, exceeded = self._limits[name](wanted, self._held[name])
+            if exceeded and name not in self._reported:
+                self._reported.add(name)
                 self._say(
-                    f"{name} is commanded beyond the limits of {', '.join(beyond)}: it is kept within"
+                    f"{name} is commanded beyond the limits of {', '.join(exceeded)}: it is kept within"
                 )
             found[name] = self._held[name] = command
         return found
@@ -206,6 +196,6 @@ class Pilot:
         return with_goals(task, seen, state) if isinstance(task, GoalTask) else seen
 
     def stop(self, joints: Joints) -> dict[str, Command]:
-        """Commands that have all joints stop where they are."""
+        """Commands that stop all joints where they are."""
         self.go_on(joints)
         return dict(self._held)

@@ -25,13 +25,13 @@ from robot_envs.world_state import Command, JointState
 class JointListener:
     """Keeps the newest state of each joint, and when it has come.
 
-    A state without velocities, or with numbers that aren't finite, doesn't count; nor does one with the stamp
-    of the one before, or an older one: a driver that repeats itself tells nothing new.
+    States without velocities or with numbers that aren't finite are ignored, and so are those whose stamp
+    isn't newer than the one before: a driver that repeats itself reports nothing new.
 
     Args:
         topic: of the joint states.
-        model: of the robot: joints may be called model::joint.
-        joints: those that are wanted.
+        model: of the robot: joints may be named model::joint.
+        joints: their plain names.
     """
 
     def __init__(self, topic: str, model: str, joints: Sequence[str]) -> None:
@@ -47,13 +47,13 @@ class JointListener:
 
     @property
     def topic(self) -> str:
-        """Of the joint states, its full name."""
+        """The full name of the topic."""
         return str(self._subscriber.resolved_name)
 
     def _receive(self, message: JointStateMsg) -> None:
         stamp, now, zero = message.header.stamp, rospy.get_time(), rospy.Time()
         efforts = message.effort or [0.0] * len(message.name)
-        # joint_state_publisher's messages are all zero and carry no velocities.
+        # Messages of joint_state_publisher are all zero, and carry no velocities.
         numbers = zip(message.name, message.position, message.velocity, efforts, strict=False)
         with self._lock:
             for full, *values in numbers:
@@ -65,19 +65,19 @@ class JointListener:
                 self._known[name] = JointState(*values), stamp, now
 
     def missing(self) -> list[str]:
-        """The joints of which nothing is known yet."""
+        """The joints whose states aren't known yet."""
         with self._lock:
             return [name for name in self._joints if name not in self._known]
 
     def look(self) -> tuple[dict[str, JointState], float]:
-        """The joints, none of which is missing, and when the oldest of their states came [s of ROS time]."""
+        """The joints, all of which are known, and when the oldest of their states arrived [s of ROS time]."""
         with self._lock:
             known = {name: self._known[name] for name in self._joints}
         oldest = min(arrival for _, _, arrival in known.values())
         return {name: state for name, (state, _, _) in known.items()}, oldest
 
     def forget(self) -> None:
-        """Has everything be told anew, as after time went back."""
+        """Forgets all states, as after time has gone back."""
         with self._lock:
             self._known.clear()
 
@@ -88,31 +88,32 @@ class JointListener:
 
 LATE_PERIODS, LATE_AT_LEAST = 5, 0.1  # control periods, and [s]
 POLL = 0.05  # [s] of wall time between two looks at what else might end a wait
-PATIENCE = 2.0  # [s] of wall time, until it is said what is missing
-LAST_WORDS = 1.0  # [s] of wall time, for each of the last commands to be sent
+PATIENCE = 2.0  # [s] of wall time, until what is missing is logged
+SENDING = 1.0  # [s] of wall time, for each of the last commands to be sent
 
 
 def late_by_default(period: float) -> float:
-    """After how long without a joint state [s] the robot is stopped, for a control period [s]."""
+    """How long the robot may be without a joint state before it is stopped [s], for a control period [s]."""
     return max(LATE_PERIODS * period, LATE_AT_LEAST)
 
 
 class PolicyNode:
-    """Runs a policy on a robot, from the moment on in which its joint states come and its controllers listen.
+    """Runs a policy on a robot, as soon as its joint states come and its controllers listen.
 
-    Each control period of ROS time it hands the newest joint states to task and policy, and publishes what
-    these command. Where the joint states are late, or the task's episode would be over, it commands a stop
-    instead, each period (see `CommandLimits.stop`), and goes on once they come, or it wouldn't. At the end
-    it stops the robot: when it is told to, by `rosnode kill`, too, and when policy or task fail.
+    Each control period of ROS time it passes the newest joint states to task and policy, and publishes their
+    commands. While joint states are late, or the task's episode would have ended, it commands a stop instead
+    (see `CommandLimits.stop`). At the end it stops the robot, also after `rosnode kill`, or an error of
+    policy or task.
 
-    A task with goals takes others from the topic `~goal` (std_msgs/Float64MultiArray).
+    The topic `~goal` (std_msgs/Float64MultiArray) changes the goal of a task with goals.
 
     Args:
         robot: the robot; nothing of it is started, spawned or set.
         task: what the policy has learned.
         act: the policy: the action for an observation.
         period: of control [s].
-        late: after how long without a joint state the robot is stopped [s]; None: `late_by_default`.
+        late: how long the robot may be without a joint state before it is stopped [s]; None:
+            `late_by_default`.
         seed: see `Pilot`.
         goal: see `Pilot`.
         way: see `CommandLimits`.
@@ -138,9 +139,9 @@ class PolicyNode:
         except ValueError as error:
             raise RobotEnvError(str(error)) from error
         self._wanted: Any = None  # a goal that has come
-        self._told = ""  # why the robot stands still
+        self._reported = ""  # why the robot stands still
         self._last: Mapping[str, JointState] | None = None  # joints; None: nothing was commanded
-        self._is_told_to_end: Callable[[], bool] = rospy.is_shutdown
+        self._should_end: Callable[[], bool] = rospy.is_shutdown
         self._is_killed, self._ended = threading.Event(), threading.Event()
         self._joints = JointListener(full_name(robot, "joint_states"), robot.model, robot.joints)
         self._topics = {
@@ -157,17 +158,17 @@ class PolicyNode:
     def _take_goal(self, message: Float64MultiArray) -> None:
         self._wanted = message.data
 
-    def run(self, is_told_to_end: Callable[[], bool]) -> None:
-        """Runs until it is told to end, or the node is shut down.
+    def run(self, should_end: Callable[[], bool]) -> None:
+        """Runs until it should end, or the node is shut down.
 
         Args:
-            is_told_to_end: is asked again and again. A signal's handler must not publish: it may have
-                interrupted a command that is being published.
+            should_end: is polled. A signal handler can't end the run itself: it may have interrupted a
+                command that is being published.
 
         Raises:
-            RobotEnvError: if policy or task give what can't be used; the robot was stopped.
+            RobotEnvError: if policy or task return something impossible; the robot was stopped.
         """
-        self._is_told_to_end = is_told_to_end
+        self._should_end = should_end
         rospy.on_shutdown(self._end_in_time)
         try:
             self._follow()
@@ -178,12 +179,12 @@ class PolicyNode:
             self._ended.set()
 
     def _end_in_time(self) -> None:
-        """By `rosnode kill`: what is published afterwards isn't sent any more."""
+        """After `rosnode kill`: messages that are published later aren't sent."""
         self._is_killed.set()
-        self._ended.wait(3.0 * LAST_WORDS)
+        self._ended.wait(3.0 * SENDING)
 
     def _is_over(self) -> bool:
-        return self._is_told_to_end() or self._is_killed.is_set() or rospy.is_shutdown()
+        return self._should_end() or self._is_killed.is_set() or rospy.is_shutdown()
 
     def _follow(self) -> None:
         began = before = self._begin()
@@ -199,14 +200,14 @@ class PolicyNode:
             self._sleep_until(began + self._period * (periods + 1))
 
     def _begin(self) -> float:
-        """Waits until all joints are known and somebody listens to each command; returns when [s]."""
+        """Waits until all joints are known and all controllers listen; returns the time [s]."""
         beginning = time.monotonic()
         while (missing := self._missing()) and not self._is_over():
             if time.monotonic() - beginning > PATIENCE:
-                self._tell(f"waiting for {missing}", lockstep_hint)
+                self._report(f"waiting for {missing}", lockstep_hint)
             rospy.rostime.wallsleep(POLL)
         if not missing:
-            self._tell("")
+            self._report("")
             self._last = self._joints.look()[0]
             self._pilot.begin(self._last)
             rospy.loginfo("the policy moves the robot")
@@ -220,7 +221,7 @@ class PolicyNode:
         return ", and ".join(missing)
 
     def _sleep_until(self, due: float) -> None:
-        """Until then [s of ROS time], or time has gone back, or it is to end: time may stand still."""
+        """Sleeps until a ROS time [s], or until time has gone back, or the run should end."""
         clock, seen, since = rospy.rostime.get_rostime_cond(), rospy.get_time(), time.monotonic()
         while seen <= (now := rospy.get_time()) < due and not self._is_over():
             if rospy.rostime.is_wallclock():
@@ -229,7 +230,7 @@ class PolicyNode:
             if now > seen:
                 seen, since = now, time.monotonic()
             elif time.monotonic() - since > PATIENCE:
-                self._tell("the time on /clock stands still", lockstep_hint)
+                self._report("the time on /clock stands still", lockstep_hint)
             with clock:
                 clock.wait(POLL)
 
@@ -237,16 +238,16 @@ class PolicyNode:
         self._last, arrival = self._joints.look()
         if now - arrival > self._late:
             topic = self._joints.topic
-            self._tell(f"no joint state on {topic} for {self._late:g} s: the robot is stopped")
+            self._report(f"no joint state on {topic} for {self._late:g} s: the robot is stopped")
             self._publish(self._pilot.stop(self._last))
             return
         self._aim_if_told()
         commands = self._pilot.step(passed, self._last)
         if commands is None:
-            self._tell("an episode would be over here: the robot is stopped")
+            self._report("an episode would be over here: the robot is stopped")
             commands = self._pilot.stop(self._last)
         else:
-            self._tell("")
+            self._report("")
         self._publish(commands)
 
     def _aim_if_told(self) -> None:
@@ -259,11 +260,11 @@ class PolicyNode:
         except ValueError as error:
             rospy.logwarn(f"{error}; it keeps the one it has")
 
-    def _tell(self, reason: str, hint: Callable[[], str] = str) -> None:
-        """Says once why the robot stands still, with a hint, and once that it doesn't any more."""
-        if reason != self._told:
+    def _report(self, reason: str, hint: Callable[[], str] = str) -> None:
+        """Logs once why the robot stands still, with a hint, and once that it moves again."""
+        if reason != self._reported:
             (rospy.logwarn if reason else rospy.loginfo)(f"{reason}{hint()}" or "going on")
-        self._told = reason
+        self._reported = reason
 
     def _publish(self, commands: Mapping[str, Command]) -> None:
         for name, command in commands.items():
@@ -272,12 +273,12 @@ class PolicyNode:
             topic.publish(Float64(command) if single else Float64MultiArray(data=list(command)))  # type: ignore[arg-type]
 
     def _end(self) -> None:
-        """Stops the robot, if it was moved."""
+        """Stops the robot, if it has moved."""
         if self._last is None:
             return
         newest = self._last if self._joints.missing() else self._joints.look()[0]
         commands = self._pilot.stop(newest)
-        # The first may still wait behind a command from before; then the second is sent after it.
+        # The first message may wait behind an earlier command; the second one is sent after it.
         for _ in range(2):
             sent = self._sent()
             self._publish(commands)
@@ -293,8 +294,8 @@ class PolicyNode:
         }
 
     def _wait_until_sent(self, before: Mapping[tuple[str, int], int]) -> None:
-        """rospy sends in threads of its own, and forgets what they haven't sent when the node ends."""
-        deadline = time.monotonic() + LAST_WORDS
+        """Waits, since rospy drops what its threads haven't sent when the node ends."""
+        deadline = time.monotonic() + SENDING
         while time.monotonic() < deadline:
             now = self._sent()
             if all(now[each] > count for each, count in before.items() if each in now):
@@ -303,15 +304,15 @@ class PolicyNode:
 
 
 def run_node(
-    name: str, argv: list[str], make: Callable[[], PolicyNode], is_told_to_end: Callable[[], bool]
+    name: str, argv: list[str], make: Callable[[], PolicyNode], should_end: Callable[[], bool]
 ) -> None:
     """Makes this process a node, and runs it.
 
     Args:
         name: the node's, with namespace.
         argv: the process's arguments, with roslaunch's remappings.
-        make: makes what it is to run.
-        is_told_to_end: see `PolicyNode.run`.
+        make: makes what it runs.
+        should_end: see `PolicyNode.run`.
 
     Raises:
         RobotEnvError: if there is no master, or a node of that name; and see `PolicyNode`.
@@ -323,6 +324,6 @@ def run_node(
     node.refuse_twin(name)
     rospy.init_node(os.path.basename(name), argv=["", *argv], disable_signals=True)
     try:
-        make().run(is_told_to_end)
+        make().run(should_end)
     finally:
         rospy.signal_shutdown("the policy has ended")

@@ -89,13 +89,16 @@ def test_parameters_and_flags_over_them() -> None:
         (["--backend=bullet", "--realtime"], "not with --backend bullet"),
         (
             ["--num-envs=2", "--realtime"],
-            "--realtime is of the robot of one simulator: num_envs is 1",
+            "--realtime is for a single simulator: num_envs must be 1",
         ),
         (
             ["--num-envs=2", "--rviz"],
-            "--rviz is of the robot of one simulator: num_envs must be 1, not 2",
+            "--rviz is for a single simulator: num_envs must be 1, not 2",
         ),
-        (["--num-envs=2", "--algo=reinforce-document"], "learns in one environment: num_envs is 1"),
+        (
+            ["--num-envs=2", "--algo=reinforce-document"],
+            "learns in one environment: num_envs must be 1",
+        ),
         (["--num-envs=0"], "num_envs must be between 1 and 1024, not 0"),
         (["--episods=5"], "unknown flag '--episods'; did you mean --episodes?"),
         (["--gamma=1.5"], "gamma must be between 0 and 1"),
@@ -116,7 +119,7 @@ def test_wrong_parameters_too(capsys) -> None:
 def test_what_is_the_robots_alone(capsys, given: str) -> None:
     flag = given.partition("=")[0]
     line = refused(capsys, "--env-id=X-v0", given)
-    assert f"{flag} is of the robot: not with --env-id X-v0" in line
+    assert f"{flag} is for the cart-pole: not with --env-id X-v0" in line
 
 
 def test_every_training_may_be_shown() -> None:
@@ -139,6 +142,33 @@ def test_help_explains_both(capsys) -> None:
     told = capsys.readouterr().out
     assert stop.value.code == 0
     assert all(flag in told for flag in ("--backend", "--start-noise", "--gae-lambda", "--resume"))
+
+
+@pytest.mark.parametrize("flag", ["--env-kwargs", "--train-env-kwargs"])
+def test_a_backend_among_the_environments_options_counts(flag: str) -> None:
+    options, _ = choose([flag, "backend=bullet", "--start-noise=0.1"], {})
+    assert options.run.training_environment == {"backend": "bullet", "noise": 0.1}
+
+
+def test_a_flag_wins_over_it() -> None:
+    options, _ = choose(["--env-kwargs=backend=bullet", "--backend=ros"], {})
+    assert options.run.training_environment["backend"] == "ros"
+    options, _ = choose(["--env-kwargs=backend=bullet", "--realtime"], {})
+    assert options.run.training_environment["backend"] == "ros-realtime"
+
+
+def test_an_empty_parameter_is_none() -> None:
+    """As roslaunch has an argument that nobody gave."""
+    options, _ = choose(["--env-kwargs=backend=bullet"], {"backend": "", "realtime": ""})
+    assert options.run.training_environment["backend"] == "bullet"
+
+
+def test_wrong_ones_are_told_with_those_that_there_are(capsys) -> None:
+    with pytest.raises(SystemExit):
+        choose(["--backend=gazebo"], {})
+    told = capsys.readouterr().err
+    assert "(choose from 'ros', 'bullet')" in told
+    assert told.startswith("usage: pg_train.py [--help] [--OPTION VALUE ...]")
 
 
 # Trainings in this process.

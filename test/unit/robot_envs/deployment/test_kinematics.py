@@ -77,10 +77,10 @@ def test_who_asks_for_no_links_gets_none() -> None:
 @pytest.mark.parametrize(
     ("query", "words"),
     [
-        (StateQuery(models=("ball",)), "asks for models, which nobody tells"),
-        (StateQuery(all_models=True), "asks for models, which nobody tells"),
-        (StateQuery(contacts_of=("tip",)), "asks for contacts, which nobody tells"),
-        (StateQuery(all_contacts=True), "asks for contacts, which nobody tells"),
+        (StateQuery(models=("ball",)), "asks for models, which aren't known"),
+        (StateQuery(all_models=True), "asks for models, which aren't known"),
+        (StateQuery(contacts_of=("tip",)), "asks for contacts, which aren't known"),
+        (StateQuery(all_contacts=True), "asks for contacts, which aren't known"),
         (StateQuery(links=(LinkQuery("tipp"),)), "no link 'tipp'; did you mean 'tip'"),
         (StateQuery(links=(LinkQuery("tip", "bass"),)), "no link 'bass'; did you mean 'base'"),
         (StateQuery(links=(LinkQuery("ball::tip"),)), "no link 'ball::tip'"),
@@ -95,7 +95,7 @@ def test_what_joints_do_not_tell_is_refused(query: StateQuery, words: str) -> No
 def test_a_robot_that_is_not_fixed_to_the_world() -> None:
     text = (FILES / "two_link_arm.urdf").read_text().replace('"world"', '"cart"')
     with pytest.raises(
-        RobotEnvError, match="isn't fixed to the world: its joints don't tell where"
+        RobotEnvError, match="isn't fixed to the world: its joints don't determine where"
     ):
         LinkView(Robot(text), ALL)
 
@@ -106,5 +106,7 @@ def test_a_joint_that_nobody_tells() -> None:
     text = before + after.split("</transmission>", 1)[1]
     query = StateQuery(links=(LinkQuery("upper"),))
     LinkView(Robot(text), query)
-    with pytest.raises(RobotEnvError, match="'tip' hangs on the joint 'elbow', which has no trans"):
+    with pytest.raises(
+        RobotEnvError, match="'tip' depends on the joint 'elbow', which has no trans"
+    ):
         LinkView(Robot(text), ALL)

@@ -105,7 +105,7 @@ def test_each_quantity_has_its_limits_and_its_stop(kind, wanted, given, stopped)
     (port,) = robot.ports
     limits = CommandLimits(robot, port, way=float("inf"), period=0.01)
     found = limits(wanted, (0.0, 0.0))
-    assert found.command == given and found.beyond == ("elbow", "shoulder")
+    assert found.command == given and found.exceeded == ("elbow", "shoulder")
     assert limits((0.1, -0.1), (0.0, 0.0)) == ((0.1, -0.1), ())
     joints = {"shoulder": JointState(-0.2, 3.0, 1.0), "elbow": JointState(0.3, -3.0, 1.0)}
     assert limits.stop(joints) == stopped
