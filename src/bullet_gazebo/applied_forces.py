@@ -11,7 +11,7 @@ Wrench = tuple[Vector, Vector]
 
 
 @dataclass(frozen=True)
-class Interval:
+class ActingTime:
     """When an effort or wrench acts, in simulated time [ns]; a negative duration is for ever."""
 
     start: int
@@ -31,7 +31,7 @@ class AppliedEffort:
     model: Model
     joint: str
     effort: float
-    interval: Interval
+    interval: ActingTime
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class AppliedWrench:
     model: Model
     link: str
     wrench: Wrench
-    interval: Interval
+    interval: ActingTime
 
 
 class AppliedForces:

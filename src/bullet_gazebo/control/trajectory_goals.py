@@ -165,7 +165,7 @@ class Constraints(NamedTuple):
     goal_time: int = 0
 
 
-class Outcome(NamedTuple):
+class GoalOutcome(NamedTuple):
     """How a goal ended; `code` is FollowJointTrajectory's error code."""
 
     kind: str
@@ -183,13 +183,13 @@ class TrajectorySample(NamedTuple):
     error: tuple[tuple[float, ...], tuple[float, ...]]
 
 
-class GoalListener(Protocol):
+class GoalObserver(Protocol):
     """Follows a goal. It is called within a control tick, so it must not wait for anything."""
 
     def feedback(self, sample: TrajectorySample) -> None:
         """Takes the state of the joints, at action_monitor_rate."""
 
-    def finished(self, outcome: Outcome) -> None:
+    def finished(self, outcome: GoalOutcome) -> None:
         """Takes the outcome; it is the last call."""
 
 
@@ -216,7 +216,7 @@ class Goal:
     def __init__(
         self,
         key: str,
-        listener: GoalListener,
+        listener: GoalObserver,
         monitored: list[MonitoredJoint],
         start: int,
         late: int,
@@ -231,12 +231,12 @@ class Goal:
         """
         self.key = key
         self.listener = listener
-        self.outcome: Outcome | None = None
+        self.outcome: GoalOutcome | None = None
         self._monitored = monitored
         self._start = start
         self._late = late
 
-    def check(self, uptime: int) -> Outcome | None:
+    def check(self, uptime: int) -> GoalOutcome | None:
         """Returns the outcome; None while the joints are on their way."""
         reached = True
         for axis, path, goal in self._monitored:
@@ -253,7 +253,7 @@ class Goal:
                 reached = False
                 if uptime >= axis.spline.end + self._late:
                     return _aborted(GOAL_TOLERANCE_VIOLATED, axis, "goal", fault)
-        return Outcome(SUCCEEDED) if reached else None
+        return GoalOutcome(SUCCEEDED) if reached else None
 
 
 def check_tolerances(request: GoalRequest) -> None:
@@ -285,7 +285,7 @@ def monitored_joints(
     return monitored, late
 
 
-def _aborted(code: int, axis: Axis, where: str, fault: str) -> Outcome:
-    return Outcome(
+def _aborted(code: int, axis: Axis, where: str, fault: str) -> GoalOutcome:
+    return GoalOutcome(
         ABORTED, code, f"{axis.joint.name} {where} error {axis.position_error:f} ({fault})"
     )

@@ -160,8 +160,8 @@ def _is_stopgap(material: Any) -> bool:
 
 def _brighten(material: Any) -> None:
     """Shows a texture without a colour as it is; trimesh would darken it."""
-    told = getattr(material, "kwargs", None)
-    if told is not None and "kd" not in told and getattr(material, "image", None) is not None:
+    given = getattr(material, "kwargs", None)
+    if given is not None and "kd" not in given and getattr(material, "image", None) is not None:
         material.diffuse = WHITE
 
 

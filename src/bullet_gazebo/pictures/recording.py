@@ -188,7 +188,7 @@ def _start(options: RecordingOptions) -> subprocess.Popen[bytes]:
     )  # fmt: skip
 
 
-class Film:
+class FrameDrawer:
     """Draws the frames: the recorded models in a renderer, and a camera that looks at them."""
 
     def __init__(self, options: RecordingOptions, renderer: "Renderer") -> None:
@@ -256,13 +256,17 @@ def main(arguments: Sequence[str]) -> int:
     signal.signal(signal.SIGTERM, stop)
     # In a thread, so that the simulator never waits for a frame.
     threading.Thread(target=_read, args=(sys.stdin.buffer, inbox), daemon=True).start()
-    film, writer, count = Film(options, Renderer()), Mp4Writer(options.path, options.rate), 0
+    drawer, writer, count = (
+        FrameDrawer(options, Renderer()),
+        Mp4Writer(options.path, options.rate),
+        0,
+    )
     try:
         while (message := inbox.get()) is not None and not stopping:
             models, poses = message
             if models is not None:
-                film.change(models)
-            writer.add(film.frame(poses))
+                drawer.change(models)
+            writer.add(drawer.frame(poses))
             count += 1
         writer.close()
     except EncoderFailed as error:

@@ -1,5 +1,7 @@
 """Conversions between visible models and lights and the messages of a scene."""
 
+from collections.abc import Iterable
+
 from bullet_gazebo_msgs.msg import SceneJoint, SceneLight, SceneLink, SceneModel, SceneShape
 from geometry_msgs.msg import Vector3
 from std_msgs.msg import ColorRGBA
@@ -20,7 +22,10 @@ def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
         number=number,
         name=model.name,
         is_static=description.static,
-        links=[_to_link(link) for link in seen.links],
+        links=[
+            SceneLink(link.name, _to_shapes(link.visuals), _to_shapes(link.collisions))
+            for link in seen.links
+        ],
         joints=[_to_joint(joint) for joint in seen.joints],
         root=seen.root,
         frame=to_pose_msg(seen.frame),
@@ -31,7 +36,10 @@ def from_model(message: SceneModel) -> VisibleModel:
     return VisibleModel(
         message.number,
         message.name,
-        [_from_link(link) for link in message.links],
+        [
+            VisibleLink(link.name, _from_shapes(link.visuals), _from_shapes(link.collisions))
+            for link in message.links
+        ],
         [_from_joint(joint) for joint in message.joints],
         message.root,
         from_pose_msg(message.frame),
@@ -55,22 +63,6 @@ def from_light(message: SceneLight) -> Light:
         direction=to_vector(message.direction),
         pose=from_pose_msg(message.pose),
         kind=message.kind,
-    )
-
-
-def _to_link(link: VisibleLink) -> SceneLink:
-    return SceneLink(
-        link.name,
-        [_to_shape(shape) for shape in link.visuals],
-        [_to_shape(shape) for shape in link.collisions],
-    )
-
-
-def _from_link(message: SceneLink) -> VisibleLink:
-    return VisibleLink(
-        message.name,
-        [_from_shape(shape) for shape in message.visuals],
-        [_from_shape(shape) for shape in message.collisions],
     )
 
 
@@ -98,27 +90,33 @@ def _from_joint(message: SceneJoint) -> VisibleJoint:
     )
 
 
-def _to_shape(shape: Shape) -> SceneShape:
-    return SceneShape(
-        name=shape.name,
-        kind=shape.kind,
-        size=shape.size,
-        pose=to_pose_msg(shape.pose),
-        mesh=shape.mesh,
-        has_color=shape.rgba is not None,
-        color=ColorRGBA(*(shape.rgba or (0.0, 0.0, 0.0, 0.0))),
-    )
+def _to_shapes(shapes: Iterable[Shape]) -> list[SceneShape]:
+    return [
+        SceneShape(
+            name=shape.name,
+            kind=shape.kind,
+            size=shape.size,
+            pose=to_pose_msg(shape.pose),
+            mesh=shape.mesh,
+            has_color=shape.rgba is not None,
+            color=ColorRGBA(*(shape.rgba or (0.0, 0.0, 0.0, 0.0))),
+        )
+        for shape in shapes
+    ]
 
 
-def _from_shape(message: SceneShape) -> Shape:
-    return Shape(
-        message.kind,
-        tuple(message.size),
-        from_pose_msg(message.pose),
-        message.mesh,
-        _from_color(message.color) if message.has_color else None,
-        message.name,
-    )
+def _from_shapes(messages: Iterable[SceneShape]) -> list[Shape]:
+    return [
+        Shape(
+            message.kind,
+            tuple(message.size),
+            from_pose_msg(message.pose),
+            message.mesh,
+            _from_color(message.color) if message.has_color else None,
+            message.name,
+        )
+        for message in messages
+    ]
 
 
 def _from_color(message: ColorRGBA) -> Color:

@@ -2,7 +2,6 @@
 
 import argparse
 import datetime
-import json
 import os
 import platform
 import re
@@ -11,15 +10,14 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from files.content import open_text
-from rl_workbench.env_ids import as_file_name
+from rl_workbench.env_ids import as_file_name, threshold
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import is_plain, key_values
 from rl_workbench.starting import Interrupt
 from rl_workbench.storage import as_json, as_text, write_file
 from rl_workbench.tools.flags import add_job_flags, number, write_figure
 from rl_workbench.tools.job import Job, last_words
-from rl_workbench.tools.jobs import job_pool
+from rl_workbench.tools.jobs import claim, job_pool
 from rl_workbench.tools.runs import Run, open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS, algorithm
@@ -96,12 +94,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Trains what isn't trained yet, then writes results.md, costs.md, results.json and two pictures.
-
-    Raises:
-        WorkbenchError: if a name is unknown, the folder holds another benchmark or one runs in it,
-            or a training has failed; then all files are written first.
-    """
+    """Trains what isn't trained yet, then writes results.md, costs.md, results.json and two pictures."""
     suite = _suite(arguments)
     for variant in suite.variants:
         check_package(variant)
@@ -113,7 +106,10 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     except OSError as error:
         raise WorkbenchError(f"can't make {folder}: {error.strerror}") from error
     with run_folder.held(folder, "another benchmark"):
-        _claim(folder, suite)
+        if not (folder / RECORD).exists() and any(folder.iterdir()):
+            raise WorkbenchError(f"{folder} holds something else; name another folder with --out")
+        variants = [asdict(each) for each in suite.variants]
+        claim(folder, RECORD, variants, "runs with other options")
         planned = [
             _Planned(variant.name, seed, _job(variant, seed, folder))
             for variant in suite.variants
@@ -148,23 +144,6 @@ def _suite(arguments: argparse.Namespace) -> Suite:
     given = {"env_id": env_id, **key_values(arguments.params, "--params")}
     name = f"{kind}__{as_file_name(given['env_id'])}"
     return Suite(name, "", SEEDS, (make_variant("--params", name, {"algo": kind, **given}),))
-
-
-def _claim(folder: Path, suite: Suite) -> None:
-    """Notes what the runs of the folder are, or checks that they are the same."""
-    path, wanted = folder / RECORD, [asdict(variant) for variant in suite.variants]
-    try:
-        with open_text(path) as file:
-            found = json.load(file)
-    except FileNotFoundError:
-        if any(folder.iterdir()):
-            raise WorkbenchError(f"{folder} holds something else; name another folder") from None
-        write_file(path, as_json(wanted))
-        return
-    except (OSError, ValueError) as error:
-        raise WorkbenchError(f"can't read {path}: {error}") from error
-    if found != json.loads(json.dumps(wanted)):
-        raise WorkbenchError(f"{folder} holds runs with other options; name another folder")
 
 
 def read_suite(name: str, path: Path | None = None) -> Suite:
@@ -213,7 +192,7 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
         raise WorkbenchError(
             f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}"
         )
-    rest = dict(options)
+    rest = {key: value for key, value in options.items() if value is not None}
     kind = str(rest.pop("algo", "dqn"))
     if kind not in ALGORITHMS:
         raise WorkbenchError(f"{origin}: algo is one of {', '.join(ALGORITHMS)}, not {kind!r}")
@@ -221,7 +200,6 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
     if taken:
         raise WorkbenchError(f"{origin}: the benchmark sets {taken[0]} itself")
     if not algorithm(kind).package:  # others are asked in `check_package`
-        rest = {key: value for key, value in rest.items() if value is not None}
         known_options(algorithm(kind)).read(_without_special(kind, rest), f"{origin}: {name}")
     return Variant(name, kind, rest)
 
@@ -261,15 +239,12 @@ def _text(value: Any) -> str:
         return f"[{','.join(map(str, value))}]"
     if isinstance(value, dict):
         return ",".join(f"{key}={each}" for key, each in value.items())
-    return "null" if value is None else str(value)
+    return str(value)
 
 
 def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, where: str) -> None:
-    """Writes all files; the same results whatever happened on the way and wherever the folder lies."""
-    from rl_workbench.env_ids import threshold
-    from rl_workbench.plotting import evaluation_curves, seed_curves
+    """Writes all files. results.md is the same whatever happened on the way, wherever the folder lies."""
     from rl_workbench.tools import results as figures
-    from rl_workbench.tools.plot import seed_panels, variant_panels
 
     runs, results = _examine(planned, episodes)
     results = [replace(each, fault=each.fault.replace(f"{folder}/", "")) for each in results]
@@ -278,16 +253,13 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
     groups = figures.grouped(results)
     summary = figures.summary_table(groups, figures.RESULTS_SUMMARY)
     every = figures.table(results, figures.RESULTS)
-    about = _measured(episodes, {threshold(run.env_id) for run in runs})
-    text = f"# {suite.name}\n\n{suite.about}\n\n{about}\n\n{summary}\n\n{every}\n"
-    write_file(folder / "results.md", as_text(text))
     costs = figures.summary_table(groups, figures.COSTS_SUMMARY)
     costs += f"\n\n{figures.table(results, figures.COSTS)}"
+    about = f"{suite.about}\n\n{_measured(episodes, {threshold(run.env_id) for run in runs})}"
     machine = (
         f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}, {where}"
     )
-    text = f"# {suite.name}: costs\n\n{datetime.date.today().isoformat()}, {machine}.\n\n{costs}\n"
-    write_file(folder / "costs.md", as_text(text))
+    today = datetime.date.today().isoformat()
     content = {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "versions": run_folder.versions(),
@@ -295,23 +267,36 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
         "where": where,
         "runs": figures.rows(results, {**figures.RESULTS, **figures.COSTS}),
     }
-    write_file(folder / "results.json", as_json(content))
-    for name, panels, draw in (
-        ("curves.png", seed_panels, seed_curves),
-        ("evaluations.png", variant_panels, evaluation_curves),
+    for name, write in (
+        ("results.md", as_text(f"# {suite.name}\n\n{about}\n\n{summary}\n\n{every}\n")),
+        ("costs.md", as_text(f"# {suite.name}: costs\n\n{today}, {machine}.\n\n{costs}\n")),
+        ("results.json", as_json(content)),
     ):
-        try:  # a picture that can't be drawn must not cost the tables
-            figure = draw(panels(runs))
-        except WorkbenchError as error:
-            warn(f"no {name}: {error}")
-        else:
-            write_figure(folder / name, figure)
+        write_file(folder / name, write)
+    _draw(folder, runs)
     tell(f"{every}\n\n{summary}\n\n{costs}\n\ntables, figures and curves are in {folder}")
     failed = [each for each in results if each.fault]
     if failed:
         raise WorkbenchError(
             f"{len(failed)} of {len(results)} trainings failed; the first one: {failed[0].fault}"
         )
+
+
+def _draw(folder: Path, runs: list[Run]) -> None:
+    """Draws the pictures; one that can't be drawn must not cost the others."""
+    from rl_workbench.plotting import evaluation_curves, seed_curves
+    from rl_workbench.tools.plot import seed_panels, variant_panels
+
+    for name, panels, draw in (
+        ("curves.png", seed_panels, seed_curves),
+        ("evaluations.png", variant_panels, evaluation_curves),
+    ):
+        try:
+            figure = draw(panels(runs))
+        except WorkbenchError as error:
+            warn(f"no {name}: {error}")
+        else:
+            write_figure(folder / name, figure)
 
 
 def _examine(planned: list[_Planned], episodes: int) -> "tuple[list[Run], list[RunResult]]":

@@ -22,11 +22,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Plays the episodes where they can be watched.
-
-    Raises:
-        WorkbenchError: if something is wrong with the run or the display.
-    """
+    """Plays the episodes where they can be watched."""
     from rl_workbench.tools.eval import episode_lines
     from rl_workbench.tools.policies import environment_of, load_learned, play
     from rl_workbench.tools.recording import draws_itself

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rl_workbench.starting import Interrupt
-from rl_workbench.tools.flags import POLICIES, add_policy_flags, env_options, number
+from rl_workbench.tools.flags import POLICIES, RANDOM, add_policy_flags, env_options, number
 from rl_workbench.training.progress import tell
 
 if TYPE_CHECKING:
@@ -23,39 +23,23 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Plays the episodes, and prints a line for each and one for all.
-
-    Raises:
-        WorkbenchError: if something is wrong with the run or the file.
-    """
+    """Plays the episodes, and prints a line for each and one for all."""
     from rl_workbench.env_ids import threshold
     from rl_workbench.storage import as_json, check_writable, write_file
-    from rl_workbench.tools.policies import (
-        RANDOM,
-        LearnedPolicy,
-        RandomPolicy,
-        load_learned,
-        play,
-        random_policy,
-    )  # fmt: skip
+    from rl_workbench.tools.policies import load_any, play
     from rl_workbench.tools.runs import open_run
 
     run = open_run(arguments.run)
     to_stdout = str(arguments.json) == "-"
     if arguments.json and not to_stdout:
         check_writable(arguments.json)
-    options, which = env_options(arguments), arguments.checkpoint
-    policy: LearnedPolicy | RandomPolicy
-    if which == RANDOM:
-        policy = random_policy(run, options, arguments.seed)
-    else:
-        policy = load_learned(run, which, options)
-    checkpoint = str(policy.checkpoint) if isinstance(policy, LearnedPolicy) else RANDOM
+    policy = load_any(run, arguments.checkpoint, env_options(arguments), arguments.seed)
     try:
         result = play(policy, arguments.episodes, arguments.seed)
     finally:
         policy.env.close()
     line = threshold(run.env_id)
+    checkpoint = str(getattr(policy, "checkpoint", RANDOM))
     found = {"run": str(run.folder), "checkpoint": checkpoint, **statistics(result, line)}
     # With the figures on standard output, the text goes to standard error.
     stream = sys.stderr if to_stdout else sys.stdout
@@ -104,7 +88,7 @@ def episode_lines(result: "Evaluation") -> str:
 
 
 def _summary(found: dict[str, Any], threshold: float | None) -> str:
-    kind = "random" if found["checkpoint"] == "random" else "greedy"
+    kind = "random" if found["checkpoint"] == RANDOM else "greedy"
     line = f"mean {found['mean']:.2f} ± {found['std']:.2f} over {found['episodes']} {kind} episodes"
     line += f" (min {found['min']:.2f}, max {found['max']:.2f})"
     if found["success_rate"] is not None:

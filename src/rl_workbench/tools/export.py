@@ -16,11 +16,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Exports the policy, and compares the file with it.
-
-    Raises:
-        WorkbenchError: if something is wrong with the run or the file, or their actions differ.
-    """
+    """Exports the policy, and compares the file with it."""
     from rl_workbench.storage import check_writable, write_file
     from rl_workbench.tools.policies import load_learned
     from rl_workbench.tools.runs import open_run

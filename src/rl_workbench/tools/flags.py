@@ -10,7 +10,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WHICH = ("best", "last")  # checkpoints: by evaluation, the newest
-POLICIES = (*WHICH, "random")
+RANDOM = "random"
+POLICIES = (*WHICH, RANDOM)
 
 
 def add_policy_flags(
@@ -18,7 +19,7 @@ def add_policy_flags(
 ) -> None:
     """Adds the flags that choose a run, one of its policies (or several), and the environment."""
     parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
-    which = "best by evaluation, newest" + (", or random actions" if "random" in choices else "")
+    which = "best by evaluation, newest" + (", or random actions" if RANDOM in choices else "")
     if several:
         parser.add_argument("--checkpoint", choices=choices, nargs="+", default=["best"],
                             help=f"{which}; several are shown side by side (default best)")  # fmt: skip

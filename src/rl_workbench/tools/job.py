@@ -23,7 +23,6 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.storage import CONFIG_RECORD, as_json, write_file
 from rl_workbench.tools.runs import SUMMARY, cost_file, cost_of, read_leniently
 from rl_workbench.training import folder as run_folder
-from rl_workbench.training.checkpoints import LAST
 from rl_workbench.training.scalar_log import NAME as SCALARS
 
 POLL = 0.2  # [s]
@@ -134,6 +133,8 @@ def is_hopeless(job: Job, since: float) -> bool:
 
 
 def _attempts_without_checkpoint(job: Job, spans: list[list[float]], since: float) -> int:
+    from rl_workbench.training.checkpoints import LAST
+
     with contextlib.suppress(OSError):
         since = max(since, (job.folder / LAST).stat().st_mtime)
     return sum(began > since for began, _ in spans)
@@ -161,6 +162,8 @@ def command(job: Job, program: Sequence[str]) -> list[str]:
     Raises:
         WorkbenchError: if a training of an earlier command still runs there.
     """
+    from rl_workbench.training.checkpoints import LAST
+
     if job.folder.exists():
         with run_folder.held(job.folder):
             if (job.folder / LAST).exists():

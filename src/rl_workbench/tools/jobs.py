@@ -80,6 +80,31 @@ def job_pool(
         yield pool
 
 
+def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
+    """Notes in a folder's file what its runs are, or checks that it is the same.
+
+    Args:
+        folder: of a benchmark or a sweep.
+        name: of the file.
+        wanted: plain values.
+        refusal: the error if the folder holds something else, after its name.
+
+    Raises:
+        WorkbenchError: if it does, or the file can't be read or written.
+    """
+    path = folder / name
+    try:
+        with open_text(path) as file:
+            found = json.load(file)
+    except FileNotFoundError:
+        write_file(path, as_json(wanted))
+        return
+    except (OSError, ValueError) as error:
+        raise WorkbenchError(f"can't read {path}: {error}") from error
+    if found != json.loads(json.dumps(wanted)):
+        raise WorkbenchError(f"{folder} holds {refusal}; name another folder with --out")
+
+
 RunJob = Callable[[Job, StopWithin, Callable[[str], None]], Ending]
 """Runs a job to its end; the last argument receives a line for each attempt that is lost."""
 
@@ -286,11 +311,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Lists the jobs of a benchmark or a sweep; only reads files.
-
-    Raises:
-        WorkbenchError: if the folder has no jobs.
-    """
+    """Lists the jobs of a benchmark or a sweep; only reads files."""
     found = read_jobs(arguments.folder)
     if arguments.json:
         write_file(arguments.json, as_json([asdict(each) for each in found]))

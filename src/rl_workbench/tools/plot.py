@@ -35,11 +35,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Draws the curves.
-
-    Raises:
-        WorkbenchError: if there is no run, or the file can't be written.
-    """
+    """Draws the curves."""
     from rl_workbench.plotting import STEPS, training_curves
 
     panels = run_panels(find_runs(arguments.runs, warn), arguments.over)

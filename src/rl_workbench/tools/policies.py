@@ -13,6 +13,7 @@ from torch import nn
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import whole
 from rl_workbench.storage import CONFIG_RECORD
+from rl_workbench.tools.flags import RANDOM
 from rl_workbench.tools.runs import Run
 from rl_workbench.training import checkpoints
 from rl_workbench.training.algorithm import load_policy
@@ -23,7 +24,6 @@ from rl_workbench.training.options import recorded_options
 from rl_workbench.training.progress import warn
 
 TEST_SEED = 5_000_000  # keeps these episodes apart from those of trainings and their evaluations
-RANDOM = "random"
 Act = Callable[[Any], Any]  # an observation to an action
 
 
@@ -60,12 +60,12 @@ def environment_of(run: Run, options: Mapping[str, Any]) -> gymnasium.Env[Any, A
     return make_environment(run.env_id, {**run.env_kwargs, **options}, keep_dict=keeps_dict)
 
 
-def random_policy(run: Run, env_options: Mapping[str, Any], seed: int) -> RandomPolicy:
-    """Makes a policy that samples the action space.
-
-    Raises:
-        WorkbenchError: if the environment can't be made.
-    """
+def load_any(
+    run: Run, which: str, env_options: Mapping[str, Any], seed: int
+) -> LearnedPolicy | RandomPolicy:
+    """Loads the policy of a checkpoint, see `load_learned`, or makes a random one of that seed."""
+    if which != RANDOM:
+        return load_learned(run, which, env_options)
     env = environment_of(run, env_options)
     env.action_space.seed(seed)
     return RandomPolicy(lambda _: env.action_space.sample(), env)

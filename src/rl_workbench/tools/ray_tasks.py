@@ -36,6 +36,13 @@ CONNECT_TIMEOUT = 5.0  # [s]; Ray itself would try for more than a minute
 OBJECT_STORE = 128 * 2**20  # [bytes] of a local cluster; jobs hardly use it
 SOCKET_PATH = 40  # [bytes] of a temporary folder's path, so that Ray's sockets fit below
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+# Ray reads these as it is imported.
+QUIET = {
+    "RAY_USAGE_STATS_ENABLED": "0",  # sends nothing home
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",  # no warning about processors for graphics
+    "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
+    "RAY_DEDUP_LOGS_SKIP_REGEX": ".",  # nothing printed about workers and nodes that die
+}
 # Ray's own messages are pages long.
 REASONS = {
     "NodeDiedError": "its node died",
@@ -182,35 +189,18 @@ def joined(address: str) -> Iterator[Any]:
         WorkbenchError: if Ray isn't installed, or there is no such cluster.
     """
     need("ray", "Ray", "--ray")
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # sends nothing home
+    for name, value in QUIET.items():
+        os.environ.setdefault(name, value)
     with contextlib.ExitStack() as stack:
-        options: dict[str, Any] = {}
-        if address == LOCAL:
-            where = None if len(tempfile.gettempdir()) < SOCKET_PATH else "/tmp"
-            scratch = tempfile.TemporaryDirectory(
-                prefix="ray_", dir=where, ignore_cleanup_errors=True
-            )
-            options = {
-                "num_cpus": len(os.sched_getaffinity(0)),
-                "object_store_memory": OBJECT_STORE,
-                "include_dashboard": False,
-                "_temp_dir": stack.enter_context(scratch),
-            }
-            if "ray" not in sys.modules:  # nobody else on this machine may use it
-                os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
-        elif address != "auto":
+        options = _local_cluster(stack) if address == LOCAL else {}
+        if address not in (LOCAL, "auto"):
             _check_address(address)
         import ray
 
         before = {number: signal.getsignal(number) for number in SIGNALS}
         try:
-            ray.init(
-                address,
-                log_to_driver=False,
-                logging_level=logging.ERROR,
-                configure_logging=False,
-                **options,
-            )
+            ray.init(address, log_to_driver=False, logging_level=logging.ERROR,
+                     configure_logging=False, **options)  # fmt: skip
         except Exception as error:
             ray.shutdown()
             text = " ".join(str(error).split())
@@ -220,6 +210,20 @@ def joined(address: str) -> Iterator[Any]:
                 signal.signal(number, handler)
         stack.callback(ray.shutdown)
         yield ray
+
+
+def _local_cluster(stack: contextlib.ExitStack) -> dict[str, Any]:
+    """Options for a cluster on this machine, which nobody else can use; its files go with the stack."""
+    if "ray" not in sys.modules:  # which reads these when it is imported
+        os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
+    where = None if len(tempfile.gettempdir()) < SOCKET_PATH else "/tmp"
+    folder = tempfile.TemporaryDirectory(prefix="ray_", dir=where, ignore_cleanup_errors=True)
+    return {
+        "num_cpus": len(os.sched_getaffinity(0)),
+        "object_store_memory": OBJECT_STORE,
+        "include_dashboard": False,
+        "_temp_dir": stack.enter_context(folder),
+    }
 
 
 def _check_address(address: str) -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
     from rl_workbench.tools.policies import LearnedPolicy, RandomPolicy
-    from rl_workbench.tools.recording import Frame
+    from rl_workbench.tools.recording import EpisodeFrame
     from rl_workbench.tools.runs import Run
 
 RATES = {".gif": 25.0, ".mp4": 50.0, ".html": 25.0}  # [Hz] by default, by the suffix
@@ -38,7 +38,7 @@ class Film(NamedTuple):
     """A recorded episode."""
 
     title: str
-    frames: "list[Frame]"
+    frames: "list[EpisodeFrame]"
     rate: float  # of the frames [Hz], in simulated time
 
 
@@ -71,11 +71,7 @@ def _rate(text: str) -> float:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Records an episode of each policy, and writes the file.
-
-    Raises:
-        WorkbenchError: if something is wrong with the run or the file, or nothing can be drawn.
-    """
+    """Records an episode of each policy, and writes the file."""
     from rl_workbench.storage import check_writable
     from rl_workbench.tools.recording import draw_without_display, draws_itself
     from rl_workbench.tools.runs import open_run
@@ -110,22 +106,17 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
 def _policy(
     arguments: argparse.Namespace, run: "Run", which: str
 ) -> "LearnedPolicy | RandomPolicy":
-    from rl_workbench.tools.policies import RANDOM, load_learned, random_policy
+    from rl_workbench.tools.policies import load_any
     from rl_workbench.tools.recording import size_options
 
-    def load(sized: dict[str, int]) -> "LearnedPolicy | RandomPolicy":
-        options = {**env_options(arguments), "render_mode": "rgb_array", **sized}
-        if which == RANDOM:
-            return random_policy(run, options, arguments.seed)
-        return load_learned(run, which, options)
-
+    options = {**env_options(arguments), "render_mode": "rgb_array"}
     sized = size_options(run.env_id, arguments.size)
     try:
-        return load(sized)
+        return load_any(run, which, {**options, **sized}, arguments.seed)
     except WorkbenchError:
         if not sized:
             raise
-    return load({})  # pictures of its own size are scaled
+    return load_any(run, which, options, arguments.seed)  # pictures of its own size are scaled
 
 
 def _record(arguments: argparse.Namespace, which: str, policy: Any, view: Any, rate: float) -> Film:

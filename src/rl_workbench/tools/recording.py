@@ -21,8 +21,8 @@ from PIL import Image
 
 from rl_workbench.env_ids import spec_of
 from rl_workbench.errors import WorkbenchError
+from rl_workbench.tools.flags import RANDOM
 from rl_workbench.tools.policies import (
-    RANDOM,
     TEST_SEED,
     Act,
     environment_of,
@@ -46,13 +46,14 @@ CAMERA, LOOK_AT = (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)  # in front of a picture on 
 HEIGHT, WIDTH = 1.2, 1.8  # of a picture on a page, at most
 FACING = (np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0)  # turns a picture's down to the page's, wxyz
 QUALITY = 85  # of JPEG on a page
+PATIENCE = 10.0  # [s] for the thread that records to end
 MAX_STEPS = 20_000  # of an episode on a page; some have no end
 MAX_BYTES = 2**28  # of its pictures
 BACKEND = "backend"  # the option by which an environment may move a robot outside of its process
 IN_PROCESS = ("bullet", "mujoco")
 
 
-class Frame(NamedTuple):
+class EpisodeFrame(NamedTuple):
     """A moment of an episode; the first one is the reset."""
 
     step: int
@@ -194,7 +195,7 @@ def record_episode(
     *,
     stride: float = 1.0,
     max_steps: int = 0,
-) -> Iterator[Frame]:
+) -> Iterator[EpisodeFrame]:
     """Plays one episode, and yields its frames.
 
     Args:
@@ -214,7 +215,7 @@ def record_episode(
         if length < due and not step.finished:
             continue
         action = "" if step.action is None else _action_text(step.action)
-        yield Frame(length, view.take(), total, action, step.success)
+        yield EpisodeFrame(length, view.take(), total, action, step.success)
         while due <= length:
             due += stride
 
@@ -261,7 +262,7 @@ class RecordedEpisode:
 
     which: str  # policy
     seed: int
-    frames: list[Frame] = field(default_factory=list)
+    frames: list[EpisodeFrame] = field(default_factory=list)
     policy: str = ""  # in words
     rate: float = DEFAULT_RATE  # [Hz] of its steps
     is_over: bool = False
@@ -306,12 +307,12 @@ class EpisodeRecorder:
             self._changed.notify()
         return episode
 
-    def close(self, patience: float) -> None:
-        """Ends the thread, within `patience` [s]."""
+    def close(self) -> None:
+        """Ends the thread, or leaves it behind if its environment doesn't answer."""
         with self._changed:
             self._is_closed = True
             self._changed.notify()
-        self._thread.join(patience)
+        self._thread.join(PATIENCE)
 
     def newest(self, which: str) -> tuple[int, ...]:
         """Returns what identifies the checkpoint that would be played; empty if there is none."""

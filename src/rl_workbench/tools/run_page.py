@@ -31,7 +31,6 @@ from viewer.server import open_browser, serve, stop
 PERIOD = 1.0 / 30.0  # [s] between two pictures
 CURVES_PERIOD = 1.0  # [s] between two looks at the table
 IDLE_PERIOD = 0.25  # [s] between two looks whether anybody watches
-PATIENCE = 10.0  # [s] for the recording thread to end
 SPEEDS = {"0.1 ×": 0.1, "0.25 ×": 0.25, "0.5 ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "5 ×": 5.0}
 LINGER = 1.0  # [s] at the end of an episode
 MAX_SEED = 2**31 - 1
@@ -70,10 +69,9 @@ def show_run(
     """
     import torch
 
-    run = None if beside_training else open_run(folder)
+    if not beside_training:
+        import_module_of(open_run(folder).env_id)
     draw_without_display()
-    if run is not None:
-        import_module_of(run.env_id)
     torch.set_num_threads(1)  # networks this small are slower on more
     interrupt.defer()
     training_ended = threading.Event()
@@ -90,26 +88,24 @@ def show_run(
         raise WorkbenchError(str(error)) from error
     with contextlib.ExitStack() as stack:
         stack.callback(stop, server)
+        recorder = EpisodeRecorder(folder, server, env_options)
+        stack.callback(recorder.close)
         for line in address.advice("the run", "plays its episodes"):
             tell(line)
         if beside_training:
             _close_output()
         if browser:  # opening one may take until its user closes it
             threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
-        while not server.get_clients():  # nothing is played until somebody watches
-            if is_over():
-                return
+        while (
+            not server.get_clients() and not is_over()
+        ):  # nothing is played until somebody watches
             time.sleep(IDLE_PERIOD)
-        recorder = EpisodeRecorder(folder, server, env_options)
-        stack.callback(recorder.close, PATIENCE)
-        with server.gui.add_folder("Episode"):
-            playback = Playback(server.gui, recorder, policies, seed, episodes)
-        curves = Curves(server.gui, server.gui.add_folder("Training"))
-        curves.follow(folder)
-        ended = threading.Event()
-        stack.callback(ended.set)
-        threading.Thread(target=_draw, args=(server, curves, ended), daemon=True).start()
-        _play(server, playback, is_over)
+        if not is_over():
+            with server.gui.add_folder("Episode"):
+                playback = Playback(server.gui, recorder, policies, seed, episodes)
+            curves = Curves(server.gui, server.gui.add_folder("Training"))
+            curves.follow(folder)
+            _play(server, playback, curves, is_over)
 
 
 def _await_end(ended: threading.Event) -> None:
@@ -125,7 +121,12 @@ def _close_output() -> None:
     os.close(nowhere)
 
 
-def _play(server: viser.ViserServer, playback: "Playback", is_over: Callable[[], bool]) -> None:
+def _play(
+    server: viser.ViserServer, playback: "Playback", curves: Curves, is_over: Callable[[], bool]
+) -> None:
+    ended = threading.Event()
+    drawing = threading.Thread(target=_draw, args=(server, curves, ended), daemon=True)
+    drawing.start()
     last = time.monotonic()
     while not is_over():
         is_watched = bool(server.get_clients())
@@ -134,6 +135,8 @@ def _play(server: viser.ViserServer, playback: "Playback", is_over: Callable[[],
         if is_watched:
             playback.tick(min(now - last, IDLE_PERIOD))
         last = now
+    ended.set()
+    drawing.join()
 
 
 def _draw(server: viser.ViserServer, curves: Curves, ended: threading.Event) -> None:

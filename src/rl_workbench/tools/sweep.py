@@ -9,7 +9,6 @@ FOLDER/best.yaml          the best options, for --config
 
 import argparse
 import contextlib
-import json
 import os
 import zlib
 from collections.abc import Iterator
@@ -18,7 +17,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from files.content import open_text
 from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError, need
 from rl_workbench.option import key_values, unknown
@@ -26,7 +24,7 @@ from rl_workbench.starting import Interrupt
 from rl_workbench.storage import as_json, as_text, check_writable, write_file
 from rl_workbench.tools.flags import add_job_flags, number
 from rl_workbench.tools.job import Job
-from rl_workbench.tools.jobs import JobPool, job_pool
+from rl_workbench.tools.jobs import JobPool, claim, job_pool
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training import folder as run_folder
 from rl_workbench.training.algorithms import ALGORITHMS
@@ -82,6 +80,12 @@ class Sweep:
     pruner: str
     section: str  # of best.yaml
 
+    def record(self) -> dict[str, Any]:
+        """Returns what has to stay the same when a search is continued."""
+        ranges = {name: each._asdict() for name, each in self.ranges.items()}
+        return {"algorithm": self.algorithm, "options": self.options, "ranges": ranges,
+                "seeds": self.seeds, "seed": self.seed}  # fmt: skip
+
     def flags(self, values: dict[str, Any]) -> list[str]:
         """Returns the flags of `train` for a trial, but for name, seed and folder."""
         options = {**self.options, **values}
@@ -95,11 +99,7 @@ class Sweep:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Searches until there are as many trials as wanted, or until interrupted.
-
-    Raises:
-        WorkbenchError: if something fails that the user can mend.
-    """
+    """Searches until there are as many trials as wanted, or until interrupted."""
     need("optuna", "Optuna", "sweep")
     algorithm, env_id = arguments.algo, arguments.env_id
     kind = ALGORITHMS[algorithm]
@@ -111,16 +111,17 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     ranges = read_ranges(arguments.ranges, algorithm, env_id, known.names)
     ranges = {name: each for name, each in ranges.items() if name not in fixed}
     folder = arguments.out or Path(f"runs/sweep__{as_file_name(env_id)}__{algorithm}")
+    folder = folder.resolve()
     sweep = Sweep(
-        folder.resolve(), algorithm, fixed, ranges, arguments.trials, arguments.seeds,
+        folder, algorithm, fixed, ranges, arguments.trials, arguments.seeds,
         arguments.seed, arguments.pruner, kind.section.format(env_id=env_id),
     )  # fmt: skip
     sweep.run_options({})
-    check_writable(sweep.folder / RECORD)
-    with run_folder.held(sweep.folder, "another search"), _disk_errors(sweep.folder):
-        _claim(sweep)
+    check_writable(folder / RECORD)
+    with run_folder.held(folder, "another search"), _disk_errors(folder):
+        claim(folder, RECORD, sweep.record(), "a search with other options, ranges or seeds")
         study = open_study(sweep)
-        with job_pool(arguments, sweep.folder, interrupt) as pool:
+        with job_pool(arguments, folder, interrupt) as pool:
             interrupt.defer()
             Search(sweep, study, pool, interrupt).run()
         write_results(sweep, study)
@@ -139,35 +140,6 @@ def _disk_errors(folder: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise WorkbenchError(f"can't write to {folder}: {error.strerror}") from error
-
-
-def _claim(sweep: Sweep) -> None:
-    """Notes what is searched in the folder, or checks that it is the same.
-
-    Raises:
-        WorkbenchError: if it is another search.
-    """
-    wanted = {
-        "algorithm": sweep.algorithm,
-        "options": sweep.options,
-        "ranges": {name: each._asdict() for name, each in sweep.ranges.items()},
-        "seeds": sweep.seeds,
-        "seed": sweep.seed,
-    }
-    path = sweep.folder / RECORD
-    try:
-        with open_text(path) as file:
-            found = json.load(file)
-    except FileNotFoundError:
-        write_file(path, as_json(wanted))
-        return
-    except (OSError, ValueError) as error:
-        raise WorkbenchError(f"can't read {path}: {error}") from error
-    if found != json.loads(json.dumps(wanted)):
-        raise WorkbenchError(
-            f"{sweep.folder} holds a search with other options, ranges or seeds; name another folder "
-            "with --out"
-        )
 
 
 def open_study(sweep: Sweep) -> Any:

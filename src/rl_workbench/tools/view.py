@@ -24,11 +24,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Serves the page until Ctrl-C, or until the training ends that has started it.
-
-    Raises:
-        WorkbenchError: if there is no such run, or the page can't be served.
-    """
+    """Serves the page until Ctrl-C, or until the training ends that has started it."""
     from rl_workbench.tools.run_page import show_run
 
     if arguments.beside_training:

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import pytest
 
 from bullet_gazebo.applied_forces import (
+    ActingTime,
     AppliedEffort,
     AppliedForces,
     AppliedWrench,
-    Interval,
     in_world,
 )
 from bullet_gazebo.physics.pose import Pose
@@ -68,7 +68,7 @@ def ticks(each, count=20, now=0):
 
 
 def effort(start=0, duration=-1, joint="a", value=1.0, model=None):
-    return AppliedEffort(model or FakeModel(), joint, value, Interval(start, duration))
+    return AppliedEffort(model or FakeModel(), joint, value, ActingTime(start, duration))
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_an_effort_on_a_fixed_joint_does_nothing():
 
 
 def wrench(model, force, link="cart", duration=-1):
-    return AppliedWrench(model, link, (force, NOTHING), Interval(0, duration))
+    return AppliedWrench(model, link, (force, NOTHING), ActingTime(0, duration))
 
 
 def test_the_wrench_queued_last_counts():

@@ -41,12 +41,6 @@ def at(line: Line2D, position: float) -> float:
     return float(np.interp(position, line.get_xdata(), line.get_ydata()))
 
 
-def test_moving_average() -> None:
-    values = [1.0, 2.0, 3.0, 4.0, 5.0]
-    assert moving_average(values, 3) == pytest.approx([1.0, 1.5, 2.0, 3.0, 4.0])
-    assert moving_average([], 3).shape == (0,)
-
-
 @pytest.mark.parametrize("count", [1, 300])
 def test_one_training_has_two_axes_and_can_be_written_as_png(tmp_path: Path, count: int) -> None:
     lengths = np.random.default_rng(0).integers(1, 3000, count).tolist()
@@ -72,24 +66,9 @@ def test_a_seed_that_has_ended_keeps_its_last_value_in_the_mean() -> None:
     assert np.interp([200, 600, 1000], positions, mean) == pytest.approx([300, 300, 300])
 
 
-def test_ten_solved_seeds_look_like_ten_solved_seeds() -> None:
-    """One of them takes long: without the others' last values the mean would fall with it."""
-    ends = [1000.0 * (index + 2) for index in range(10)]
-    curves = [seed([1000.0, end - 500.0, end], [20.0, 100.0, 500.0]) for end in ends]
-    (axes,) = evaluation_curves([panel({"dqn": curves})]).axes
-    mean = the_mean(axes).get_ydata()
-    assert mean[-1] == 500.0 and not np.isnan(mean).any()
-    assert (np.diff(mean) >= 0.0).all()
-
-
 def test_the_mean_begins_where_every_seed_has_a_value() -> None:
     positions, mean, _, _ = mean_over_seeds([seed([10, 20], [1, 1]), seed([15, 30], [3, 3])])
     assert positions[0] == 15 and mean == pytest.approx(np.full(len(mean), 2.0))
-
-
-def test_where_one_seed_ends_before_another_has_begun() -> None:
-    positions, mean, _, _ = mean_over_seeds([seed([10], [1]), seed([15], [3])])
-    assert positions.tolist() == [15] and mean.tolist() == [2]
 
 
 def test_few_points_are_met_exactly_and_many_are_thinned() -> None:
@@ -184,14 +163,6 @@ def test_a_variant_is_held_against_the_first_of_its_own_environment() -> None:
         "tuned (1 seed), A-v0",
         "other (1 seed), B-v0",
     ]
-
-
-def test_panels_of_one_environment_share_their_axis_and_of_several_do_not() -> None:
-    low, high = seed([1, 2], [0, 1]), seed([1, 2], [0, 500])
-    same = evaluation_curves([panel({"a": [low]}, "A-v0"), panel({"b": [high]}, "A-v0")])
-    assert same.axes[0].get_ylim() == same.axes[1].get_ylim()
-    others = evaluation_curves([panel({"a": [low]}, "A-v0"), panel({"b": [high]}, "B-v0")])
-    assert others.axes[0].get_ylim()[1] < 10 < others.axes[1].get_ylim()[1]
 
 
 def test_training_curves_show_episodes_unless_there_are_too_many_runs() -> None:

@@ -17,9 +17,9 @@ from bullet_gazebo.control.trajectory_goals import (
     INVALID_GOAL,
     Constraints,
     Goal,
-    GoalListener,
+    GoalObserver,
+    GoalOutcome,
     GoalRequest,
-    Outcome,
     Tolerance,
     Trajectory,
     TrajectoryRefused,
@@ -197,7 +197,7 @@ class JointTrajectoryController(Controller):
         self._end_goal("a trajectory came by the command topic")
         return warning
 
-    def pursue(self, key: str, request: GoalRequest, listener: GoalListener) -> str:
+    def pursue(self, key: str, request: GoalRequest, listener: GoalObserver) -> str:
         """Pursues a goal of follow_joint_trajectory; returns and raises like follow()."""
         self._check_running("take a goal")
         check_joints(request.trajectory.names, self.joint_names, self._settings.partial)
@@ -272,7 +272,7 @@ class JointTrajectoryController(Controller):
         """Ends the active goal with its outcome; without one, as canceled for `reason`."""
         goal, self._goal = self._goal, None
         if goal is not None:
-            goal.listener.finished(goal.outcome or Outcome(CANCELED, text=reason))
+            goal.listener.finished(goal.outcome or GoalOutcome(CANCELED, text=reason))
 
 
 class EffortTrajectory(JointTrajectoryController):

@@ -9,26 +9,19 @@ from collections.abc import Iterable, Sequence
 import rosgraph
 import rospy
 import rosservice
+from controller_manager_msgs import srv
 from controller_manager_msgs.msg import ControllerState
-from controller_manager_msgs.srv import (
-    ListControllers,
-    ListControllerTypes,
-    LoadController,
-    ReloadControllerLibraries,
-    SwitchController,
-    UnloadController,
-)
 
 from ros_calls.service import ServiceClient, ServiceFailed
 
 LIST = "list_controllers"
 SERVICES = {
-    LIST: ListControllers,
-    "list_controller_types": ListControllerTypes,
-    "load_controller": LoadController,
-    "unload_controller": UnloadController,
-    "switch_controller": SwitchController,
-    "reload_controller_libraries": ReloadControllerLibraries,
+    LIST: srv.ListControllers,
+    "list_controller_types": srv.ListControllerTypes,
+    "load_controller": srv.LoadController,
+    "unload_controller": srv.UnloadController,
+    "switch_controller": srv.SwitchController,
+    "reload_controller_libraries": srv.ReloadControllerLibraries,
 }
 
 
@@ -81,7 +74,7 @@ class ControllerLister:
 
     def __init__(self, namespace: str = "/controller_manager") -> None:
         service = rospy.names.ns_join(namespace, LIST)
-        self._client = ServiceClient(service, ListControllers, persistent=True)
+        self._client = ServiceClient(service, srv.ListControllers, persistent=True)
 
     def __call__(self) -> list[ControllerState]:
         try:

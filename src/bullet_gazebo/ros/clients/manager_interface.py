@@ -13,27 +13,19 @@ from collections.abc import Sequence
 from typing import Any
 
 import rospy
+from controller_manager_msgs import srv
 from controller_manager_msgs.msg import ControllerState
-from controller_manager_msgs.srv import (
-    ListControllers,
-    ListControllerTypes,
-    LoadController,
-    ReloadControllerLibraries,
-    SwitchController,
-    SwitchControllerRequest,
-    UnloadController,
-)
 
 from ros_calls.service import ServiceClient
 from ros_calls.waiting import service_comes_up
 
-BEST_EFFORT = SwitchControllerRequest.BEST_EFFORT
-STRICT = SwitchControllerRequest.STRICT
+BEST_EFFORT = srv.SwitchControllerRequest.BEST_EFFORT
+STRICT = srv.SwitchControllerRequest.STRICT
 
 
 def list_controller_types() -> None:
     """Prints the types that the manager can load."""
-    for kind in _call("list_controller_types", ListControllerTypes).types:
+    for kind in _call("list_controller_types", srv.ListControllerTypes).types:
         print(kind)
 
 
@@ -58,14 +50,16 @@ def reload_libraries(force_kill: bool, restore: bool = False) -> bool:
     """
     print(f"Restore: {restore}")
     before = loaded_controllers() if restore else []
-    reloaded = bool(_call("reload_controller_libraries", ReloadControllerLibraries, force_kill).ok)
+    reloaded = bool(
+        _call("reload_controller_libraries", srv.ReloadControllerLibraries, force_kill).ok
+    )
     if reloaded:
         print("Successfully reloaded libraries")
     else:
         print("Failed to reload libraries. Do you still have controllers loaded?")
     if restore:
         for each in before:
-            _call("load_controller", LoadController, each.name)
+            _call("load_controller", srv.LoadController, each.name)
         _switch([each.name for each in before if each.state == "running"], [], BEST_EFFORT)
         print("Controllers restored to original state")
     return reloaded
@@ -73,14 +67,14 @@ def reload_libraries(force_kill: bool, restore: bool = False) -> bool:
 
 def load_controller(name: str) -> bool:
     """Loads a controller whose parameters are on the parameter server."""
-    loaded = bool(_call("load_controller", LoadController, name).ok)
+    loaded = bool(_call("load_controller", srv.LoadController, name).ok)
     print(f"Loaded '{name}'" if loaded else f"Error when loading '{name}'")
     return loaded
 
 
 def unload_controller(name: str) -> bool:
     """Unloads a controller, which must not be running."""
-    unloaded = bool(_call("unload_controller", UnloadController, name).ok)
+    unloaded = bool(_call("unload_controller", srv.UnloadController, name).ok)
     print(f"Unloaded '{name}' successfully" if unloaded else f"Error when unloading '{name}'")
     return unloaded
 
@@ -121,12 +115,12 @@ def switch_controllers(start: Sequence[str], stop: Sequence[str]) -> bool:
 
 def loaded_controllers() -> list[ControllerState]:
     """Returns what the manager lists."""
-    return list(_call("list_controllers", ListControllers).controller)
+    return list(_call("list_controllers", srv.ListControllers).controller)
 
 
 def _switch(start: Sequence[str], stop: Sequence[str], strictness: int) -> bool:
     request = (list(start), list(stop), strictness, False, 0.0)
-    return bool(_call("switch_controller", SwitchController, *request).ok)
+    return bool(_call("switch_controller", srv.SwitchController, *request).ok)
 
 
 def _call(service: str, kind: Any, *request: Any) -> Any:
@@ -163,10 +157,10 @@ class ManagerClient:
         return None
 
     def load(self, name: str, timeout: float = math.inf) -> bool:
-        return bool(self._call("load_controller", LoadController, name, timeout=timeout).ok)
+        return bool(self._call("load_controller", srv.LoadController, name, timeout=timeout).ok)
 
     def unload(self, name: str, timeout: float = math.inf) -> bool:
-        return bool(self._call("unload_controller", UnloadController, name, timeout=timeout).ok)
+        return bool(self._call("unload_controller", srv.UnloadController, name, timeout=timeout).ok)
 
     def switch(
         self,
@@ -177,11 +171,13 @@ class ManagerClient:
     ) -> bool:
         """Starts and stops controllers in one step; no time limit for the manager itself."""
         request = (list(start), list(stop), strictness, False, 0.0)
-        return bool(self._call("switch_controller", SwitchController, *request, timeout=timeout).ok)
+        return bool(
+            self._call("switch_controller", srv.SwitchController, *request, timeout=timeout).ok
+        )
 
     def running(self, timeout: float = math.inf) -> list[str]:
         """Returns the names of the running controllers."""
-        answer = self._call("list_controllers", ListControllers, timeout=timeout)
+        answer = self._call("list_controllers", srv.ListControllers, timeout=timeout)
         return [each.name for each in answer.controller if each.state == "running"]
 
     def _call(self, service: str, kind: Any, *request: Any, timeout: float) -> Any:

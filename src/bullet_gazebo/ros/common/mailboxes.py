@@ -101,11 +101,11 @@ class Mailboxes:
             if time.monotonic() > deadline:
                 break
             time.sleep(LOOK)  # rospy doesn't report new connections of a subscriber
-        heard, told = (
+        heard, sent = (
             [topic for topic in topics if is_connected(topic, node, publishes) is not None]
             for topics, publishes in ways
         )
-        return heard, told
+        return heard, sent
 
     def _sink(self, node: str) -> Callable[[str, bytes], None] | None:
         box = self._boxes.get(node)

@@ -19,7 +19,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from types import FrameType
 
-import numpy as np
 import rosgraph
 import rospy
 
@@ -179,6 +178,8 @@ def seed_random_numbers(seed: int | None, tell: bool = True) -> None:
     """Seeds Python's and NumPy's random numbers, for plugins; the physics itself draws none."""
     if seed is None:
         return
+    import numpy as np  # the clients start without it
+
     random.seed(seed)
     np.random.seed(seed % 2**32)
     if tell:

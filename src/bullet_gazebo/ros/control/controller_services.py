@@ -8,23 +8,8 @@ from typing import Any
 
 import rosgraph
 import rospy
+from controller_manager_msgs import srv
 from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
-from controller_manager_msgs.srv import (
-    ListControllers,
-    ListControllersRequest,
-    ListControllersResponse,
-    ListControllerTypes,
-    ListControllerTypesRequest,
-    ListControllerTypesResponse,
-    LoadController,
-    LoadControllerRequest,
-    ReloadControllerLibraries,
-    ReloadControllerLibrariesRequest,
-    SwitchController,
-    SwitchControllerRequest,
-    UnloadController,
-    UnloadControllerRequest,
-)
 
 from bullet_gazebo.control.controllers import find_type
 from bullet_gazebo.control.controllers.base import Controller
@@ -54,12 +39,14 @@ class ControllerServices:
         self._services: list[rospy.Service] = []
         with ExitStack() as opened:  # if one can't be offered, those before it are closed
             opened.callback(self.shutdown)
-            self._advertise("list_controllers", ListControllers, self._list)
-            self._advertise("list_controller_types", ListControllerTypes, self._list_types)
-            self._advertise("load_controller", LoadController, self._load)
-            self._advertise("unload_controller", UnloadController, self._unload)
-            self._advertise("switch_controller", SwitchController, self._switch)
-            self._advertise("reload_controller_libraries", ReloadControllerLibraries, self._reload)
+            self._advertise("list_controllers", srv.ListControllers, self._list)
+            self._advertise("list_controller_types", srv.ListControllerTypes, self._list_types)
+            self._advertise("load_controller", srv.LoadController, self._load)
+            self._advertise("unload_controller", srv.UnloadController, self._unload)
+            self._advertise("switch_controller", srv.SwitchController, self._switch)
+            self._advertise(
+                "reload_controller_libraries", srv.ReloadControllerLibraries, self._reload
+            )
             opened.pop_all()
 
     def shutdown(self) -> None:
@@ -80,16 +67,18 @@ class ControllerServices:
         full = rospy.names.ns_join(self._namespace, f"controller_manager/{name}")
         self._services.append(rospy.Service(full, kind, handle))
 
-    def _list(self, request: ListControllersRequest) -> ListControllersResponse:
+    def _list(self, request: srv.ListControllersRequest) -> srv.ListControllersResponse:
         with self._sim.lock:
             listed = self._manager.listed()
-        return ListControllersResponse([_state(entry) for entry in listed])
+        return srv.ListControllersResponse([_state(entry) for entry in listed])
 
-    def _list_types(self, request: ListControllerTypesRequest) -> ListControllerTypesResponse:
+    def _list_types(
+        self, request: srv.ListControllerTypesRequest
+    ) -> srv.ListControllerTypesResponse:
         types = sorted(self._manager.types)
-        return ListControllerTypesResponse(types, [BASE_CLASS] * len(types))
+        return srv.ListControllerTypesResponse(types, [BASE_CLASS] * len(types))
 
-    def _load(self, request: LoadControllerRequest) -> bool:
+    def _load(self, request: srv.LoadControllerRequest) -> bool:
         # An empty name would fetch the whole namespace, and resolve to it.
         if not rosgraph.names.is_legal_name(request.name):
             return _refused(ControlError(f"'{request.name}' is not a legal name of a controller"))
@@ -121,7 +110,7 @@ class ControllerServices:
                 self._manager.unload(controller.name)
             raise ControlError(f"the topics of '{controller.name}': {error!r}") from error
 
-    def _unload(self, request: UnloadControllerRequest) -> bool:
+    def _unload(self, request: srv.UnloadControllerRequest) -> bool:
         try:
             with self._sim.lock:
                 self._manager.unload(request.name)
@@ -130,7 +119,7 @@ class ControllerServices:
         self._topics.pop(request.name).shutdown()
         return True
 
-    def _switch(self, request: SwitchControllerRequest) -> bool:
+    def _switch(self, request: srv.SwitchControllerRequest) -> bool:
         if request.strictness == 0:
             rospy.logwarn("Controller manager: strictness was not set, best effort is used.")
         try:
@@ -142,7 +131,7 @@ class ControllerServices:
             return _refused(error)
         return True
 
-    def _reload(self, request: ReloadControllerLibrariesRequest) -> bool:
+    def _reload(self, request: srv.ReloadControllerLibrariesRequest) -> bool:
         with self._sim.lock:
             loaded = [entry.name for entry in self._manager.listed()]
         if loaded and not request.force_kill:

@@ -7,19 +7,7 @@ from typing import Any
 
 import rospy
 from actionlib import ServerGoalHandle
-from control_msgs.msg import (
-    FollowJointTrajectoryAction,
-    FollowJointTrajectoryFeedback,
-    FollowJointTrajectoryGoal,
-    FollowJointTrajectoryResult,
-    JointTolerance,
-    JointTrajectoryControllerState,
-)
-from control_msgs.srv import (
-    QueryTrajectoryState,
-    QueryTrajectoryStateRequest,
-    QueryTrajectoryStateResponse,
-)
+from control_msgs import msg, srv
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -27,8 +15,8 @@ from bullet_gazebo.control.controllers.joint_trajectory import JointTrajectoryCo
 from bullet_gazebo.control.trajectory_goals import (
     ABORTED,
     SUCCEEDED,
+    GoalOutcome,
     GoalRequest,
-    Outcome,
     Tolerance,
     Trajectory,
     TrajectoryPoint,
@@ -55,7 +43,7 @@ class TrajectoryTopics:
         self._controller = controller
         self._action = TrajectoryAction(sim, controller, namespace)
         self._query_state = rospy.Service(
-            rospy.names.ns_join(namespace, "query_state"), QueryTrajectoryState, self._query
+            rospy.names.ns_join(namespace, "query_state"), srv.QueryTrajectoryState, self._query
         )
         self._topic = rospy.names.ns_join(namespace, "command")
         self._command = rospy.Subscriber(
@@ -79,14 +67,14 @@ class TrajectoryTopics:
         if warning:
             rospy.logwarn("%s: %s", self._topic, warning)
 
-    def _query(self, request: QueryTrajectoryStateRequest) -> QueryTrajectoryStateResponse:
+    def _query(self, request: srv.QueryTrajectoryStateRequest) -> srv.QueryTrajectoryStateResponse:
         try:
             with self._sim.lock:
                 states = self._controller.query(request.time.to_nsec())
         except TrajectoryRefused as refusal:
             raise rospy.ServiceException(str(refusal)) from refusal
         names = self._controller.joint_names
-        return QueryTrajectoryStateResponse(names, *zip(*states, strict=True))
+        return srv.QueryTrajectoryStateResponse(names, *zip(*states, strict=True))
 
 
 class TrajectoryAction:
@@ -103,12 +91,12 @@ class TrajectoryAction:
         self._controller = controller
         self._news = threading.Condition()
         self._feedback: tuple[ServerGoalHandle, TrajectorySample] | None = None  # the newest one
-        self._outcomes: list[tuple[ServerGoalHandle, Outcome]] = []
+        self._outcomes: list[tuple[ServerGoalHandle, GoalOutcome]] = []
         self._closing = False
         self._status_due = 0.0  # [s]
         self._name = rospy.names.ns_join(namespace, "follow_joint_trajectory")
         self._server = SteadyActionServer(
-            self._name, FollowJointTrajectoryAction, self._pursue, self._cancel, self._clock
+            self._name, msg.FollowJointTrajectoryAction, self._pursue, self._cancel, self._clock
         )
         self._server.start()
         sim.outboxes.append(self)
@@ -130,7 +118,7 @@ class TrajectoryAction:
             self._feedback = (handle, sample)
             self._news.notify()
 
-    def note_outcome(self, handle: ServerGoalHandle, outcome: Outcome) -> None:
+    def note_outcome(self, handle: ServerGoalHandle, outcome: GoalOutcome) -> None:
         """Keeps a goal's result, to be published soon."""
         with self._news:
             self._outcomes.append((handle, outcome))
@@ -138,13 +126,13 @@ class TrajectoryAction:
 
     def _pursue(self, handle: ServerGoalHandle) -> None:
         request = _to_request(handle.get_goal())
-        goal = GoalListener(self, handle)
+        goal = ActionGoal(self, handle)
         try:
             with self._sim.lock:
                 warning = self._controller.pursue(handle.get_goal_id().id, request, goal)
         except TrajectoryRefused as refusal:
             rospy.logerr("%s: %s", self._name, refusal)
-            result = FollowJointTrajectoryResult(refusal.code, str(refusal))
+            result = msg.FollowJointTrajectoryResult(refusal.code, str(refusal))
             handle.set_rejected(result, str(refusal))
             return
         if warning:
@@ -166,7 +154,7 @@ class TrajectoryAction:
             outcomes, self._outcomes = self._outcomes, []
         if feedback is not None:
             handle, sample = feedback
-            handle.publish_feedback(FollowJointTrajectoryFeedback(*_fields(sample)))
+            handle.publish_feedback(msg.FollowJointTrajectoryFeedback(*_fields(sample)))
         for handle, outcome in outcomes:
             _settle(handle, outcome)
         if self._status_is_due():
@@ -196,7 +184,7 @@ class TrajectoryAction:
         return self._closing or bool(news and not self._sim.deliver_with_steps)
 
 
-class GoalListener:
+class ActionGoal:
     """Takes the controller's news of one goal within a control tick, and passes them on."""
 
     def __init__(self, action: TrajectoryAction, handle: ServerGoalHandle) -> None:
@@ -206,12 +194,12 @@ class GoalListener:
     def feedback(self, sample: TrajectorySample) -> None:
         self._action.note_feedback(self._handle, sample)
 
-    def finished(self, outcome: Outcome) -> None:
+    def finished(self, outcome: GoalOutcome) -> None:
         self._action.note_outcome(self._handle, outcome)
 
 
-def _settle(handle: ServerGoalHandle, outcome: Outcome) -> None:
-    result = FollowJointTrajectoryResult(outcome.code, outcome.text)
+def _settle(handle: ServerGoalHandle, outcome: GoalOutcome) -> None:
+    result = msg.FollowJointTrajectoryResult(outcome.code, outcome.text)
     if outcome.kind == SUCCEEDED:
         handle.set_succeeded(result, outcome.text)
     elif outcome.kind == ABORTED:
@@ -220,8 +208,8 @@ def _settle(handle: ServerGoalHandle, outcome: Outcome) -> None:
         handle.set_canceled(result, outcome.text)
 
 
-def to_controller_state(sample: TrajectorySample) -> JointTrajectoryControllerState:
-    return JointTrajectoryControllerState(*_fields(sample))
+def to_controller_state(sample: TrajectorySample) -> msg.JointTrajectoryControllerState:
+    return msg.JointTrajectoryControllerState(*_fields(sample))
 
 
 def _fields(sample: TrajectorySample) -> tuple[Any, ...]:
@@ -235,16 +223,16 @@ def _fields(sample: TrajectorySample) -> tuple[Any, ...]:
     return Header(stamp=to_time(sample.stamp)), sample.names, *points
 
 
-def _to_trajectory(msg: JointTrajectory) -> Trajectory:
+def _to_trajectory(message: JointTrajectory) -> Trajectory:
     """Converts the message without its efforts."""
     points = tuple(
         TrajectoryPoint(p.time_from_start.to_nsec(), p.positions, p.velocities, p.accelerations)
-        for p in msg.points
+        for p in message.points
     )
-    return Trajectory(tuple(msg.joint_names), points, msg.header.stamp.to_nsec())
+    return Trajectory(tuple(message.joint_names), points, message.header.stamp.to_nsec())
 
 
-def _to_request(goal: FollowJointTrajectoryGoal) -> GoalRequest:
+def _to_request(goal: msg.FollowJointTrajectoryGoal) -> GoalRequest:
     return GoalRequest(
         _to_trajectory(goal.trajectory),
         _tolerances(goal.path_tolerance),
@@ -253,5 +241,5 @@ def _to_request(goal: FollowJointTrajectoryGoal) -> GoalRequest:
     )
 
 
-def _tolerances(tolerances: Iterable[JointTolerance]) -> dict[str, Tolerance]:
+def _tolerances(tolerances: Iterable[msg.JointTolerance]) -> dict[str, Tolerance]:
     return {each.name: Tolerance(each.position, each.velocity) for each in tolerances}

@@ -4,31 +4,9 @@ import math
 
 import genpy
 import rospy
-from gazebo_msgs.srv import (
-    ApplyBodyWrench,
-    ApplyBodyWrenchRequest,
-    ApplyBodyWrenchResponse,
-    ApplyJointEffort,
-    ApplyJointEffortRequest,
-    ApplyJointEffortResponse,
-    BodyRequest,
-    BodyRequestRequest,
-    BodyRequestResponse,
-    GetJointProperties,
-    GetJointPropertiesRequest,
-    GetJointPropertiesResponse,
-    JointRequest,
-    JointRequestRequest,
-    JointRequestResponse,
-    SetJointProperties,
-    SetJointPropertiesRequest,
-    SetJointPropertiesResponse,
-    SetModelConfiguration,
-    SetModelConfigurationRequest,
-    SetModelConfigurationResponse,
-)
+from gazebo_msgs import srv
 
-from bullet_gazebo.applied_forces import AppliedEffort, AppliedWrench, Interval, in_world
+from bullet_gazebo.applied_forces import ActingTime, AppliedEffort, AppliedWrench, in_world
 from bullet_gazebo.physics.properties import JointProperties, PropertyError, set_joint_properties
 from bullet_gazebo.ros.common.messages import bad_number, to_vector
 from bullet_gazebo.simulator import Simulator
@@ -44,34 +22,38 @@ class JointServices:
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._services = [
-            rospy.Service("~get_joint_properties", GetJointProperties, self._get_properties),
-            rospy.Service("~set_joint_properties", SetJointProperties, self._set_properties),
+            rospy.Service("~get_joint_properties", srv.GetJointProperties, self._get_properties),
+            rospy.Service("~set_joint_properties", srv.SetJointProperties, self._set_properties),
             rospy.Service(
-                "~set_model_configuration", SetModelConfiguration, self._set_configuration
+                "~set_model_configuration", srv.SetModelConfiguration, self._set_configuration
             ),
         ]
 
-    def _get_properties(self, request: GetJointPropertiesRequest) -> GetJointPropertiesResponse:
+    def _get_properties(
+        self, request: srv.GetJointPropertiesRequest
+    ) -> srv.GetJointPropertiesResponse:
         with self._sim.lock:
             found = self._sim.world.joint(request.joint_name)
             if found is None:
-                return GetJointPropertiesResponse(
+                return srv.GetJointPropertiesResponse(
                     status_message="GetJointProperties: joint not found"
                 )
             model, name = found
             position, rate = model.joint_state(name)
         # Gazebo answers REVOLUTE and no damping whatever the joint is.
-        return GetJointPropertiesResponse(
-            type=GetJointPropertiesResponse.REVOLUTE,
+        return srv.GetJointPropertiesResponse(
+            type=srv.GetJointPropertiesResponse.REVOLUTE,
             position=[position],
             rate=[rate],
             success=True,
             status_message="GetJointProperties: got properties",
         )
 
-    def _set_properties(self, request: SetJointPropertiesRequest) -> SetJointPropertiesResponse:
-        def refused(fault: str) -> SetJointPropertiesResponse:
-            return SetJointPropertiesResponse(False, f"SetJointProperties: {fault}")
+    def _set_properties(
+        self, request: srv.SetJointPropertiesRequest
+    ) -> srv.SetJointPropertiesResponse:
+        def refused(fault: str) -> srv.SetJointPropertiesResponse:
+            return srv.SetJointPropertiesResponse(False, f"SetJointProperties: {fault}")
 
         with self._sim.lock:
             found = self._sim.world.joint(request.joint_name)
@@ -93,13 +75,13 @@ class JointServices:
                 set_joint_properties(*found, wanted, self._sim.world.time_step)
             except PropertyError as error:
                 return refused(str(error))
-        return SetJointPropertiesResponse(True, "SetJointProperties: properties set")
+        return srv.SetJointPropertiesResponse(True, "SetJointProperties: properties set")
 
     def _set_configuration(
-        self, request: SetModelConfigurationRequest
-    ) -> SetModelConfigurationResponse:
-        def refused(fault: str) -> SetModelConfigurationResponse:
-            return SetModelConfigurationResponse(False, f"SetModelConfiguration: {fault}")
+        self, request: srv.SetModelConfigurationRequest
+    ) -> srv.SetModelConfigurationResponse:
+        def refused(fault: str) -> srv.SetModelConfigurationResponse:
+            return srv.SetModelConfigurationResponse(False, f"SetModelConfiguration: {fault}")
 
         names, positions = request.joint_names, request.joint_positions
         with self._sim.lock:
@@ -118,7 +100,7 @@ class JointServices:
             more = f" and {len(unknown) - MOST_NAMES} more" if len(unknown) > MOST_NAMES else ""
             text = "SetModelConfiguration: model '%s' has no joint %s%s"
             rospy.logwarn(text, model.name, some, more)
-        return SetModelConfigurationResponse(True, "SetModelConfiguration: success")
+        return srv.SetModelConfigurationResponse(True, "SetModelConfiguration: success")
 
 
 class ForceServices:
@@ -127,27 +109,27 @@ class ForceServices:
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._services = [
-            rospy.Service("~apply_joint_effort", ApplyJointEffort, self._apply_effort),
-            rospy.Service("~apply_body_wrench", ApplyBodyWrench, self._apply_wrench),
-            rospy.Service("~clear_joint_forces", JointRequest, self._clear_efforts),
-            rospy.Service("~clear_body_wrenches", BodyRequest, self._clear_wrenches),
+            rospy.Service("~apply_joint_effort", srv.ApplyJointEffort, self._apply_effort),
+            rospy.Service("~apply_body_wrench", srv.ApplyBodyWrench, self._apply_wrench),
+            rospy.Service("~clear_joint_forces", srv.JointRequest, self._clear_efforts),
+            rospy.Service("~clear_body_wrenches", srv.BodyRequest, self._clear_wrenches),
         ]
 
-    def _apply_effort(self, request: ApplyJointEffortRequest) -> ApplyJointEffortResponse:
+    def _apply_effort(self, request: srv.ApplyJointEffortRequest) -> srv.ApplyJointEffortResponse:
         with self._sim.lock:
             found = self._sim.world.joint(request.joint_name)
             if found is None:
-                return ApplyJointEffortResponse(False, "ApplyJointEffort: joint not found")
+                return srv.ApplyJointEffortResponse(False, "ApplyJointEffort: joint not found")
             fault = bad_number(request)
             if fault:
-                return ApplyJointEffortResponse(False, f"ApplyJointEffort: {fault}")
+                return srv.ApplyJointEffortResponse(False, f"ApplyJointEffort: {fault}")
             interval = self._interval(request.start_time, request.duration)
             self._sim.applied.add_effort(AppliedEffort(*found, request.effort, interval))
-        return ApplyJointEffortResponse(True, "ApplyJointEffort: effort set")
+        return srv.ApplyJointEffortResponse(True, "ApplyJointEffort: effort set")
 
-    def _apply_wrench(self, request: ApplyBodyWrenchRequest) -> ApplyBodyWrenchResponse:
-        def refused(fault: str) -> ApplyBodyWrenchResponse:
-            return ApplyBodyWrenchResponse(False, f"ApplyBodyWrench: {fault}")
+    def _apply_wrench(self, request: srv.ApplyBodyWrenchRequest) -> srv.ApplyBodyWrenchResponse:
+        def refused(fault: str) -> srv.ApplyBodyWrenchResponse:
+            return srv.ApplyBodyWrenchResponse(False, f"ApplyBodyWrench: {fault}")
 
         with self._sim.lock:
             world = self._sim.world
@@ -168,18 +150,18 @@ class ForceServices:
             )
             interval = self._interval(request.start_time, request.duration)
             self._sim.applied.add_wrench(AppliedWrench(*found, wrench, interval))
-        return ApplyBodyWrenchResponse(True, "")
+        return srv.ApplyBodyWrenchResponse(True, "")
 
-    def _interval(self, start: genpy.Time, duration: genpy.Duration) -> Interval:
+    def _interval(self, start: genpy.Time, duration: genpy.Duration) -> ActingTime:
         """A start in the past means now."""
-        return Interval(max(start.to_nsec(), self._sim.now), duration.to_nsec())
+        return ActingTime(max(start.to_nsec(), self._sim.now), duration.to_nsec())
 
-    def _clear_efforts(self, request: JointRequestRequest) -> JointRequestResponse:
+    def _clear_efforts(self, request: srv.JointRequestRequest) -> srv.JointRequestResponse:
         with self._sim.lock:
             self._sim.applied.clear_efforts(request.joint_name)
-        return JointRequestResponse()
+        return srv.JointRequestResponse()
 
-    def _clear_wrenches(self, request: BodyRequestRequest) -> BodyRequestResponse:
+    def _clear_wrenches(self, request: srv.BodyRequestRequest) -> srv.BodyRequestResponse:
         with self._sim.lock:
             self._sim.applied.clear_wrenches(request.body_name)
-        return BodyRequestResponse()
+        return srv.BodyRequestResponse()

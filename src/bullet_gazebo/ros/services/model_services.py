@@ -5,30 +5,8 @@ from dataclasses import replace
 
 import genpy
 import rospy
+from gazebo_msgs import srv
 from gazebo_msgs.msg import LinkState, ModelState
-from gazebo_msgs.srv import (
-    GetLinkProperties,
-    GetLinkPropertiesRequest,
-    GetLinkPropertiesResponse,
-    GetLinkState,
-    GetLinkStateRequest,
-    GetLinkStateResponse,
-    GetModelProperties,
-    GetModelPropertiesRequest,
-    GetModelPropertiesResponse,
-    GetModelState,
-    GetModelStateRequest,
-    GetModelStateResponse,
-    SetLinkProperties,
-    SetLinkPropertiesRequest,
-    SetLinkPropertiesResponse,
-    SetLinkState,
-    SetLinkStateRequest,
-    SetLinkStateResponse,
-    SetModelState,
-    SetModelStateRequest,
-    SetModelStateResponse,
-)
 from std_msgs.msg import Header
 
 from bullet_gazebo.physics.description import DescriptionError
@@ -53,7 +31,7 @@ SCOPE = "did you forget to scope the link by model name?"
 QUEUE = 10
 
 
-class _StateResponse(GetModelStateResponse):
+class _StateResponse(srv.GetModelStateResponse):
     """rospy puts its own count into header.seq of responses that say they begin with a header."""
 
     _has_header = False
@@ -66,21 +44,23 @@ class ModelServices:
         self._sim = sim
         self._calls: Counter[str] = Counter()  # header.seq counts the calls for each name
         self._services = [
-            rospy.Service("~get_model_state", GetModelState, self._get_state),
-            rospy.Service("~get_model_properties", GetModelProperties, self._get_properties),
-            rospy.Service("~set_model_state", SetModelState, self._set_state),
+            rospy.Service("~get_model_state", srv.GetModelState, self._get_state),
+            rospy.Service("~get_model_properties", srv.GetModelProperties, self._get_properties),
+            rospy.Service("~set_model_state", srv.SetModelState, self._set_state),
         ]
         self._topic = rospy.Subscriber("~set_model_state", ModelState, self._hear, queue_size=QUEUE)
 
-    def _get_properties(self, request: GetModelPropertiesRequest) -> GetModelPropertiesResponse:
+    def _get_properties(
+        self, request: srv.GetModelPropertiesRequest
+    ) -> srv.GetModelPropertiesResponse:
         with self._sim.lock:
             model = self._sim.world.model(request.model_name)
             if model is None:
-                return GetModelPropertiesResponse(
+                return srv.GetModelPropertiesResponse(
                     status_message="GetModelProperties: model does not exist"
                 )
             # All names are unscoped, and canonical_body_name is never filled.
-            return GetModelPropertiesResponse(
+            return srv.GetModelPropertiesResponse(
                 body_names=model.link_names,
                 geom_names=[name for link in model.link_names for name in model.collisions(link)],
                 joint_names=model.all_joints,
@@ -89,7 +69,7 @@ class ModelServices:
                 status_message="GetModelProperties: got properties",
             )
 
-    def _get_state(self, request: GetModelStateRequest) -> GetModelStateResponse:
+    def _get_state(self, request: srv.GetModelStateRequest) -> srv.GetModelStateResponse:
         response = _StateResponse()
         with self._sim.lock:
             model = self._sim.world.model(request.model_name)
@@ -121,13 +101,13 @@ class ModelServices:
         return rospy.get_rostime() if rospy.rostime.is_wallclock() else to_time(self._sim.now)
 
     def _hear(self, state: ModelState) -> None:
-        self._set_state(SetModelStateRequest(state))
+        self._set_state(srv.SetModelStateRequest(state))
 
-    def _set_state(self, request: SetModelStateRequest) -> SetModelStateResponse:
+    def _set_state(self, request: srv.SetModelStateRequest) -> srv.SetModelStateResponse:
         wanted = request.model_state
 
-        def refused(fault: str) -> SetModelStateResponse:
-            return SetModelStateResponse(False, f"SetModelState: {fault}")
+        def refused(fault: str) -> srv.SetModelStateResponse:
+            return srv.SetModelStateResponse(False, f"SetModelState: {fault}")
 
         with self._sim.lock:
             model = self._sim.world.model(wanted.model_name)
@@ -145,7 +125,7 @@ class ModelServices:
             )
             pose = frame[0].compose(from_pose_msg(wanted.pose))
             self._sim.place_model(model, pose, (linear, angular))
-        return SetModelStateResponse(True, "SetModelState: set model state done")
+        return srv.SetModelStateResponse(True, "SetModelState: set model state done")
 
 
 class LinkServices:
@@ -154,22 +134,24 @@ class LinkServices:
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._services = [
-            rospy.Service("~get_link_properties", GetLinkProperties, self._get_properties),
-            rospy.Service("~set_link_properties", SetLinkProperties, self._set_properties),
-            rospy.Service("~get_link_state", GetLinkState, self._get_state),
-            rospy.Service("~set_link_state", SetLinkState, self._set_state),
+            rospy.Service("~get_link_properties", srv.GetLinkProperties, self._get_properties),
+            rospy.Service("~set_link_properties", srv.SetLinkProperties, self._set_properties),
+            rospy.Service("~get_link_state", srv.GetLinkState, self._get_state),
+            rospy.Service("~set_link_state", srv.SetLinkState, self._set_state),
         ]
         self._topic = rospy.Subscriber("~set_link_state", LinkState, self._hear, queue_size=QUEUE)
 
-    def _get_properties(self, request: GetLinkPropertiesRequest) -> GetLinkPropertiesResponse:
+    def _get_properties(
+        self, request: srv.GetLinkPropertiesRequest
+    ) -> srv.GetLinkPropertiesResponse:
         with self._sim.lock:
             found = self._sim.world.link(request.link_name)
             if found is None:
-                return GetLinkPropertiesResponse(
+                return srv.GetLinkPropertiesResponse(
                     status_message=f"GetLinkProperties: link not found, {SCOPE}"
                 )
             inertia, gravity = link_inertia(*found), found[0].body.link_gravity(found[1])
-        return GetLinkPropertiesResponse(
+        return srv.GetLinkPropertiesResponse(
             com=to_pose_msg(Pose(inertia.com.position)),  # never its orientation
             gravity_mode=gravity,
             mass=inertia.mass,
@@ -178,9 +160,11 @@ class LinkServices:
             **{key: getattr(inertia, key) for key in TENSOR},
         )
 
-    def _set_properties(self, request: SetLinkPropertiesRequest) -> SetLinkPropertiesResponse:
-        def refused(fault: str) -> SetLinkPropertiesResponse:
-            return SetLinkPropertiesResponse(False, f"SetLinkProperties: {fault}")
+    def _set_properties(
+        self, request: srv.SetLinkPropertiesRequest
+    ) -> srv.SetLinkPropertiesResponse:
+        def refused(fault: str) -> srv.SetLinkPropertiesResponse:
+            return srv.SetLinkPropertiesResponse(False, f"SetLinkProperties: {fault}")
 
         with self._sim.lock:
             found = self._sim.world.link(request.link_name)
@@ -200,45 +184,47 @@ class LinkServices:
                 set_link_properties(self._sim.world, *found, inertia, request.gravity_mode)
             except (PropertyError, DescriptionError) as error:
                 return refused(str(error))
-        return SetLinkPropertiesResponse(True, "SetLinkProperties: properties set")
+        return srv.SetLinkPropertiesResponse(True, "SetLinkProperties: properties set")
 
-    def _get_state(self, request: GetLinkStateRequest) -> GetLinkStateResponse:
+    def _get_state(self, request: srv.GetLinkStateRequest) -> srv.GetLinkStateResponse:
         with self._sim.lock:
             world = self._sim.world
             found = world.link(request.link_name)
             if found is None:
-                return GetLinkStateResponse(status_message=f"GetLinkState: link not found, {SCOPE}")
+                return srv.GetLinkStateResponse(
+                    status_message=f"GetLinkState: link not found, {SCOPE}"
+                )
             frame = world.frame(request.reference_frame)
             if frame is None:
-                return GetLinkStateResponse(
+                return srv.GetLinkStateResponse(
                     status_message=f"GetLinkState: reference reference_frame not found, {SCOPE}"
                 )
             pose, twist = seen_from(found[0].link_state(found[1]), frame)
         state = LinkState(
             request.link_name, to_pose_msg(pose), to_twist_msg(twist), request.reference_frame
         )
-        return GetLinkStateResponse(state, True, "GetLinkState: got state")
+        return srv.GetLinkStateResponse(state, True, "GetLinkState: got state")
 
     def _hear(self, state: LinkState) -> None:
-        self._set_state(SetLinkStateRequest(state))
+        self._set_state(srv.SetLinkStateRequest(state))
 
-    def _set_state(self, request: SetLinkStateRequest) -> SetLinkStateResponse:
+    def _set_state(self, request: srv.SetLinkStateRequest) -> srv.SetLinkStateResponse:
         wanted = request.link_state
         with self._sim.lock:
             found = self._sim.world.link(wanted.link_name)
             if found is None:
-                return SetLinkStateResponse(False, "SetLinkState: link does not exist")
+                return srv.SetLinkStateResponse(False, "SetLinkState: link does not exist")
             frame = self._frame(wanted.reference_frame)
             if frame is None:
-                return SetLinkStateResponse(False, "SetLinkState: failed")
+                return srv.SetLinkStateResponse(False, "SetLinkState: failed")
             fault = bad_number(wanted)
             if fault:
-                return SetLinkStateResponse(False, f"SetLinkState: {fault}")
+                return srv.SetLinkStateResponse(False, f"SetLinkState: {fault}")
             linear, angular = from_twist_msg(wanted.twist)
             # Gazebo subtracts the frame's velocity, and doesn't turn the request's.
             twist = (subtract(linear, frame[1][0]), subtract(angular, frame[1][1]))
             self._sim.place_link(*found, frame[0].compose(from_pose_msg(wanted.pose)), twist)
-        return SetLinkStateResponse(True, "SetLinkState: success")
+        return srv.SetLinkStateResponse(True, "SetLinkState: success")
 
     def _frame(self, name: str) -> tuple[Pose, Twist] | None:
         """Returns the state of a link or the world; a model is no frame here."""

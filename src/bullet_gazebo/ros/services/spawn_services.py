@@ -8,14 +8,7 @@ from dataclasses import replace
 
 import rospkg
 import rospy
-from gazebo_msgs.srv import (
-    DeleteModel,
-    DeleteModelRequest,
-    DeleteModelResponse,
-    SpawnModel,
-    SpawnModelRequest,
-    SpawnModelResponse,
-)
+from gazebo_msgs import srv
 
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
 from bullet_gazebo.physics.files.elements import shown
@@ -56,12 +49,12 @@ class SpawnServices:
         # serialises all its services (docs/contract/gazebo.md 1.1).
         self._one_at_a_time = threading.Lock()
         self._services = [
-            rospy.Service("~spawn_urdf_model", SpawnModel, self._spawn_urdf),
-            rospy.Service("~spawn_sdf_model", SpawnModel, self._spawn_sdf),
-            rospy.Service("~delete_model", DeleteModel, self._delete),
+            rospy.Service("~spawn_urdf_model", srv.SpawnModel, self._spawn_urdf),
+            rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._spawn_sdf),
+            rospy.Service("~delete_model", srv.DeleteModel, self._delete),
         ]
 
-    def _spawn_urdf(self, request: SpawnModelRequest) -> SpawnModelResponse:
+    def _spawn_urdf(self, request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
         if len(request.model_xml) > MAX_BYTES:
             return self._spawn(request, request.model_xml)  # refuses it before anything parses it
         text = without_comments(request.model_xml)
@@ -71,10 +64,10 @@ class SpawnServices:
             raise _refused(f"entity format is invalid: {found} instead of a URDF's <robot>.")
         return self._spawn(request, _with_package_paths(text))
 
-    def _spawn_sdf(self, request: SpawnModelRequest) -> SpawnModelResponse:
+    def _spawn_sdf(self, request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
         return self._spawn(request, request.model_xml)
 
-    def _spawn(self, request: SpawnModelRequest, text: str) -> SpawnModelResponse:
+    def _spawn(self, request: srv.SpawnModelRequest, text: str) -> srv.SpawnModelResponse:
         try:
             self._checked_pose(request)  # before anything takes time
             # Reading may take long; others spawn meanwhile.
@@ -84,16 +77,16 @@ class SpawnServices:
             with self._one_at_a_time:
                 self._add(request, entity, self._checked_pose(request).compose(own))
         except NameTaken:
-            return SpawnModelResponse(False, TAKEN)
+            return srv.SpawnModelResponse(False, TAKEN)
         except UnknownFormat as error:
             rospy.logerr("SpawnModel: %s", error)
-            return SpawnModelResponse(False, f"{UNKNOWN_FORMAT} ({error})")
+            return srv.SpawnModelResponse(False, f"{UNKNOWN_FORMAT} ({error})")
         except (DescriptionError, LookupError) as error:
             rospy.logerr("SpawnModel: %s", error)
-            return SpawnModelResponse(False, f"SpawnModel: {error}")
-        return SpawnModelResponse(True, "SpawnModel: Successfully spawned entity")
+            return srv.SpawnModelResponse(False, f"SpawnModel: {error}")
+        return srv.SpawnModelResponse(True, "SpawnModel: Successfully spawned entity")
 
-    def _checked_pose(self, request: SpawnModelRequest) -> Pose:
+    def _checked_pose(self, request: srv.SpawnModelRequest) -> Pose:
         """Returns the requested pose in the world."""
         pose, name = from_pose_msg(request.initial_pose), request.model_name
         if not name:
@@ -113,7 +106,7 @@ class SpawnServices:
         return pose
 
     def _add(
-        self, request: SpawnModelRequest, entity: ModelDescription | Light, pose: Pose
+        self, request: srv.SpawnModelRequest, entity: ModelDescription | Light, pose: Pose
     ) -> None:
         name, world = request.model_name, self._sim.world
         if isinstance(entity, Light):
@@ -130,16 +123,16 @@ class SpawnServices:
             self._plugins.load(model, request.robot_namespace)
         _warn(model.name, entity)
 
-    def _delete(self, request: DeleteModelRequest) -> DeleteModelResponse:
+    def _delete(self, request: srv.DeleteModelRequest) -> srv.DeleteModelResponse:
         with self._one_at_a_time:
             with self._sim.lock:
                 model = self._sim.world.model(request.model_name)
             if model is None:
-                return DeleteModelResponse(False, "DeleteModel: model does not exist")
+                return srv.DeleteModelResponse(False, "DeleteModel: model does not exist")
             self._plugins.unload(model)
             with self._sim.lock:
                 self._sim.delete_model(model)
-        return DeleteModelResponse(True, "DeleteModel: successfully deleted model")
+        return srv.DeleteModelResponse(True, "DeleteModel: successfully deleted model")
 
 
 def read_world(name: str, interrupted: Callable[[], bool]) -> WorldDescription:

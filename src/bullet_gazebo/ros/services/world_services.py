@@ -5,27 +5,8 @@ from typing import Any
 
 import rospy
 from dynamic_reconfigure.encoding import Config
+from gazebo_msgs import srv
 from gazebo_msgs.msg import ODEPhysics
-from gazebo_msgs.srv import (
-    DeleteLight,
-    DeleteLightRequest,
-    DeleteLightResponse,
-    GetLightProperties,
-    GetLightPropertiesRequest,
-    GetLightPropertiesResponse,
-    GetPhysicsProperties,
-    GetPhysicsPropertiesRequest,
-    GetPhysicsPropertiesResponse,
-    GetWorldProperties,
-    GetWorldPropertiesRequest,
-    GetWorldPropertiesResponse,
-    SetLightProperties,
-    SetLightPropertiesRequest,
-    SetLightPropertiesResponse,
-    SetPhysicsProperties,
-    SetPhysicsPropertiesRequest,
-    SetPhysicsPropertiesResponse,
-)
 from geometry_msgs.msg import Vector3
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
@@ -106,14 +87,14 @@ class PhysicsServices:
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._services = [
-            rospy.Service("~get_world_properties", GetWorldProperties, self._get_world),
-            rospy.Service("~get_physics_properties", GetPhysicsProperties, self.get),
-            rospy.Service("~set_physics_properties", SetPhysicsProperties, self.set),
+            rospy.Service("~get_world_properties", srv.GetWorldProperties, self._get_world),
+            rospy.Service("~get_physics_properties", srv.GetPhysicsProperties, self.get),
+            rospy.Service("~set_physics_properties", srv.SetPhysicsProperties, self.set),
         ]
 
-    def _get_world(self, request: GetWorldPropertiesRequest) -> GetWorldPropertiesResponse:
+    def _get_world(self, request: srv.GetWorldPropertiesRequest) -> srv.GetWorldPropertiesResponse:
         with self._sim.lock:
-            return GetWorldPropertiesResponse(
+            return srv.GetWorldPropertiesResponse(
                 sim_time=self._sim.sim_time,
                 model_names=list(self._sim.world.models),
                 rendering_enabled=False,  # no cameras here: clients must not wait for their pictures
@@ -121,11 +102,11 @@ class PhysicsServices:
                 status_message="GetWorldProperties: got properties",
             )
 
-    def get(self, request: GetPhysicsPropertiesRequest) -> GetPhysicsPropertiesResponse:
+    def get(self, request: srv.GetPhysicsPropertiesRequest) -> srv.GetPhysicsPropertiesResponse:
         with self._sim.lock:
             world = self._sim.world
             solver = {key: getattr(world.solver, ours) for key, ours in FIELDS.items()}
-            return GetPhysicsPropertiesResponse(
+            return srv.GetPhysicsPropertiesResponse(
                 time_step=world.time_step,
                 pause=self._sim.paused,
                 max_update_rate=self._sim.max_update_rate,
@@ -135,7 +116,7 @@ class PhysicsServices:
                 status_message="GetPhysicsProperties: got properties",
             )
 
-    def set(self, request: SetPhysicsPropertiesRequest) -> SetPhysicsPropertiesResponse:
+    def set(self, request: srv.SetPhysicsPropertiesRequest) -> srv.SetPhysicsPropertiesResponse:
         """Sets all fields: none is optional. A bad one refuses the whole request."""
         fault = bad_number(request)
         if not fault and not SHORTEST_STEP <= request.time_step <= LONGEST_STEP:
@@ -144,7 +125,7 @@ class PhysicsServices:
                 f"it must be between {SHORTEST_STEP:g} and {LONGEST_STEP:g} s"
             )
         if fault:
-            return SetPhysicsPropertiesResponse(False, f"SetPhysicsProperties: {fault}")
+            return srv.SetPhysicsPropertiesResponse(False, f"SetPhysicsProperties: {fault}")
         ode = request.ode_config
         with self._sim.lock:
             world = self._sim.world
@@ -152,7 +133,7 @@ class PhysicsServices:
             self._sim.set_time_step(request.time_step)
             self._sim.max_update_rate = request.max_update_rate
             world.set_solver(SolverSettings(**{o: getattr(ode, k) for k, o in FIELDS.items()}))
-        return SetPhysicsPropertiesResponse(True, "physics engine updated")
+        return srv.SetPhysicsPropertiesResponse(True, "physics engine updated")
 
 
 class PhysicsReconfigure(DynamicServer):
@@ -171,7 +152,7 @@ class PhysicsReconfigure(DynamicServer):
         if level == FIRST:
             config.update(self._in_force())
             return config
-        request = SetPhysicsPropertiesRequest(
+        request = srv.SetPhysicsPropertiesRequest(
             time_step=config["time_step"],
             max_update_rate=config["max_update_rate"],
             gravity=Vector3(*(config[f"gravity_{axis}"] for axis in AXES)),
@@ -184,7 +165,7 @@ class PhysicsReconfigure(DynamicServer):
         return config
 
     def _in_force(self) -> dict[str, Any]:
-        now = self._physics.get(GetPhysicsPropertiesRequest())
+        now = self._physics.get(srv.GetPhysicsPropertiesRequest())
         gravity = {f"gravity_{axis}": getattr(now.gravity, axis) for axis in AXES}
         ode = {name: getattr(now.ode_config, name) for name in ODE}
         plain = {"time_step": now.time_step, "max_update_rate": now.max_update_rate}
@@ -197,19 +178,19 @@ class LightServices:
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._services = [
-            rospy.Service("~get_light_properties", GetLightProperties, self._get),
-            rospy.Service("~set_light_properties", SetLightProperties, self._set),
-            rospy.Service("~delete_light", DeleteLight, self._delete),
+            rospy.Service("~get_light_properties", srv.GetLightProperties, self._get),
+            rospy.Service("~set_light_properties", srv.SetLightProperties, self._set),
+            rospy.Service("~delete_light", srv.DeleteLight, self._delete),
         ]
 
-    def _get(self, request: GetLightPropertiesRequest) -> GetLightPropertiesResponse:
+    def _get(self, request: srv.GetLightPropertiesRequest) -> srv.GetLightPropertiesResponse:
         name = request.light_name
         with self._sim.lock:
             light = self._sim.world.lights.get(name)
             if light is None:
                 text = f"getLightProperties: Requested light {name} not found!"
-                return GetLightPropertiesResponse(status_message=text)
-            return GetLightPropertiesResponse(
+                return srv.GetLightPropertiesResponse(status_message=text)
+            return srv.GetLightPropertiesResponse(
                 diffuse=ColorRGBA(*light.diffuse),
                 attenuation_constant=light.attenuation_constant,
                 attenuation_linear=light.attenuation_linear,
@@ -217,16 +198,16 @@ class LightServices:
                 success=True,
             )
 
-    def _set(self, request: SetLightPropertiesRequest) -> SetLightPropertiesResponse:
+    def _set(self, request: srv.SetLightPropertiesRequest) -> srv.SetLightPropertiesResponse:
         name = request.light_name
         with self._sim.lock:
             light = self._sim.world.lights.get(name)
             if light is None:
                 text = f"setLightProperties: Requested light {name} not found!"
-                return SetLightPropertiesResponse(False, text)
+                return srv.SetLightPropertiesResponse(False, text)
             fault = bad_number(request)
             if fault:
-                return SetLightPropertiesResponse(False, f"setLightProperties: {fault}")
+                return srv.SetLightPropertiesResponse(False, f"setLightProperties: {fault}")
             light.diffuse, light.specular = _color(request.diffuse), _color(request.specular)
             light.cast_shadows = request.cast_shadows
             light.attenuation_constant = request.attenuation_constant
@@ -235,17 +216,17 @@ class LightServices:
             light.direction = to_vector(request.direction)
             light.pose = from_pose_msg(request.pose)
             self._sim.world.version += 1
-        return SetLightPropertiesResponse(True, "")
+        return srv.SetLightPropertiesResponse(True, "")
 
-    def _delete(self, request: DeleteLightRequest) -> DeleteLightResponse:
+    def _delete(self, request: srv.DeleteLightRequest) -> srv.DeleteLightResponse:
         name = request.light_name
         with self._sim.lock:
             light = self._sim.world.lights.pop(name, None)
             self._sim.world.version += 1
         if light is None:  # Gazebo's text for a light that doesn't exist, after 10 s
             text = f'DeleteLight: Timeout reached while removing light "{name}"'
-            return DeleteLightResponse(False, text)
-        return DeleteLightResponse(True, f"DeleteLight: {name} successfully deleted")
+            return srv.DeleteLightResponse(False, text)
+        return srv.DeleteLightResponse(True, f"DeleteLight: {name} successfully deleted")
 
 
 def _color(msg: ColorRGBA) -> tuple[float, float, float, float]:

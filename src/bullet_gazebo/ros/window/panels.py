@@ -100,7 +100,7 @@ class TimePanel:
         self._write(f"no simulator {node} (yet)")
 
     def show_speed(self) -> None:
-        """Shows the speed that is set, whoever set it."""
+        """Shows the speed in force, which another client may have set."""
         found = self._commands.physics()
         factor = found.max_update_rate * found.time_step
         names = [name for name, each in SPEEDS.items() if abs(each - factor) < 1e-6]

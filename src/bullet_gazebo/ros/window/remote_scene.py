@@ -9,12 +9,7 @@ import rosgraph
 import rospy
 from bullet_gazebo_msgs.msg import SceneContacts, ScenePoses
 from bullet_gazebo_msgs.srv import GetScene, GetSceneResponse, StepWorld, StepWorldRequest
-from gazebo_msgs.srv import (
-    GetPhysicsProperties,
-    GetPhysicsPropertiesResponse,
-    SetModelConfiguration,
-    SetPhysicsProperties,
-)
+from gazebo_msgs import srv
 from std_srvs.srv import Empty
 
 from bullet_gazebo.ros.clients.gz import ControlFailed, RemoteWorld
@@ -162,17 +157,18 @@ class Commands:
             self._call("step_world", StepWorld, StepWorldRequest(ticks=count))
             ticks -= count
 
-    def physics(self) -> GetPhysicsPropertiesResponse:
-        return self._call("get_physics_properties", GetPhysicsProperties)
+    def physics(self) -> srv.GetPhysicsPropertiesResponse:
+        return self._call("get_physics_properties", srv.GetPhysicsProperties)
 
     def set_speed(self, factor: float) -> None:
         """Sets the desired real-time factor; 0 is as fast as possible."""
         now = self.physics()
         rate = factor / now.time_step
-        self._call(
-            "set_physics_properties", SetPhysicsProperties, now.time_step, rate, now.gravity, now.ode_config
-        )  # fmt: skip
+        request = (now.time_step, rate, now.gravity, now.ode_config)
+        self._call("set_physics_properties", srv.SetPhysicsProperties, *request)
 
     def place_joint(self, model: str, joint: str, position: float) -> None:
         """Puts a joint at `position` [rad, m], at rest."""
-        self._call("set_model_configuration", SetModelConfiguration, model, "", [joint], [position])
+        self._call(
+            "set_model_configuration", srv.SetModelConfiguration, model, "", [joint], [position]
+        )

@@ -14,7 +14,7 @@ from bullet_gazebo.control.trajectory import Segment, Waypoint
 from bullet_gazebo.control.trajectory_goals import (
     INVALID_GOAL,
     INVALID_JOINTS,
-    Outcome,
+    GoalOutcome,
     Tolerance,
     Trajectory,
     TrajectoryRefused,
@@ -261,7 +261,7 @@ def test_joints_that_are_not_named_go_on():
     rig.run(500)
     told = rig.pursue(move((0.5, (2.0,)), names=("rail",)))
     rig.run(600)
-    assert told.outcomes == [Outcome("succeeded")]
+    assert told.outcomes == [GoalOutcome("succeeded")]
     rig.run(1000)
     assert [rig.joints[name].position for name in ("shoulder", "rail")] == [1.0, 2.0]
 

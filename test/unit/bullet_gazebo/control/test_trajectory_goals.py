@@ -8,7 +8,7 @@ from support.robots.trajectory_rig import Rig, S, move
 from bullet_gazebo.control.trajectory_goals import (
     GOAL_TOLERANCE_VIOLATED,
     PATH_TOLERANCE_VIOLATED,
-    Outcome,
+    GoalOutcome,
     Tolerance,
     Trajectory,
     TrajectoryRefused,
@@ -22,7 +22,7 @@ def test_a_goal_is_told_of_at_the_monitors_rate_and_succeeds():
     rig.run(1000)
     assert (len(told.samples), told.outcomes) == (10, [])
     rig.run(100)
-    assert told.outcomes == [Outcome("succeeded")]
+    assert told.outcomes == [GoalOutcome("succeeded")]
     assert told.samples[0].names == ("shoulder",)
 
 
@@ -106,9 +106,9 @@ def test_a_new_goal_preempts_and_a_refused_one_does_not():
     rig.run(100)
     assert first.outcomes == []
     second = rig.pursue(move((1.0, (-1.0,))), "second")
-    assert first.outcomes == [Outcome("canceled", text="another goal came")]
+    assert first.outcomes == [GoalOutcome("canceled", text="another goal came")]
     rig.run(1100)
-    assert second.outcomes == [Outcome("succeeded")]
+    assert second.outcomes == [GoalOutcome("succeeded")]
     assert rig.joints["shoulder"].position == pytest.approx(-1.0)
 
 
@@ -127,7 +127,7 @@ def test_a_success_that_was_not_told_yet_is_told_when_something_else_comes():
     rig.run(900)
     assert told.outcomes == []
     rig.controller.follow(move((1.0, (2.0,))))
-    assert told.outcomes == [Outcome("succeeded")]
+    assert told.outcomes == [GoalOutcome("succeeded")]
 
 
 def test_cancel_holds_the_joints_and_knows_its_goal():
@@ -137,7 +137,7 @@ def test_cancel_holds_the_joints_and_knows_its_goal():
     rig.controller.cancel("other")
     assert told.outcomes == []
     rig.controller.cancel("mine")
-    assert told.outcomes == [Outcome("canceled", text="canceled by its client")]
+    assert told.outcomes == [GoalOutcome("canceled", text="canceled by its client")]
     here = rig.joints["shoulder"].position
     rig.run(1000)
     assert rig.joints["shoulder"].position == here
@@ -148,7 +148,7 @@ def test_stopping_and_beginning_anew_cancel_the_goal():
     told = rig.pursue(move((1.0, (1.0,))))
     rig.run(100)
     rig.controller.stopping()
-    assert told.outcomes == [Outcome("canceled", text="the controller was stopped")]
+    assert told.outcomes == [GoalOutcome("canceled", text="the controller was stopped")]
     told = rig.pursue(move((1.0, (1.0,))))
     rig.run(300)
     rig.joints["shoulder"].position = -0.5  # as a reset does it
@@ -160,7 +160,7 @@ def test_stopping_and_beginning_anew_cancel_the_goal():
     assert rig.joints["shoulder"].position == -0.5
     told = rig.pursue(move((1.0, (0.0,)), stamp=rig.now + S // 2))
     rig.run(1600)
-    assert told.outcomes == [Outcome("succeeded")]
+    assert told.outcomes == [GoalOutcome("succeeded")]
 
 
 def test_a_goal_without_points_holds_and_succeeds():
@@ -169,7 +169,7 @@ def test_a_goal_without_points_holds_and_succeeds():
     rig.run(1100)
     told = rig.pursue(Trajectory(("shoulder",), ()))
     rig.run(100)
-    assert told.outcomes == [Outcome("succeeded")]
+    assert told.outcomes == [GoalOutcome("succeeded")]
 
 
 def test_a_goal_that_waits_for_its_stamp_is_not_judged_by_the_old_trajectory():

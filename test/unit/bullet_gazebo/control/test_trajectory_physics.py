@@ -7,8 +7,8 @@ from support.robots.trajectory_rig import Listener
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
 from bullet_gazebo.control.trajectory_goals import (
+    GoalOutcome,
     GoalRequest,
-    Outcome,
     Tolerance,
     Trajectory,
     TrajectoryPoint,
@@ -99,7 +99,7 @@ def test_a_quintic_is_followed_within_its_tolerances(sim, interface, path):
         sim.advance(1)
         told = pursue(controller, points, path)
         sim.advance(2500)
-    assert told.outcomes == [Outcome("succeeded")]
+    assert told.outcomes == [GoalOutcome("succeeded")]
     assert len(told.samples) == pytest.approx(40, abs=2)
     found = [robot.hardware.joints[name].position for name in JOINTS]
     assert found == pytest.approx([0.8, -0.6], abs=path)

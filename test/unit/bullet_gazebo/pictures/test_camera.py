@@ -41,8 +41,3 @@ def test_the_ground_ends_at_the_horizon():
     behind = background(Camera(pitch=0.0, target=(0.0, 0.0, 1.0)), 40, 30)
     assert (behind.colours[:15] == SKY).all() and (behind.depth[:15] == 1.0).all()
     assert (behind.colours[-1] != SKY).any() and (np.diff(behind.depth[16:, 0]) < 0.0).all()
-
-
-def test_from_below_the_ground_is_above():
-    behind = background(Camera(pitch=10.0), 40, 30)
-    assert (behind.depth[0] < 1.0).all() and (behind.depth[-1] == 1.0).all()

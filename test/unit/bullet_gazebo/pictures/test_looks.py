@@ -7,10 +7,9 @@ import pytest
 from PIL import Image
 from support.mutations import mesh_files
 
-from bullet_gazebo.physics.description import DescriptionError, Shape
+from bullet_gazebo.physics.description import Shape
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.camera import Camera
-from bullet_gazebo.pictures.looks import read_look
 from bullet_gazebo.pictures.renderer import Renderer
 
 WIDTH, HEIGHT = 120, 120
@@ -99,14 +98,6 @@ def test_a_texture_is_as_bright_as_its_image_where_the_file_names_no_colour(scen
     assert np.array_equal(seen(scene), told)
 
 
-def test_a_texture_repeats(scene, tmp_path):
-    text = textured(tmp_path).replace("vt 1", "vt 2").replace("1\nvt 0 1", "2\nvt 0 2")
-    put(scene, "it", mesh(tmp_path / "square.obj", text))
-    picture = seen(scene)
-    at = [HEIGHT // 2 + each for each in (-32, -10, 10, 32)]
-    assert [main_colour(picture[at[0], x]) for x in at] == ["r", "g", "r", "g"]
-
-
 def test_materials_of_one_file_have_their_colours_and_those_of_the_robots_file_give_way(
     scene, tmp_path
 ):
@@ -177,11 +168,6 @@ def test_what_is_whole_hides_what_is_half_transparent(scene):
     before = seen(scene)
     put(scene, "clear", Shape("box", (0.9, 0.2, 0.9), rgba=(1.0, 0.0, 0.0, 0.5)), 1.0)
     assert np.array_equal(seen(scene), before)
-
-
-def test_a_file_that_is_gone_is_refused_in_one_line(tmp_path):
-    with pytest.raises(DescriptionError, match="not a file"):
-        read_look(str(tmp_path / "gone.obj"))
 
 
 def test_a_damaged_texture_leaves_the_shape(scene, tmp_path):

@@ -32,9 +32,3 @@ def test_it_is_closed_and_has_the_shapes_size(shape, volume, extents):
     outwards = np.einsum("ni,ni->n", solid.normals, np.repeat(areas, 3, axis=0))
     assert (outwards > 0.0).all()
     assert np.linalg.norm(solid.normals, axis=1) == pytest.approx(1.0)
-
-
-def test_a_shape_of_no_size_does_no_harm():
-    for shape in (Shape("box", (0.0, 0.0, 0.0)), Shape("cylinder", (0.0, 0.0))):
-        solid = solid_of(shape)
-        assert np.isfinite(solid.normals).all() and len(solid.corners) % 3 == 0

@@ -24,19 +24,6 @@ def test_the_world_is_found(line):
     assert parse_args(line.split()).world == "a.world"
 
 
-def test_without_a_world_it_is_the_empty_one():
-    args = parse_args(["--nix"])
-    assert (args.world, args.seed, args.ignored) == ("empty.world", None, ["--nix"])
-
-
-def test_a_video_has_its_options():
-    args = parse_args(
-        ["--video", "a.mp4", "--video-size", "320", "240", "w.world", "--video-rate", "60"]
-    )
-    assert (args.video, args.video_size, args.video_rate) == ("a.mp4", [320, 240], 60.0)
-    assert (args.video_model, args.world) == ("", "w.world")
-
-
 def test_the_seed_decides_random_numbers():
     drawn = []
     for _ in range(2):

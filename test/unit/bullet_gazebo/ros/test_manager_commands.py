@@ -89,15 +89,3 @@ CONTROLLERS = [
 )
 def test_filter(function, arguments, expected):
     assert [each.name for each in function(CONTROLLERS, *arguments)] == expected
-
-
-def test_keyword_arguments_have_their_documented_names():
-    assert filter_by_name(ctrl_list=CONTROLLERS, ctrl_name="arm", match_substring=False)
-    assert filter_by_type(ctrl_list=CONTROLLERS, ctrl_type="mine", match_substring=True)
-    assert filter_by_state(ctrl_list=CONTROLLERS, ctrl_state="run", match_substring=True)
-    assert filter_by_hardware_interface(
-        ctrl_list=CONTROLLERS, hardware_interface="Velocity", match_substring=True
-    )
-    assert filter_by_resources(
-        ctrl_list=CONTROLLERS, resources=["wheel"], hardware_interface=VELOCITY, match_any=False
-    )

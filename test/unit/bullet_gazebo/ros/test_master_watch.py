@@ -97,13 +97,6 @@ def test_a_master_that_is_gone_is_told_once_and_its_return_too(setting, monkeypa
     assert "answers again" in setting.told[1] and not setting.registered
 
 
-def test_at_the_end_nothing_is_registered_again(setting) -> None:
-    setting.master.services.clear()
-    setting.watch._ending.set()
-    setting.watch.look()
-    assert not setting.registered and not setting.told
-
-
 @pytest.mark.parametrize(
     ("line", "name"),
     [("", "/gazebo"), ("__name:=world -u", "/world"), ("__ns:=/second", "/second/gazebo")],
@@ -124,11 +117,6 @@ def test_a_twin_is_refused_while_it_lives_with_a_way_out(master) -> None:
         refuse_twin("/gazebo")
 
 
-def test_without_a_master_nobody_is_refused(monkeypatch) -> None:
-    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
-    refuse_twin("/gazebo")
-
-
 def test_two_of_a_name_start_one_after_the_other(master) -> None:
     inside, order = threading.Event(), []
 
@@ -145,11 +133,6 @@ def test_two_of_a_name_start_one_after_the_other(master) -> None:
         order.append("first")
     other.join(BOUND)
     assert order == ["first", "second"]
-
-
-def test_one_that_never_comes_up_holds_up_nobody_for_ever(master) -> None:
-    with one_at_a_time("/gazebo"), one_at_a_time("/gazebo", bound=0.1):
-        pass
 
 
 def test_the_loss_of_the_name_is_told_apart_from_other_ends(master, monkeypatch) -> None:

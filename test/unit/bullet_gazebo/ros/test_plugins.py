@@ -130,13 +130,6 @@ def test_a_parameter_that_is_no_table_is_a_warning(setting, places) -> None:
     assert any("no table" in each for each in setting.errors)
 
 
-def test_a_function_that_is_made_by_a_call_is_a_plugin_too(setting) -> None:
-    setting.write("partly", "import functools\nmade = []\nMake = functools.partial(made.append)")
-    setting.places = {"libgood.so": "partly:Make"}
-    setting.delete(setting.spawn("good"))
-    assert len(sys.modules["partly"].made) == 1 and not setting.errors
-
-
 def test_a_master_that_is_away_leaves_no_model_half_there(setting, monkeypatch) -> None:
     def away(name: str, default: object) -> object:
         raise ConnectionRefusedError("no master")

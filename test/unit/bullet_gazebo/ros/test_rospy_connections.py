@@ -18,7 +18,7 @@ from rosgraph.network import ROSHandshakeException, encode_ros_handshake_header
 from rosgraph.xmlrpc import SilenceableXMLRPCRequestHandler, ThreadingXMLRPCServer
 from rospy.exceptions import TransportTerminated
 from rospy.impl.tcpros_base import TCPROSTransportProtocol, TCPServer
-from std_msgs.msg import Float64, String
+from std_msgs.msg import String
 
 from bullet_gazebo.ros.common import rospy_connections as connections
 from bullet_gazebo.ros.common.rospy_connections import (
@@ -137,22 +137,6 @@ def test_silent_clients_push_each_other_out_and_nobody_else(server, monkeypatch)
         client.close()
 
 
-def test_each_newcomer_pushes_out_another_one_before_their_threads_have_noticed(monkeypatch):
-    monkeypatch.setattr(connections, "MOST_STRANGERS", 2)
-    noticed = threading.Event()
-    reception = Reception(lambda client, address: noticed.wait(BOUND))
-    pairs = [socket.socketpair() for _ in range(6)]
-    for there, _ in pairs:
-        reception.greet(there, ("", 0))
-    for _, here in pairs:
-        here.setblocking(False)
-    assert [here.recv(1) for _, here in pairs[:4]] == [b""] * 4
-    for _, here in pairs[4:]:
-        with pytest.raises(BlockingIOError):
-            here.recv(1)
-    noticed.set()
-
-
 def test_a_client_that_says_nothing_for_long_is_let_go(server, monkeypatch) -> None:
     monkeypatch.setattr(connections, "SILENCE", 0.05)
     client = server.connect()
@@ -215,16 +199,6 @@ def test_a_message_that_claims_to_be_large_ends_its_connection(told, size) -> No
     assert "/any" in told[0]
 
 
-def test_others_are_read_one_after_the_other(told) -> None:
-    bound_messages()
-    protocol = TCPROSTransportProtocol("/any", Float64)
-    buffer, queue = io.BytesIO(), []
-    for value in (1.0, 2.0):
-        buffer.write(struct.pack("<Id", 8, value))
-    protocol.read_messages(buffer, queue, None)
-    assert [message.data for message in queue] == [1.0, 2.0] and not told
-
-
 @pytest.fixture
 def calls() -> Iterator[tuple[str, int]]:
     """An XML-RPC server as a node's."""
@@ -268,14 +242,3 @@ def test_where_few_descriptors_are_left_no_call_is_answered(calls, monkeypatch) 
     assert ends(socket.create_connection(calls, BOUND))
     monkeypatch.setattr(connections, "_crowded", lambda: False)
     assert call(calls) == 4
-
-
-def test_where_no_descriptor_is_left_to_count_with_there_are_too_few() -> None:
-    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
-    assert not connections._crowded()
-    resource.setrlimit(resource.RLIMIT_NOFILE, (0, limits[1]))
-    try:
-        crowded = connections._crowded()
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
-    assert crowded

@@ -67,10 +67,6 @@ def test_a_client_that_does_not_read_holds_nobody_up() -> None:
     stuck.close()
 
 
-def test_without_clients_there_is_nothing_to_wait_for() -> None:
-    wait_until_sent(publisher())
-
-
 @pytest.fixture
 def no_collection() -> Iterator[None]:
     """What refers to itself stays, as it may for long."""

@@ -155,17 +155,6 @@ def test_torch_alone_runs_it(run: Path, tmp_path: Path) -> None:
     policy.env.close()
 
 
-def test_other_observations_are_told_as_what_they_were(tmp_path: Path) -> None:
-    """Those that aren't vectors were flattened for the training; who uses the file has to do so."""
-    run = workbench_runs.policy_gradient(
-        tmp_path / "run", "reinforce", env_id="FrozenLake-v1", eval_frequency=0
-    )
-    assert work("export", run, "--out", tmp_path / "policy.pt") == 0
-    metadata = open_exported(tmp_path / "policy.pt").metadata
-    assert metadata["observation_space"]["shape"] == [16]
-    assert metadata["flattened_from"] == {"kind": "Discrete", "n": 16, "start": 0}
-
-
 class Reach(gymnasium.Env):
     """A goal to reach in a plane, observed in parts."""
 

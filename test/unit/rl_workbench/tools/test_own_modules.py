@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import pytest
-import yaml
 from PIL import Image
 
 import rl_workbench
@@ -55,14 +54,6 @@ def trained(module: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_train_names_its_folder(tmp_path: Path, monkeypatch, capsys) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(["train", "--algo", "dqn", *SMALL, "--seed", "7"]) == 0
-    (folder,) = (tmp_path / "runs").iterdir()
-    assert folder.name.startswith("own_arm.tasks-own_arm-Reach-v0__dqn__7__")
-    assert f"training dqn in {ENV_ID} with seed 7" in capsys.readouterr().out
-
-
 def test_another_process_goes_on(trained: Path) -> None:
     command = [*PROGRAM, "train", "--resume", str(trained), "--total-timesteps", "340"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -79,22 +70,6 @@ def test_eval_knows_the_line_and_the_successes(trained: Path, capsys) -> None:
     assert found["success_rate"] == sum(found["successes"]) / 3
     assert "success |" not in told.err and f"success {found['success_rate']:.0%}" in told.err
     assert told.err.splitlines()[0].endswith(("| success", "| no success"))
-
-
-def test_enjoy_opens_its_window(trained: Path, monkeypatch, capsys) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    assert cli.main(["enjoy", str(trained)]) == 0
-    assert "return" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("size", [[], ["--size", "96x96"]])
-def test_record(trained: Path, tmp_path: Path, capsys, size: list[str]) -> None:
-    out = tmp_path / "episode.gif"
-    wanted = ["--checkpoint", "best", "random", "--no-captions", *size]
-    assert cli.main(["record", str(trained), "--out", str(out), *wanted]) == 0
-    width = 96 if size else 64
-    assert Image.open(out).size == (2 * width, width)
-    assert "success" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("over", ["episodes", "steps"])
@@ -133,28 +108,6 @@ def test_benchmark_trains_in_processes_of_their_own(tmp_path: Path, monkeypatch,
     assert cli.main(command) == 0
     table = (tmp_path / "out/results.md").read_text()
     assert "| success |" in table and "0 of 1" in table and "at least -7.5." in table
-
-
-@pytest.mark.extras("optuna")
-def test_sweep_searches_what_is_not_given(tmp_path: Path) -> None:
-    out = tmp_path / "study"
-    options = ["env_kwargs=moves=4", "learning_starts=50", "eval_frequency=100", "gamma=0.5",
-               "confirm_episodes=0"]  # fmt: skip
-    wanted = ["--trials", "1", "--total-timesteps", "200", "--out", str(out)]
-    assert cli.main(["sweep", "--env-id", ENV_ID, "--params", *options, *wanted]) == 0
-    (trial,) = json.loads((out / "trials.json").read_text())
-    assert trial["state"] == "complete" and "gamma" not in trial["options"]
-    (section,) = yaml.safe_load((out / "best.yaml").read_text())
-    assert section == ENV_ID
-    assert open_run(out / "trial_0000" / "seed_0").config["hyperparameters"]["gamma"] == 0.5
-
-
-@pytest.mark.extras("optuna")
-def test_a_sweep_of_an_option_that_does_not_exist(capsys, tmp_path: Path) -> None:
-    wanted = ["--params", "gama=0.5", "--out", str(tmp_path / "study")]
-    assert cli.main(["sweep", "--env-id", ENV_ID, *wanted]) == 1
-    assert "--params: unknown option 'gama'; did you mean gamma?" in capsys.readouterr().err
-    assert not (tmp_path / "study").exists()
 
 
 @pytest.mark.parametrize("section", [ENV_ID, "own_arm/Reach-v0"])

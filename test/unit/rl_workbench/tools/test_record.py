@@ -16,7 +16,7 @@ import cartpole  # noqa: F401 - registers the environments
 from rl_workbench import cli
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.tools.record import Film, SideBySide, write_video
-from rl_workbench.tools.recording import Frame, PictureView, record_episode, size_options
+from rl_workbench.tools.recording import EpisodeFrame, PictureView, record_episode, size_options
 
 pytestmark = pytest.mark.usefixtures("signals")
 RATE = 40.0  # [Hz]
@@ -106,7 +106,7 @@ def test_actions_of_any_kind_are_told(action, text):
     env = Constant(2)
     *_, last = record_episode(env, lambda _: action, PictureView(env), 0)
     assert last.caption("best") == f"best   step 2   return 1.0   action {text}"
-    assert Frame(0, b"", 0.0, "").caption() == "step 0   return 0.0"
+    assert EpisodeFrame(0, b"", 0.0, "").caption() == "step 0   return 0.0"
 
 
 def test_a_gifs_frames_last_as_long_as_they_should_on_average(tmp_path: Path):

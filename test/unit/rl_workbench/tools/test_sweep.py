@@ -156,11 +156,6 @@ def test_trials_that_fall_behind_are_ended(tmp_path: Path, pruner: str) -> None:
     assert max(scores, key=lambda row: row[0])[1] == best
 
 
-def test_without_a_pruner_none_is(tmp_path: Path) -> None:
-    search(tmp_path, 12)
-    assert set(states(tmp_path)) == {"complete"}
-
-
 class Killed(BaseException):
     """What a kill -9 is to this process: nothing is told or written any more."""
 

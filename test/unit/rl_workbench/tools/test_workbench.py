@@ -88,11 +88,6 @@ def test_eval_of_random_actions_is_a_baseline(runs: Path, capsys) -> None:
     assert "or random actions" in " ".join(capsys.readouterr().out.split())
 
 
-def test_eval_says_whether_it_is_solved(runs: Path, capsys) -> None:
-    work("eval", runs / "dqn_0", "--episodes", 2)
-    assert "not solved: the threshold is 475" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize("given", [["max_steps=3"], ["max_steps=3,noise=0.01"],
                                    ["max_steps=3", "noise=0.01"]])  # fmt: skip
 def test_options_of_the_environment_reach_it(runs: Path, given: list[str], capsys) -> None:
@@ -233,12 +228,6 @@ def test_no_run_folder(tmp_path: Path, capsys) -> None:
     assert "no run folder at" in refused(capsys, "plot", tmp_path, "--out", tmp_path / "a.png")
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"algorithm": "dqn", "run": 3}'])
-def test_a_foreign_record(tmp_path: Path, text: str, capsys) -> None:
-    (tmp_path / "config.json").write_text(text)
-    refused(capsys, "eval", tmp_path)
-
-
 def test_a_damaged_run_costs_no_other(tmp_path: Path, capsys) -> None:
     workbench_runs.record(tmp_path / "good", [1.0, 2.0])
     (tmp_path / "damaged").mkdir()
@@ -273,11 +262,6 @@ def test_without_any_good_checkpoint(own: Path, capsys) -> None:
     assert "no checkpoint yet" in refused(capsys, "eval", own)
 
 
-def test_options_of_the_environment_that_cannot_be_read(runs: Path, capsys) -> None:
-    line = refused(capsys, "eval", runs / "robot", "--env-kwargs", "max_steps")
-    assert "KEY=VALUE" in line
-
-
 def test_no_episodes_yet(tmp_path: Path, capsys) -> None:
     run = workbench_runs.record(tmp_path / "run", [])
     assert "no episode has ended yet" in refused(capsys, "plot", run, "--out", tmp_path / "a.png")
@@ -306,12 +290,6 @@ def test_an_unknown_command(name: str, capsys) -> None:
         work(name)
     assert ended.value.code == 2
     assert "unknown command" in capsys.readouterr().err
-
-
-def test_the_nearest_command_is_named(capsys) -> None:
-    with pytest.raises(SystemExit):
-        work("evla")
-    assert "did you mean eval?" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["video.avi", "video"])
