@@ -184,15 +184,15 @@ def wheels_text(survey: Survey) -> dict[str, str]:
     )
     if not listed:
         return {"wheels": "", "where": where.format("", "state.joints[joint].position")}
-    told = (
-        '        told = {joint: "velocity" if joint in WHEELS else "position" for joint in RANGES}'
+    kinds = (
+        '        kinds = {joint: "velocity" if joint in WHEELS else "position" for joint in RANGES}'
     )
     text = where.format(
-        "; of wheels, how fast they turn", "getattr(state.joints[joint], told[joint])"
+        "; of wheels, how fast they turn", "getattr(state.joints[joint], kinds[joint])"
     )
     return {
-        "wheels": f"WHEELS = {{  # they are told a velocity, and reach one\n{listed}}}\n",
-        "where": text.replace("\n", f"\n{told}\n"),
+        "wheels": f"WHEELS = {{  # commanded by velocity\n{listed}}}\n",
+        "where": text.replace("\n", f"\n{kinds}\n"),
     }
 
 

@@ -1,4 +1,4 @@
-"""Ids of environments as text: `module:namespace/Name-v0` or `namespace/Name-v0`, as Gymnasium has them."""
+"""Gymnasium's ids of environments: `module:namespace/Name-v0` or `namespace/Name-v0`."""
 
 import contextlib
 import re
@@ -14,18 +14,18 @@ from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line, 
 
 
 def without_module(env_id: str) -> str:
-    """The id under which it is registered."""
+    """Returns the id under which it is registered."""
     return env_id.partition(":")[2] or env_id
 
 
 def module_of(env_id: str) -> str:
-    """The module that registers it; empty if the id names none."""
+    """Returns the module that registers it; empty if the id names none."""
     module, colon, _ = env_id.partition(":")
     return module if colon else ""
 
 
 def as_file_name(env_id: str) -> str:
-    """For the names of files and folders."""
+    """Returns an id as part of a file's name."""
     return re.sub("[/:]", "-", env_id)
 
 
@@ -36,7 +36,7 @@ def import_module_of(env_id: str) -> None:
     """Imports the module that an id names, if it names one.
 
     Raises:
-        WorkbenchError: if there is no such module, naming the nearest, or it fails.
+        WorkbenchError: If there is no such module, or it fails.
     """
     module = module_of(env_id)
     if not module:
@@ -52,7 +52,7 @@ def import_module_of(env_id: str) -> None:
 
 
 def _nearest(missing: str) -> str:
-    """The words for the module whose name is most alike; none if there is none."""
+    """Returns a hint at the module with the most similar name, if there is one."""
     package, _, name = missing.rpartition(".")
     folders: Any = import_module(package).__path__ if package else None
     near = get_close_matches(name, [each.name for each in iter_modules(folders)], 1)
@@ -60,7 +60,7 @@ def _nearest(missing: str) -> str:
 
 
 def unknown_environment(env_id: str) -> str:
-    """The words for an id that isn't registered: the nearest one, or how one's own are named."""
+    """Returns an error text for an unregistered id, with the nearest one or how to name one's own."""
     near = get_close_matches(without_module(env_id), sorted(gymnasium.registry), 1)
     module = module_of(env_id)
     text = f"unknown environment {env_id!r}"
@@ -73,10 +73,10 @@ def unknown_environment(env_id: str) -> str:
 
 
 def spec_of(env_id: str) -> EnvSpec | None:
-    """What is registered under an id, once its module is imported; None if nothing is.
+    """Returns what is registered under an id, once its module is imported.
 
     Raises:
-        WorkbenchError: if its module can't be imported.
+        WorkbenchError: If its module can't be imported.
     """
     if without_module(env_id) not in gymnasium.registry:
         import_module_of(env_id)
@@ -84,8 +84,8 @@ def spec_of(env_id: str) -> EnvSpec | None:
 
 
 def threshold(env_id: str) -> float | None:
-    """The return from which Gymnasium calls an environment solved, if it says so."""
+    """Returns the return at which Gymnasium calls an environment solved, if it says so."""
     spec = None
-    with contextlib.suppress(WorkbenchError):  # who makes the environment says so
+    with contextlib.suppress(WorkbenchError):  # making the environment reports it
         spec = spec_of(env_id)
     return None if spec is None else spec.reward_threshold

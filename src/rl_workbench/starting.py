@@ -1,4 +1,4 @@
-"""How commands start: Ctrl-C while they still read their modules, and how one starts another."""
+"""How commands start and end: signals, an output that nobody reads, and how one starts another."""
 
 import contextlib
 import os
@@ -12,10 +12,10 @@ from typing import NoReturn
 
 @contextlib.contextmanager
 def ended_by_ctrl_c() -> Iterator[None]:
-    """Ctrl-C ends the process inside with a line, and 130.
+    """Lets Ctrl-C end the process with one line and 130 while modules are imported.
 
-    A KeyboardInterrupt could be swallowed by a module that is being imported, which would be left
-    half there: torch does so. A process that ignores Ctrl-C goes on ignoring it.
+    A module that is being imported could swallow a KeyboardInterrupt and stay half imported, as torch does.
+    A process that ignores Ctrl-C goes on ignoring it.
     """
     before = signal.getsignal(signal.SIGINT)
     if before is signal.default_int_handler:
@@ -35,15 +35,15 @@ def _end(number: int, frame: FrameType | None) -> NoReturn:
 
 
 def program(module: str) -> tuple[str, ...]:
-    """What starts a module as a process of its own, which doesn't search the current folder for modules.
+    """Returns the command that starts a module as a process of its own; see `search_path`.
 
-    A user's `token.py` there would stand in for the standard library's. See `search_path`.
+    -P: a user's `token.py` in the current folder mustn't replace the standard library's.
     """
     return (sys.executable, "-P", "-m", module)
 
 
 def search_path() -> str:
-    """PYTHONPATH of a process that is to find the modules that this one finds."""
+    """Returns a PYTHONPATH with which another process finds the modules that this one finds."""
     import sysconfig  # not before Ctrl-C is seen to
 
     standard = sysconfig.get_path("stdlib")
@@ -53,7 +53,7 @@ def search_path() -> str:
 
 @contextlib.contextmanager
 def reader_may_go() -> Iterator[None]:
-    """Ends what runs inside without a word once nobody reads, also what is left to write at the end."""
+    """Ends what runs inside silently once nobody reads standard output, as in `train --help | head`."""
     try:
         yield
         if sys.stdout is not None:  # it may have been closed by >&-
@@ -68,7 +68,7 @@ def reader_may_go() -> Iterator[None]:
 
 
 def _nobody_reads() -> bool:
-    """Whether standard output is a pipe without a reader."""
+    """Returns whether standard output is a pipe without a reader."""
     try:
         descriptor = sys.stdout.fileno()
     except (AttributeError, OSError, ValueError):  # closed, or a test's
@@ -82,11 +82,11 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
 
 class Interrupt:
-    """Takes over these signals from `install()` on, until the process ends.
+    """Handles Ctrl-C, SIGTERM, a closed terminal and the end of a batch system's CPU time.
 
-    Before `defer()` a signal raises KeyboardInterrupt, so any wait ends at once. After it, a
-    signal only makes `requested` true: the loop ends at its next step, and saving and
-    cleaning up run to their end however often Ctrl-C is pressed.
+    Before `defer()` a signal raises KeyboardInterrupt, so any wait ends at once. After it, a signal only
+    makes `requested()` true: the loop ends at its next step, and saving and cleaning up are completed
+    however often Ctrl-C is pressed.
     """
 
     def __init__(self) -> None:
@@ -101,18 +101,18 @@ class Interrupt:
         return self
 
     def defer(self) -> None:
-        """From now on signals only set `requested`."""
+        """Lets signals only set `requested` from now on."""
         self._deferred = True
 
     def at_once(self) -> None:
-        """From now on signals raise KeyboardInterrupt again; one that was deferred does so here."""
+        """Lets signals raise KeyboardInterrupt again. One that was deferred does so here."""
         self._deferred = False
         if self.requested():
             raise KeyboardInterrupt
 
     @contextlib.contextmanager
     def reading(self) -> Iterator[None]:
-        """While modules are imported signals wait: what is interrupted there may be left half done."""
+        """Defers signals while modules are imported: an interrupted import may stay half done."""
         self.defer()
         try:
             yield

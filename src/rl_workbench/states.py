@@ -1,6 +1,6 @@
-"""What checkpoints hold, checked as it is taken over: wrong types would only show steps later, or crash.
+"""Checks what checkpoints hold while it is loaded. A wrong type would show only steps later, or crash.
 
-Each check returns its value and raises a ValueError or TypeError that says what it should have been.
+Each function returns its value, or raises a ValueError or TypeError that says what was expected.
 """
 
 import copy
@@ -15,33 +15,33 @@ LARGEST = 2**53  # up to which floats count one by one
 
 
 def whole(value: Any, lowest: int = 0) -> int:
-    """A whole number from `lowest` on."""
+    """Checks a whole number of at least `lowest`."""
     if type(value) is not int or not lowest <= value <= LARGEST:
         raise ValueError(f"a whole number from {lowest} on is expected, not {_short(value)}")
     return value
 
 
 def number(value: Any) -> float:
-    """A finite number."""
+    """Checks a finite number."""
     if type(value) not in (int, float) or not math.isfinite(value) or abs(value) > 1e300:
         raise ValueError(f"a finite number is expected, not {_short(value)}")
     return float(value)
 
 
 def switch(value: Any) -> bool:
-    """True or False."""
+    """Checks a bool."""
     if type(value) is not bool:
         raise ValueError(f"true or false is expected, not {_short(value)}")
     return value
 
 
 def array(value: Any, dtype: torch.dtype, shape: tuple[int | None, ...]) -> np.ndarray:
-    """A tensor as an array of its own.
+    """Checks a tensor and returns a copy as an array.
 
     Args:
-        value: the tensor.
-        dtype: its type; if that is a floating one, all of its values are finite.
-        shape: its shape; None is any size.
+        value: The tensor. All of its values must be finite.
+        dtype: Its type.
+        shape: Its shape, with None for any size.
     """
     if not isinstance(value, torch.Tensor) or value.dtype != dtype or value.is_sparse:
         raise ValueError(f"a tensor of {dtype} is expected, not {_short(value)}")
@@ -54,7 +54,7 @@ def array(value: Any, dtype: torch.dtype, shape: tuple[int | None, ...]) -> np.n
 
 
 def sequence(value: Any, length: int | None = None) -> list[Any]:
-    """A list; of a length, if one is given."""
+    """Checks a list, and its length if one is given."""
     if not isinstance(value, list | tuple) or (length is not None and len(value) != length):
         size = "" if length is None else f" of {length}"
         raise ValueError(f"a list{size} is expected, not {_short(value)}")
@@ -62,25 +62,24 @@ def sequence(value: Any, length: int | None = None) -> list[Any]:
 
 
 def set_generator(generator: np.random.Generator, text: Any) -> None:
-    """Brings a generator to a state, written as JSON."""
+    """Sets a generator to a state that was written as JSON."""
     if not isinstance(text, str):
         raise ValueError(f"a generator's state is a text, not {_short(text)}")
     generator.bit_generator.state = json.loads(text)
 
 
 def load_optimizer(optimizer: torch.optim.Optimizer, state: Any) -> None:
-    """Takes over an optimizer's state; see `check_optimizer`."""
+    """Loads an optimizer's state; see `check_optimizer`."""
     check_optimizer(optimizer, state)
     optimizer.load_state_dict(state)
 
 
 def check_optimizer(optimizer: torch.optim.Optimizer, state: Any) -> None:
-    """Holds a state against the optimizer's own: torch takes whatever there is, and its kernels write
-    beyond moments of another size.
+    """Checks an optimizer's state: torch loads anything, and its kernels write beyond smaller moments.
 
     Args:
-        optimizer: new; it doesn't change.
-        state: all but the learning rate and the moments' values is as the optimizer's.
+        optimizer: A new one. It isn't changed.
+        state: It must equal the optimizer's own but for the learning rate and the values of the moments.
     """
     own = _after_a_step(optimizer)
     if not isinstance(state, dict) or set(state) != set(own):
@@ -108,7 +107,7 @@ def check_optimizer(optimizer: torch.optim.Optimizer, state: Any) -> None:
 
 
 def _after_a_step(optimizer: torch.optim.Optimizer) -> dict[str, Any]:
-    """The state that such an optimizer has once it has moments."""
+    """Returns the state of a copy that has taken a step, and so has moments."""
     twin = copy.deepcopy(optimizer)
     for group in twin.param_groups:
         for parameter in group["params"]:

@@ -1,4 +1,4 @@
-"""Files on disk: each one whole, or as it was before."""
+"""Writes files so that each is either complete or as it was before, and reads config.json."""
 
 import io
 import json
@@ -15,10 +15,10 @@ Writer = Callable[[BinaryIO], object]  # fills a file
 
 
 def write_atomically(path: Path, write: Writer) -> None:
-    """Lets `write` fill a file that replaces `path` only once it is whole and on disk.
+    """Lets `write` fill a file that replaces `path` only once it is complete and on disk.
 
     Raises:
-        OSError: if the disk refuses; an older file of that name is untouched.
+        OSError: If it can't be written. An older file of that name is untouched.
     """
     descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
@@ -35,13 +35,15 @@ def write_atomically(path: Path, write: Writer) -> None:
 
 
 def write_file(path: Path, write: Writer, told: Path | None = None) -> None:
-    """The same for what a user asked for: makes the folder, and tells what the disk refuses.
+    """Does the same for what a user asked for: it makes the folder, and its errors are for the user.
 
     Args:
-        told: the name for the error, if the user gave another one.
+        path: The file.
+        write: Fills it.
+        told: Its name for the error, if the user gave another one.
 
     Raises:
-        WorkbenchError: if it does; an older file of that name is untouched.
+        WorkbenchError: If it can't be written. An older file of that name is untouched.
     """
     told = told or path
     try:
@@ -54,10 +56,10 @@ def write_file(path: Path, write: Writer, told: Path | None = None) -> None:
 
 
 def check_writable(path: Path) -> None:
-    """Refuses a place where nothing can be written, before hours are spent on what goes there.
+    """Checks that a file can be written, before hours are spent on its content.
 
     Raises:
-        WorkbenchError: if it is one.
+        WorkbenchError: If it can't.
     """
     if path.is_dir():
         raise WorkbenchError(f"can't write {path}: it is a folder")
@@ -67,26 +69,26 @@ def check_writable(path: Path) -> None:
 
 
 def as_text(text: str) -> Writer:
-    """Writes a text."""
+    """Returns what writes a text."""
     return lambda stream: stream.write(text.encode())
 
 
 def as_json(content: Any) -> Writer:
-    """Writes JSON with an end of line.
+    """Returns what writes JSON.
 
     Raises:
-        ValueError: if a number of it is none.
+        ValueError: If a number is NaN or infinite.
     """
     return as_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def save_tensors(path: Path, content: dict[str, Any]) -> None:
-    """Writes what `torch.load` reads, whole or not at all.
+    """Writes what `torch.load` reads.
 
-    By way of the memory: torch turns the error of a full disk into one of its own.
+    It goes through memory, since torch hides the error of a full disk behind its own.
 
     Raises:
-        OSError: if the disk refuses; an older file of that name is untouched.
+        OSError: If it can't be written. An older file of that name is untouched.
     """
     import torch  # takes seconds, and most files need none of it
 
@@ -114,10 +116,10 @@ CONFIG_RECORD = "config.json"
 
 
 def read_record(folder: Path) -> Any:
-    """What config.json holds.
+    """Reads a run folder's config.json.
 
     Raises:
-        WorkbenchError: if there is none, or it isn't JSON.
+        WorkbenchError: If there is none, or it isn't JSON.
     """
     path = folder / CONFIG_RECORD
     try:
@@ -125,5 +127,5 @@ def read_record(folder: Path) -> Any:
             return json.load(file)
     except OSError as error:
         raise WorkbenchError(f"{folder} is no run folder: {path}: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:  # the latter of brackets within brackets
+    except (ValueError, RecursionError) as error:  # the latter for deeply nested brackets
         raise WorkbenchError(f"{path} isn't JSON: {error}") from error

@@ -108,7 +108,6 @@ class SingleChoice(Choice):
         return self.scores(observations).argmax(dim=1)
 
     def margins(self, observations: torch.Tensor) -> torch.Tensor:
-        """See `Choice`."""
         return lead(self.scores(observations))
 
 

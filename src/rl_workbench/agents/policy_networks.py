@@ -90,11 +90,9 @@ class PairActor:
         return np.array([first, 1.0 - first])
 
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> int:
-        """See `Actor`."""
         return 0 if generator.random() < self._first(observation) else 1
 
     def greedy(self, observation: np.ndarray) -> int:
-        """See `Actor`."""
         return 0 if self._first(observation) >= 0.5 else 1
 
 
@@ -130,12 +128,10 @@ class SoftmaxActor:
         return weights / weights.sum()
 
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> int:
-        """See `Actor`."""
         ends = np.cumsum(self.probabilities(observation))
         return min(int(np.searchsorted(ends, generator.random(), side="right")), len(ends) - 1)
 
     def greedy(self, observation: np.ndarray) -> int:
-        """See `Actor`."""
         return int(np.argmax(self._preferences(observation)))
 
 

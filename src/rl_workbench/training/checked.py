@@ -1,4 +1,4 @@
-"""What an environment gives, checked before it spoils what is learned from it."""
+"""Checks what an environment returns, before it spoils what is learned from it."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,53 +10,40 @@ from gymnasium import spaces
 
 from rl_workbench.errors import EnvironmentFailure, WorkbenchError, error_line
 
-LARGEST = float(np.finfo(np.float32).max)  # networks and replay know no larger number
+LARGEST = float(np.finfo(np.float32).max)  # networks and replay buffers hold no larger number
 COMPUTE_REWARD = "compute_reward"  # method of an environment with a goal
-BEGIN_STEP = "begin_step"  # and of one whose step takes time elsewhere, as in a simulator
+BEGIN_STEP = "begin_step"  # method of an environment whose step takes time in another process
 
 
 class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Ends with one line what would spoil replay, statistics and weights, before it gets there.
+    """Ends a training with one line where NaN, a wrong shape or an exception would spoil it.
+
+    All methods raise WorkbenchError if the environment fails; `reset` and `step` also if an observation or
+    a reward isn't finite in float32.
 
     Args:
-        env: its observations are vectors, or a Dict of arrays.
-        env_id: for the error.
+        env: Its observations are vectors, or a Dict of arrays.
+        env_id: For errors.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], env_id: str) -> None:
         super().__init__(env)
-        self._id, self._begin_step = env_id, _beginning(env)
+        self._id, self._begin_step = env_id, _begin_method(env)
 
     def begin_step(self, action: Any) -> None:
-        """Has a step begin, where the environment can: the next `step`, by the same action, takes its answer.
-
-        Raises:
-            WorkbenchError: if the environment fails.
-        """
+        """Begins a step, where the environment can. The next `step`, by the same action, waits for it."""
         with self._running("begin_step"):
             self._begin_step(action)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """As the environment's.
-
-        Raises:
-            WorkbenchError: if the observation isn't finite in single precision, or the environment
-                fails.
-        """
         with self._running("reset"):
             observation, info = self.env.reset(seed=seed, options=options)
         self._check(observation)
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """As the environment's.
-
-        Raises:
-            WorkbenchError: if the observation or the reward isn't finite in single precision, or the
-                environment fails.
-        """
         with self._running("step"):
             observation, reward, terminated, truncated, info = self.env.step(action)
         self._check(observation)
@@ -65,27 +52,24 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         except (TypeError, ValueError) as error:
             raise WorkbenchError(f"the reward of {self._id} isn't a number: {reward!r}") from error
         if not size <= LARGEST:  # so that NaN is refused too
-            raise self._error("reward", reward)
+            raise self._not_finite("reward", reward)
         return observation, reward, terminated, truncated, info
 
     @property
     def can_compute_reward(self) -> bool:
-        """Whether it has rewards for goals that it is given."""
+        """Whether it can compute rewards for any goals."""
         return self.env.has_wrapper_attr(COMPUTE_REWARD)
 
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> np.ndarray:
-        """The rewards for goals that were achieved while others were desired, as hindsight asks for them.
+        """Computes rewards in hindsight: for goals that were achieved while others were desired.
 
         Args:
-            achieved: goals (N, n).
-            desired: goals (N, n).
-            info: of each of the steps; a list of N.
+            achieved: Goals (N, n).
+            desired: Goals (N, n).
+            info: A list of N, one of each step.
 
         Returns:
             float32, (N,).
-
-        Raises:
-            WorkbenchError: if the environment fails, or gives something else.
         """
         with self._running(COMPUTE_REWARD):
             found = self.env.get_wrapper_attr(COMPUTE_REWARD)(achieved, desired, info)
@@ -104,32 +88,20 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         return rewards
 
     def render(self) -> Any:
-        """As the environment's.
-
-        Raises:
-            gymnasium.error.Error: as the environment's.
-            WorkbenchError: if the environment fails otherwise.
-        """
         try:
             return self.env.render()
-        except gymnasium.error.Error:  # who draws says what for
+        except gymnasium.error.Error:  # the caller adds what it draws for
             raise
         except (Exception, SystemExit) as error:
             text = f"{self._id} failed in render(): {error_line(error)}"
             raise EnvironmentFailure(text) from error
 
     def close(self) -> None:
-        """As the environment's.
-
-        Raises:
-            WorkbenchError: if the environment fails.
-        """
         with self._running("close"):
             self.env.close()
 
     @contextmanager
     def _running(self, method: str) -> Iterator[None]:
-        """Whatever it raises ends the training with one line, once what was learned is saved."""
         try:
             yield
         except gymnasium.error.Error as error:  # its text is made for the user
@@ -164,18 +136,17 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
                 f"observation_space {space.shape}"
             )
         if not is_finite:
-            raise self._error(name, array)
+            raise self._not_finite(name, array)
 
-    def _error(self, what: str, value: Any) -> WorkbenchError:
+    def _not_finite(self, what: str, value: Any) -> WorkbenchError:
         text = " ".join(str(value).split())
         return WorkbenchError(f"the {what} of {self._id} isn't finite in float32: {text}")
 
 
-def _beginning(env: gymnasium.Env[Any, Any]) -> Callable[[Any], object]:
-    """What has a step of an environment begin.
+def _begin_method(env: gymnasium.Env[Any, Any]) -> Callable[[Any], object]:
+    """Returns what begins a step of an environment.
 
-    That does nothing where the environment can't, as one in this process, or where a wrapper lies between
-    that may have its steps taken by other actions.
+    It does nothing if the environment can't, or if a wrapper in between might change the actions.
     """
     layer: Any = env
     while isinstance(layer, gymnasium.Wrapper):

@@ -1,9 +1,9 @@
-"""Checkpoints of a training that can be resumed: whole or absent, checked when read.
+"""Checkpoints of a training. A file is either complete or absent, and is checked when it is read.
 
     RUN_DIR/checkpoints/step_000005000.pt   the newest few
-    RUN_DIR/last.pt, RUN_DIR/best.pt        further names of two of them
+    RUN_DIR/last.pt, RUN_DIR/best.pt        the newest, and that of the best evaluation
 
-Each holds everything; `last.pt` is the newest, `best.pt` the one of the best evaluation.
+Each holds everything; the two are further names of numbered ones.
 """
 
 import contextlib
@@ -33,11 +33,11 @@ _MISFITS = (LookupError, TypeError, ValueError, RuntimeError, AttributeError, Ar
 
 
 class Checkpoints:
-    """Writes the checkpoints of one run, while its folder is the one in which the run began.
+    """Writes the checkpoints of one run.
 
     Args:
-        run: the run's folder.
-        keep: how many of the newest stay; 0: all.
+        run: The run folder.
+        keep: How many of the newest to keep; 0 keeps all.
     """
 
     def __init__(self, run: Path, keep: int) -> None:
@@ -46,27 +46,27 @@ class Checkpoints:
         self._place = run.stat()
 
     def are_in_place(self) -> bool:
-        """Whether the folder is still where it was."""
+        """Returns whether the run folder is still where it was."""
         try:
             return os.path.samestat(self._run.stat(), self._place)
         except FileNotFoundError:
             return False
 
     def check_place(self) -> None:
-        """Another run may lie there by now, which is not to be written over.
+        """Checks the run folder: another run may be in its place by now, which mustn't be overwritten.
 
         Raises:
-            OSError: if the folder isn't the one in which the training began.
+            OSError: If the folder isn't the one in which the training began.
         """
         if not self.are_in_place():
             moved = "the folder was moved or removed"
             raise FileNotFoundError(errno.ENOENT, moved, str(self._run))
 
     def save(self, step: int, content: dict[str, Any], best: bool = False) -> Path:
-        """Writes a checkpoint, and makes it the last one and, if so told, the best one.
+        """Writes a checkpoint as the last one, and also as the best one if `best`; returns its path.
 
         Raises:
-            OSError: if the disk refuses, or it is another folder; the earlier checkpoints are untouched.
+            OSError: If it can't be written. The earlier checkpoints are untouched.
         """
         self.check_place()
         path = self._run / FOLDER / f"step_{step:09d}.pt"
@@ -82,9 +82,9 @@ class Checkpoints:
         return path
 
     def save_failure(self, content: dict[str, Any]) -> None:
-        """Writes `failure.pt`: what was learned until something failed, in the midst of a step.
+        """Writes `failure.pt`: what was learned until something failed in the middle of a step.
 
-        No training goes on from it: from `last.pt` it comes to the same place again, exactly.
+        Nothing resumes from it: from `last.pt` a training gets to the same place again, exactly.
         """
         path = self._run / FAILURE
         with contextlib.suppress(OSError):  # a full disk may well be the failure
@@ -92,10 +92,10 @@ class Checkpoints:
             save_tensors(path, {"format": FORMAT, **content})
 
     def remove_leftovers(self) -> None:
-        """Removes what a training that was killed had begun to write; nobody else may write.
+        """Removes what a killed training had begun to write. Nobody else may be writing.
 
         Raises:
-            OSError: if the disk refuses.
+            OSError: If a file can't be removed.
         """
         for folder in (self._run, self._run / FOLDER):
             for pattern in LEFTOVERS:
@@ -104,7 +104,7 @@ class Checkpoints:
 
 
 def give_name(path: Path, name: Path) -> None:
-    """Gives a file a second name, in one step; a copy where the disk knows no second names."""
+    """Gives a file a second name in one step; a copy where the file system has no hard links."""
     temporary = name.with_name(f".{name.name}.new")
     temporary.unlink(missing_ok=True)
     try:
@@ -115,19 +115,19 @@ def give_name(path: Path, name: Path) -> None:
 
 
 def _numbered(run: Path) -> list[Path]:
-    """The checkpoints of a run by number, the newest first."""
+    """Returns the numbered checkpoints of a run, the newest first."""
     paths = (run / FOLDER).glob("step_*.pt")
     return sorted(paths, key=lambda path: (len(path.name), path.name), reverse=True)
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Reads one checkpoint into main memory, safely: it can't run code.
+    """Reads a checkpoint into main memory. A foreign file can't run code.
 
     Raises:
-        WorkbenchError: if there is none, or it is damaged or something else.
+        WorkbenchError: If there is none, or it is damaged or something else.
     """
     try:
-        # torch doesn't look at the check sums of a file that it reads.
+        # torch doesn't verify the checksums of a file that it reads.
         with open_file(path) as file:
             with zipfile.ZipFile(file) as archive:
                 bad = archive.testzip()
@@ -140,19 +140,19 @@ def read(path: Path) -> dict[str, Any]:
     except _DAMAGED as error:
         raise WorkbenchError(f"{path} is damaged, or no checkpoint") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise WorkbenchError(f"{path} is no checkpoint of this version")
+        raise WorkbenchError(f"{path} is no checkpoint of a training")
     return content
 
 
 @contextlib.contextmanager
 def fitting(what: str) -> Iterator[None]:
-    """Tells in one line if what is taken over from a checkpoint doesn't fit.
+    """Turns errors into one line while something is loaded from a checkpoint.
 
     Args:
-        what: is taken over, for the error.
+        what: Is loaded, for the error.
 
     Raises:
-        WorkbenchError: if it doesn't.
+        WorkbenchError: If it doesn't fit.
     """
     try:
         yield
@@ -162,10 +162,10 @@ def fitting(what: str) -> Iterator[None]:
 
 
 def read_newest(run: Path, say: Callable[[str], None]) -> dict[str, Any]:
-    """The last checkpoint, or the newest before it that can be read; says what is passed over.
+    """Reads the last checkpoint, or the newest before it that is readable; reports what it skips.
 
     Raises:
-        WorkbenchError: if there is none.
+        WorkbenchError: If there is none.
     """
     for path in candidates(run):
         try:
@@ -176,10 +176,10 @@ def read_newest(run: Path, say: Callable[[str], None]) -> dict[str, Any]:
 
 
 def candidates(run: Path, best_first: bool = False) -> list[Path]:
-    """Checkpoints in the order in which to try them; each file once, whatever its names.
+    """Returns checkpoints in the order in which to try them, each file once.
 
-    That is last.pt, the numbered ones from the newest on, and best.pt at the end or, if so told,
-    at the beginning.
+    That is last.pt, the numbered ones from the newest on, and best.pt at the end or, with `best_first`, at
+    the start.
     """
     best, others = [run / BEST], [run / LAST, *_numbered(run)]
     found: dict[tuple[int, int], Path] = {}

@@ -1,4 +1,4 @@
-"""DQN at work: one step of the environment at a time, and what follows from it."""
+"""DQN in our frame: one step of the environment at a time, and what follows from it."""
 
 from typing import Any
 
@@ -21,17 +21,17 @@ from rl_workbench.training.repeatable import RepeatableEnvironment
 
 
 def make(options: TrainingOptions) -> "DQNTraining":
-    """A new training; see `make_algorithm`."""
+    """Makes a new training; see `make_algorithm`."""
     return in_its_environments(
         options, lambda envs: DQNTraining(options, envs[0], make_agent(options, envs[0]))
     )
 
 
 def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> DQNAgent:
-    """A new agent for an environment.
+    """Makes a new agent for an environment.
 
     Raises:
-        WorkbenchError: if the environment's actions don't suit DQN, or torch lacks the device.
+        WorkbenchError: If the environment's actions don't suit DQN, or torch lacks the device.
     """
     run = options.run
     actions = discrete_actions(env, run.env_id, "DQN")
@@ -46,7 +46,7 @@ def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> DQNAge
 def load_policy(
     options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
 ) -> Policy:
-    """The policy of a checkpoint; see `policy.load_policy`."""
+    """Makes the policy of a checkpoint; see `algorithm.load_policy`."""
     agent = make_agent(options, env)
     agent.load_policy_state(content)
 
@@ -62,9 +62,9 @@ class DQNTraining(Algorithm):
     """Steps the environment and lets the agent learn.
 
     Args:
-        options: what the user chose.
-        env: is learned in.
-        agent: it counts the steps.
+        options: What the user chose.
+        env: The environment to learn in.
+        agent: It counts the steps.
     """
 
     def __init__(
@@ -72,38 +72,34 @@ class DQNTraining(Algorithm):
     ) -> None:
         self.env, self._agent = env, agent
         self._seed, self._log_frequency = options.run.seed, options.run.log_frequency
-        self._place = RepeatableEnvironment(env)
-        self._observation: np.ndarray | None = None  # None: an episode has to be begun
+        self._repeatable = RepeatableEnvironment(env)
+        self._observation: np.ndarray | None = None  # None: the next step begins an episode
         self._reward = 0.0  # of the episode so far
         self._last: Learned | None = None
 
     @property
     def steps(self) -> int:
-        """See `Algorithm.steps`."""
         return self._agent.steps
 
     def act_greedily(self, observation: np.ndarray) -> int:
-        """See `Algorithm.act_greedily`."""
         return self._agent.act_greedily(observation)
 
     def learn(self, frame: Frame) -> None:
-        """See `Algorithm.learn`."""
         while not frame.is_over():
             self._step(frame)
             if self._last is not None and self.steps % self._log_frequency == 0:
-                frame.log.add(
-                    self.steps,
-                    {"losses/td_loss": self._last.td_loss, "losses/q_values": self._last.q_values},
-                )
+                td_loss, q_values = self._last
+                losses = {"losses/td_loss": td_loss, "losses/q_values": q_values}
+                frame.log.add(self.steps, losses)
             frame.step_done()
 
     def _step(self, frame: Frame) -> None:
-        agent, place = self._agent, self._place
+        agent, env = self._agent, self._repeatable
         observation = self._observation
         if observation is None:
-            observation = as_vector(place.reset()[0])
+            observation = as_vector(env.reset()[0])
         action = agent.act(observation)
-        seen, reward, terminated, truncated, info = place.step(action)
+        seen, reward, terminated, truncated, info = env.step(action)
         following, reward = as_vector(seen), float(reward)
         self._reward += reward
         agent.observe((observation, action, reward), following, bool(terminated), bool(truncated))
@@ -114,30 +110,27 @@ class DQNTraining(Algorithm):
             agent.episode_done()
             total, self._reward, self._observation = self._reward, 0.0, None
             scalars, note = {"charts/epsilon": agent.epsilon}, f"ε: {agent.epsilon:.3f}"
-            frame.episode_done(total, place.length, scalars, note, succeeded(info))
+            frame.episode_done(total, env.length, scalars, note, succeeded(info))
 
     def state_dict(self) -> dict[str, Any]:
-        """See `Algorithm.state_dict`."""
         return self._agent.state_dict()
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """See `Algorithm.load_state_dict`."""
         with fitting("agent"):
             self._agent.load_state_dict(state)
 
     def environment_state(self) -> dict[str, Any]:
-        """The episode under way, if there is one, the generator, and the last loss."""
+        """Returns the episode under way, if there is one, the generator, and the last loss."""
         under_way = self._observation is not None
         return {
-            "episode": self._place.state_dict() if under_way else None,
-            "generator": self._place.generator,
+            "episode": self._repeatable.state_dict() if under_way else None,
+            "generator": self._repeatable.generator,
             "reward": self._reward,
             "last": None if self._last is None else list(self._last),
         }
 
     def start_environment(self, state: dict[str, Any] | None, say: Say) -> None:
-        """See `Algorithm.start_environment`."""
-        self._place.reset(seed=self._seed)  # the episodes' own resets go on from here
+        self._repeatable.reset(seed=self._seed)  # the resets of the episodes continue from here
         if state is not None:
             self.restore_environment(state, say)
 
@@ -145,10 +138,10 @@ class DQNTraining(Algorithm):
         """Repeats the episode under way; says so if it goes another way."""
         last = state["last"]
         self._last = None if last is None else Learned(*map(number, sequence(last, 2)))
-        self._place.generator = state["generator"]
+        self._repeatable.generator = state["generator"]
         if state["episode"] is None:
             return
-        self._observation = self._place.load_state_dict(state["episode"])
+        self._observation = self._repeatable.load_state_dict(state["episode"])
         self._reward = number(state["reward"])
         if self._observation is None:
             say("the environment doesn't repeat itself: the episode under way is given up")

@@ -1,135 +1,24 @@
-"""Where the episodes come from that a policy gradient learns from: rounds of one from each environment."""
+"""Whole episodes to learn from: rounds of one from each environment."""
 
 from collections.abc import Callable, Generator, Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium
 import numpy as np
 
 from rl_workbench.agents.document import Episode, PolicyGradientAgent
 from rl_workbench.agents.reinforce import ReinforceAgent
+from rl_workbench.states import sequence, set_generator
 from rl_workbench.training.checked import BEGIN_STEP
 from rl_workbench.training.environments import as_vector, close_all, succeeded
-from rl_workbench.training.generators import EpisodeGenerators, action_generator
+from rl_workbench.training.generators import (
+    generator_state,
+    mark_random_states,
+    rewind_random_states,
+)
 
 Agent = PolicyGradientAgent | ReinforceAgent
-
-
-class EpisodeSource(Protocol):
-    """N environments, in which the same policy plays a whole episode each.
-
-    The environment i is seeded by the training's seed + i, and its actions are drawn by a generator of its
-    own (`action_generator`; the agent's for the first one). So what an episode comes to depends on weights
-    and generators only, wherever it is played, and in whatever order they end.
-    """
-
-    def seed(self) -> None:
-        """Seeds all environments, before their first episode.
-
-        Raises:
-            WorkbenchError: if one fails, with its number if there are several.
-        """
-        ...
-
-    def collect(self, should_stop: Callable[[], bool]) -> list[Episode] | None:
-        """One episode from each environment, all by the agent's policy as it is now.
-
-        Args:
-            should_stop: is asked again and again, while episodes are played.
-
-        Returns:
-            The episodes in the order of the environments; None if `should_stop()` became true.
-
-        Raises:
-            WorkbenchError: as `seed`.
-        """
-        ...
-
-    def mark(self) -> None:
-        """Remembers where all generators are."""
-        ...
-
-    def rewind(self) -> None:
-        """Brings them back to where `mark` found them: what was drawn since then is taken back."""
-        ...
-
-    def state(self) -> Any:
-        """Where the generators are, but for the agent's own, as plain values.
-
-        That of N environments is the same, whatever source they are of: see `EpisodeGenerators.state`.
-        """
-        ...
-
-    def load_state(self, state: Any) -> None:
-        """Takes over what `state` gave.
-
-        Raises:
-            TypeError, ValueError, LookupError: if it gave something else.
-        """
-        ...
-
-    def close(self) -> None:
-        """Closes all environments."""
-        ...
-
-
-class LocalEpisodes:
-    """Environments in this process: a step of each in turn.
-
-    Where a step's work is done elsewhere, as in simulators, it is done for all of them at the same time.
-
-    Args:
-        envs: each with a robot of its own.
-        agent: plays in them.
-        seed: of the training.
-    """
-
-    def __init__(self, envs: Sequence[gymnasium.Env[Any, Any]], agent: Agent, seed: int) -> None:
-        self._envs, self._agent, self._seed = envs, agent, seed
-        others = [action_generator(seed, index) for index in range(1, len(envs))]
-        self._actions = [agent.generator, *others]
-        self._generators = EpisodeGenerators(envs, self._actions)
-
-    def seed(self) -> None:
-        """See `EpisodeSource`."""
-        for index, env in enumerate(self._envs):
-            env.reset(seed=self._seed + index)
-
-    def collect(self, should_stop: Callable[[], bool]) -> list[Episode] | None:
-        """See `EpisodeSource`."""
-        agent = self._agent
-        playing = [
-            play(env, partial(agent.draw, generator=generator), agent.limited, begin)
-            for env, generator, begin in zip(self._envs, self._actions, self._begins(), strict=True)
-        ]
-        return play_all(playing, should_stop)
-
-    def _begins(self) -> list[Callable[[Any], object]]:
-        """What has a step begin in each; nothing in a single one, which nobody else is waited for with."""
-        if len(self._envs) == 1:
-            return [lambda action: None]
-        return [env.get_wrapper_attr(BEGIN_STEP) for env in self._envs]
-
-    def mark(self) -> None:
-        """See `EpisodeSource`."""
-        self._generators.mark()
-
-    def rewind(self) -> None:
-        """See `EpisodeSource`."""
-        self._generators.rewind()
-
-    def state(self) -> Any:
-        """See `EpisodeSource`."""
-        return self._generators.state()
-
-    def load_state(self, state: Any) -> None:
-        """See `EpisodeSource`."""
-        self._generators.load_state(state)
-
-    def close(self) -> None:
-        """See `EpisodeSource`."""
-        close_all(self._envs)
 
 
 def play(
@@ -138,13 +27,13 @@ def play(
     limited: Callable[[Any], Any] = lambda action: action,
     begin: Callable[[Any], object] = lambda action: None,
 ) -> Generator[None, None, Episode]:
-    """Plays one episode; stops before each step, so that others can be played meanwhile.
+    """Plays one episode. It yields before each step, so that others can be played meanwhile.
 
     Args:
-        env: was seeded before.
-        act: draws an action for an observation (D,), float32.
-        limited: makes of an action that was drawn the one that the environment takes.
-        begin: has the step by such an action begin, before this stops.
+        env: It was seeded before.
+        act: Draws an action for an observation (D,), float32.
+        limited: Returns the action that the environment takes for one that was drawn.
+        begin: Begins a step, before this yields.
 
     Returns:
         The episode.
@@ -172,11 +61,11 @@ def play_all(
     """Plays several episodes at the same time, a step of each in turn, until all have ended.
 
     Args:
-        playing: what `play` gave, of environments of their own.
-        should_stop: is asked before each step.
+        playing: What `play` returned, each of an environment of its own.
+        should_stop: Called before each step.
 
     Returns:
-        The episodes, in their order, or None if they were broken off because `should_stop()` became true.
+        The episodes in their order; None if `should_stop()` became true.
     """
     episodes: dict[int, Episode] = {}
     for each in playing:
@@ -194,12 +83,95 @@ def play_all(
     return [episodes[index] for index in range(len(playing))]
 
 
-def run_episode(
-    env: gymnasium.Env[Any, Any],
-    act: Callable[[np.ndarray], Any],
-    should_stop: Callable[[], bool],
-    limited: Callable[[Any], Any] = lambda action: action,
-) -> Episode | None:
-    """Runs one episode alone; see `play` and `play_all`."""
-    episodes = play_all([play(env, act, limited)], should_stop)
-    return None if episodes is None else episodes[0]
+class EpisodeSource:
+    """N environments, in each of which the same policy plays a whole episode.
+
+    Environment i is seeded with the training's seed + i, and a generator of its own draws its actions (the
+    agent's own for the first). So an episode depends on weights and generators only, not on the order in
+    which episodes end. Where a step takes time in another process, all steps run at the same time.
+
+    An episode that is interrupted has drawn from the generators, but nothing was learned from it. `rewind`
+    takes its draws back, so that it can be played again as it would have been.
+
+    Args:
+        envs: Each moves a robot of its own.
+        agent: Plays in them.
+        seed: Of the training.
+    """
+
+    def __init__(self, envs: Sequence[gymnasium.Env[Any, Any]], agent: Agent, seed: int) -> None:
+        self._envs, self._agent, self._seed = envs, agent, seed
+        others = [np.random.default_rng((seed, index)) for index in range(1, len(envs))]
+        self._actions = [agent.generator, *others]
+
+    def seed(self) -> None:
+        """Seeds all environments, before their first episode.
+
+        Raises:
+            WorkbenchError: If one fails.
+        """
+        for index, env in enumerate(self._envs):
+            env.reset(seed=self._seed + index)
+
+    def collect(self, should_stop: Callable[[], bool]) -> list[Episode] | None:
+        """Plays one episode in each environment, all by the agent's present policy.
+
+        Args:
+            should_stop: Called before each step.
+
+        Returns:
+            The episodes in the order of the environments; None if `should_stop()` became true.
+
+        Raises:
+            WorkbenchError: If an environment fails.
+        """
+        agent = self._agent
+        # Nobody else waits while a single environment takes its step.
+        begins: list[Callable[[Any], object]] = [lambda action: None]
+        if len(self._envs) > 1:
+            begins = [env.get_wrapper_attr(BEGIN_STEP) for env in self._envs]
+        playing = [
+            play(env, partial(agent.draw, generator=generator), agent.limited, begin)
+            for env, generator, begin in zip(self._envs, self._actions, begins, strict=True)
+        ]
+        return play_all(playing, should_stop)
+
+    def _generators(self) -> list[np.random.Generator]:
+        # An environment has another generator after each seeding.
+        return [*(each.unwrapped.np_random for each in self._envs), *self._actions]
+
+    def mark(self) -> None:
+        """Remembers where all generators are."""
+        self._process = mark_random_states()
+        self._states = [each.bit_generator.state for each in self._generators()]
+
+    def rewind(self) -> None:
+        """Brings the generators back to where `mark` found them."""
+        rewind_random_states(self._process)
+        for generator, state in zip(self._generators(), self._states, strict=True):
+            generator.bit_generator.state = state
+
+    def state(self) -> Any:
+        """Returns the states of all generators but the agent's own: of one environment, or in lists."""
+        environments = [generator_state(each.unwrapped.np_random) for each in self._envs]
+        actions = [generator_state(each) for each in self._actions[1:]]
+        return {"environments": environments, "actions": actions} if actions else environments[0]
+
+    def load_state(self, state: Any) -> None:
+        """Loads what `state` returned.
+
+        Raises:
+            TypeError, ValueError, LookupError: If it is something else.
+        """
+        count = len(self._envs)
+        texts = [state]
+        if count > 1:
+            texts = sequence(state["environments"], count) + sequence(state["actions"], count - 1)
+        generators = self._generators()
+        del generators[count]  # the agent's own
+        for generator, text in zip(generators, texts, strict=True):
+            set_generator(generator, text)
+
+    def close(self) -> None:
+        """Closes all environments."""
+        close_all(self._envs)

@@ -1,4 +1,4 @@
-"""What a policy is worth: greedy episodes that leave nothing behind in the training."""
+"""Evaluates policies by greedy episodes, without any effect on the training."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,11 +19,11 @@ EVALUATION_SEED = 1_000_000  # added to the training's: other episodes than thos
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Lengths [steps], undiscounted returns and successes, one for each episode."""
+    """Lengths [steps], undiscounted returns and successes of episodes."""
 
     lengths: list[int]
     returns: list[float]
-    successes: list[bool] = field(default_factory=list)  # of those that say whether they are one
+    successes: list[bool] = field(default_factory=list)  # of the episodes that say so
 
     @property
     def mean_length(self) -> float:
@@ -35,7 +35,7 @@ class Evaluation:
 
     @property
     def success_rate(self) -> float | None:
-        """Between 0 and 1; None if no episode says."""
+        """Between 0 and 1; None if no episode says so."""
         return float(np.mean(self.successes)) if self.successes else None
 
 
@@ -46,7 +46,7 @@ def run_greedily(
     episodes: int,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Evaluation | None:
-    """Runs episodes in any environment, seeded once; None if told to stop."""
+    """Plays episodes in an environment that is seeded once; None if `should_stop()` became true."""
     found = Evaluation([], [])
     for index in range(episodes):
         observation, _ = env.reset(seed=seed if index == 0 else None)
@@ -77,17 +77,16 @@ class Score(NamedTuple):
 class Evaluator:
     """Evaluates an algorithm's policy, in an environment of its own wherever there can be one.
 
-    Over ROS there is one robot in one simulator: an evaluation there moves the training's, which
-    is brought back to where it was afterwards.
+    If all environments share one robot, an evaluation moves the training's, which is brought back afterwards.
 
     Args:
-        options: how many episodes, in which environment, from which seed.
-        algorithm: acts greedily.
-        should_stop: is asked before each step.
-        say: is told if there can be no second environment.
+        options: Of the training.
+        algorithm: Acts greedily.
+        should_stop: Called before each step.
+        say: Called if there can be no second environment.
 
     Raises:
-        WorkbenchError: if the second environment can't be made, and has to be another one.
+        WorkbenchError: If the second environment can't be made but must differ from the training's.
     """
 
     def __init__(
@@ -113,18 +112,18 @@ class Evaluator:
                 )
 
     def evaluate(self, best: float, say: Say, is_last: bool = False) -> Score | None:
-        """Runs greedy episodes; None if interrupted.
+        """Plays greedy episodes; None if interrupted.
 
-        A policy that is perfect in ten episodes may well fall in the next ninety: one that seems
-        to be the best so far is confirmed over more, if the options say so.
+        A policy that is perfect in ten episodes may well fail in the next ninety. So one that seems to be the
+        best so far is confirmed over `confirm_episodes`.
 
         Args:
-            best: mean return of the best policy so far.
-            say: is told if the episode under way can't be brought back.
-            is_last: there is no episode under way that would have to be.
+            best: The mean return of the best policy so far.
+            say: Called if the episode under way can't be brought back.
+            is_last: Whether the training is over, so that no episode has to be brought back.
 
         Raises:
-            WorkbenchError: if the environment fails, or the policy isn't one any more.
+            WorkbenchError: If the environment fails, or the weights aren't finite.
         """
         self._algorithm.check_weights()
         with self._undisturbed(say, is_last):
@@ -138,7 +137,7 @@ class Evaluator:
 
     @contextmanager
     def _undisturbed(self, say: Say, is_last: bool) -> Iterator[None]:
-        """What is done inside is forgotten afterwards, also by generators that all share."""
+        """Undoes what happens inside, also in the generators of the process."""
         must_return = self._is_guest and not is_last
         place = self._algorithm.leave_environment() if must_return else None
         states = random_states()
@@ -153,6 +152,6 @@ class Evaluator:
         return run_greedily(self._env, act, seed, episodes, self._should_stop)
 
     def close(self) -> None:
-        """Closes the environment, if it is this one's own."""
+        """Closes the environment, unless it is the algorithm's."""
         if self._env is not self._algorithm.env:
             self._env.close()

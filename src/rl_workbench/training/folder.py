@@ -1,8 +1,6 @@
-"""The folder of one run: its name, who holds it, and the versions that write in it."""
+"""The folder of one run: its name, its lock, and config.json with the versions that wrote it."""
 
 import contextlib
-import fcntl
-import os
 import platform
 import shlex
 import sys
@@ -11,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from files.locks import is_locked, locked_folder
 from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.storage import CONFIG_RECORD, as_json, read_record, write_atomically
@@ -21,14 +20,13 @@ LIBRARIES = ("python", "numpy", "torch", "gymnasium", EXTRA)  # a training's bit
 
 @contextlib.contextmanager
 def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]:
-    """A new run's folder, held: the one given, or runs/{env}__{experiment}__{seed}__{time}.
+    """Makes and locks a new run's folder: the one given, or runs/{env}__{experiment}__{seed}__{time}.
 
-    Slashes and colons of the names become hyphens there. Whoever makes a folder and can't begin
-    leaves none behind; who comes second leaves the first one's alone.
+    A training that makes a folder and can't begin removes it again.
 
     Raises:
-        WorkbenchError: if the folder holds something already, another training runs in it, or it
-            can't be made or written to.
+        WorkbenchError: If the folder isn't empty, another training runs in it, or it can't be made or
+            written to.
     """
     name = as_file_name(f"{env}__{experiment}__{seed}__{int(time.time())}")
     folder = Path(run_dir or Path("runs") / name)
@@ -36,7 +34,7 @@ def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]
         if run_dir:
             _make(folder)
         else:
-            folder = _fresh(folder)
+            folder = _make_new(folder)
     except OSError as error:
         raise _no_place(folder, error) from error
     with held(folder):
@@ -49,14 +47,25 @@ def opened(run_dir: str, env: str, experiment: str, seed: int) -> Iterator[Path]
 
 
 def _make(folder: Path) -> None:
-    """Makes it, if it isn't there; also where somebody who can't begin removes it in the same moment."""
     while True:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             return
-        except FileExistsError:  # it was there, and then it was no folder
+        except FileExistsError:  # somebody who can't begin may have removed it in this moment
             if folder.exists():
                 raise
+
+
+def _make_new(wanted: Path) -> Path:
+    """Makes a folder; two runs of one second get two."""
+    wanted.parent.mkdir(parents=True, exist_ok=True)
+    folder, number = wanted, 2
+    while True:
+        try:
+            folder.mkdir()
+            return folder
+        except FileExistsError:
+            folder, number = wanted.with_name(f"{wanted.name}_{number}"), number + 1
 
 
 def _check_empty(folder: Path) -> None:
@@ -79,79 +88,33 @@ def _no_place(folder: Path, error: OSError) -> WorkbenchError:
 
 @contextlib.contextmanager
 def held(folder: Path, holder: str = "a training") -> Iterator[None]:
-    """Keeps a second training out of a run's folder; the lock ends with the process.
+    """Keeps a second training out of a run's folder. The lock ends with the process.
 
     Args:
-        holder: what may hold it, for the error.
+        folder: Of the run.
+        holder: What may hold it, for the error.
 
     Raises:
-        WorkbenchError: if another process holds it, or there is no such folder.
+        WorkbenchError: If another process holds it, or there is no such folder.
     """
-    try:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError as error:
-        raise WorkbenchError(f"{folder} is no run folder: {error.strerror}") from error
-    try:
+    with contextlib.ExitStack() as holding:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            holding.enter_context(locked_folder(folder, wait=False))
         except BlockingIOError as error:
             raise WorkbenchError(f"{holder} is running in {folder}") from error
-        if not _is_at(descriptor, folder):  # its last holder has removed it meanwhile
-            raise WorkbenchError(f"{folder} is no run folder: it was removed just now")
+        except OSError as error:
+            reason = error.strerror or "it was removed just now"
+            raise WorkbenchError(f"{folder} is no run folder: {reason}") from error
         yield
-    finally:
-        os.close(descriptor)
 
 
 def is_held(folder: Path) -> bool:
-    """Whether a training runs in a folder. One that begins in this very moment may be refused: ask seldom."""
-    try:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(descriptor)
-    return False
-
-
-def _is_at(descriptor: int, folder: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(descriptor), folder.stat())
-    except FileNotFoundError:
-        return False
-
-
-def _fresh(wanted: Path) -> Path:
-    """Makes a folder; two runs of one second get two."""
-    wanted.parent.mkdir(parents=True, exist_ok=True)
-    folder, number = wanted, 2
-    while True:
-        try:
-            folder.mkdir()
-            return folder
-        except FileExistsError:
-            folder, number = wanted.with_name(f"{wanted.name}_{number}"), number + 1
-
-
-def other_versions(before: Any) -> str:
-    """Where those that a training began with aren't those of now; empty if they are the same.
-
-    Args:
-        before: what `versions` gave then; no training depends on it, so it may be damaged.
-    """
-    if not isinstance(before, dict):
-        return ""
-    now = versions()
-    names = [name for name in LIBRARIES if name in before and before[name] != now.get(name)]
-    return ", ".join(f"{name} {before[name]} is now {now.get(name)}" for name in names)
+    """Returns whether a training runs in a folder."""
+    return folder.is_dir() and is_locked(folder)
 
 
 def versions() -> dict[str, str]:
-    """What the figures depend on: interpreter, libraries, machine, the command."""
+    """Returns what the figures depend on: interpreter, libraries, machine, the command."""
     import gymnasium
     import numpy
     import torch
@@ -167,12 +130,25 @@ def versions() -> dict[str, str]:
     }
 
 
+def other_versions(before: Any) -> str:
+    """Returns how the versions of now differ from those at a training's start; empty if they don't.
+
+    Args:
+        before: What `versions` returned then. It may be damaged, since no training depends on it.
+    """
+    if not isinstance(before, dict):
+        return ""
+    now = versions()
+    names = [name for name in LIBRARIES if name in before and before[name] != now.get(name)]
+    return ", ".join(f"{name} {before[name]} is now {now.get(name)}" for name in names)
+
+
 def write_record(folder: Path, config: dict[str, Any], resumed: bool) -> None:
-    """Writes it; of a resumed training, whose length may be new, versions and begin stay.
+    """Writes config.json. A resumed training keeps its versions and its start.
 
     Raises:
-        OSError: if the disk refuses.
-        WorkbenchError: if the record of a resumed training is damaged.
+        OSError: If it can't be written.
+        WorkbenchError: If the record of a resumed training is damaged.
     """
     record: dict[str, Any] = {"versions": versions(), "began": time.time()}
     if resumed:

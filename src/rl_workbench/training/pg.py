@@ -1,4 +1,4 @@
-"""A policy gradient at work: run an episode, learn from it."""
+"""Policy gradients in our frame: play a round of episodes, learn from it."""
 
 from pathlib import Path
 from typing import Any
@@ -15,16 +15,31 @@ from rl_workbench.states import whole
 from rl_workbench.storage import save_tensors
 from rl_workbench.training.algorithm import Algorithm, Frame, Policy, Say
 from rl_workbench.training.checkpoints import fitting
-from rl_workbench.training.environments import discrete_actions, in_its_environments, is_continuous
-from rl_workbench.training.episodes import Agent, EpisodeSource, LocalEpisodes
+from rl_workbench.training.environments import (
+    discrete_actions,
+    in_its_environments,
+    is_continuous,
+)
+from rl_workbench.training.episodes import Agent, EpisodeSource
 from rl_workbench.training.options import TrainingOptions
 
 
+def make(options: TrainingOptions) -> "PolicyGradientTraining":
+    """Makes a new training; see `make_algorithm`."""
+
+    def learning_in(envs: list[gymnasium.Env[Any, Any]]) -> PolicyGradientTraining:
+        agent = make_agent(options, envs[0])
+        source = EpisodeSource(envs, agent, options.run.seed)
+        return PolicyGradientTraining(options, envs[0], agent, source)
+
+    return in_its_environments(options, learning_in)
+
+
 def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
-    """A new agent for an environment.
+    """Makes a new agent for an environment.
 
     Raises:
-        WorkbenchError: if the environment doesn't suit it; says what does.
+        WorkbenchError: If the environment doesn't suit it. The text says what does.
     """
     run, settings = options.run, options.hyperparameters
     (size,) = env.observation_space.shape or (0,)
@@ -52,17 +67,16 @@ def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> Agent:
 def load_policy(
     options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
 ) -> Policy:
-    """The policy of a checkpoint; see `policy.load_policy`."""
+    """Makes the policy of a checkpoint; see `algorithm.load_policy`."""
     agent = make_agent(options, env)
     agent.load_state_dict(content["agent"])
     network = agent.greedy_network()
     if is_continuous(env.action_space):
-        return Policy(
-            agent.act_greedily,
-            lambda seen: np.array([np.ravel(agent.act_greedily(each))[0] for each in seen]),
-            "action",
-            network,
-        )
+
+        def first_action(seen: np.ndarray) -> np.ndarray:
+            return np.array([np.ravel(agent.act_greedily(each))[0] for each in seen])
+
+        return Policy(agent.act_greedily, first_action, "action", network)
 
     def preference(observations: np.ndarray) -> np.ndarray:
         found = [agent.probabilities(each) for each in observations]
@@ -72,13 +86,13 @@ def load_policy(
 
 
 class PolicyGradientTraining(Algorithm):
-    """Runs episodes and learns from each, in rounds of one from each environment; saved between two rounds.
+    """Learns from rounds of one episode from each environment. It can be saved between two rounds.
 
     Args:
-        options: what the user chose.
-        env: of the kind that is learned in; evaluations take place there, where there is no other.
-        agent: acts and learns.
-        source: of the episodes.
+        options: What the user chose.
+        env: The first environment; evaluations take place there if there is no other.
+        agent: Acts and learns.
+        source: Plays the episodes.
     """
 
     def __init__(
@@ -94,20 +108,16 @@ class PolicyGradientTraining(Algorithm):
 
     @property
     def steps(self) -> int:
-        """See `Algorithm.steps`."""
         return self._steps
 
     @property
     def stride(self) -> int:
-        """The lengths of the last round's episodes together."""
         return self._stride
 
     def act_greedily(self, observation: np.ndarray) -> Any:
-        """See `Algorithm.act_greedily`."""
         return self._agent.act_greedily(observation)
 
     def learn(self, frame: Frame) -> None:
-        """See `Algorithm.learn`."""
         self._source.mark()
         while not frame.is_over():
             episodes = self._source.collect(frame.is_interrupted)
@@ -116,13 +126,13 @@ class PolicyGradientTraining(Algorithm):
             losses = self._agent.learn(*episodes)
             self._stride = 0
             for episode in episodes:
-                self._take_down(episode, losses if episode is episodes[-1] else None, frame)
+                # A batch ends with the last episode of a round, which has its losses.
+                self._record(episode, losses if episode is episodes[-1] else None, frame)
             self._source.mark()
             frame.step_done()
         self._source.rewind()
 
-    def _take_down(self, episode: Episode, losses: Losses | None, frame: Frame) -> None:
-        """Of a round, the last episode has the losses: batches end with it."""
+    def _record(self, episode: Episode, losses: Losses | None, frame: Frame) -> None:
         self._steps += episode.length
         self._stride += episode.length
         by_episode = {"Reward": episode.total_reward}  # the tags of the existing script
@@ -132,21 +142,14 @@ class PolicyGradientTraining(Algorithm):
             by_step = {"losses/value_loss": losses.value, "losses/policy_loss": losses.policy}
         frame.log.add(self._episodes, by_episode)
         frame.episode_done(episode.total_reward, episode.length, by_step, success=episode.success)
-        self._save_networks_if_due(frame.folder)
+        if self._save_every and self._episodes % self._save_every == 0:
+            self.export(frame.folder, f"_episode_{self._episodes}")
         self._episodes += 1
 
-    def _save_networks_if_due(self, folder: Path) -> None:
-        if self._save_every and self._episodes % self._save_every == 0:
-            self._save_networks(folder, f"_episode_{self._episodes}")
-
-    def _save_networks(self, folder: Path, suffix: str = "") -> None:
+    def export(self, folder: Path, suffix: str = "") -> None:
         networks = {"policy_network": self._agent.policy, "value_network": self._agent.value}
         for name, network in networks.items():
             save_tensors(folder / f"{name}{suffix}.pth", network.state_dict())
-
-    def export(self, folder: Path) -> None:
-        """Writes policy_network.pth and value_network.pth."""
-        self._save_networks(folder)
 
     def settle(self) -> bool:
         """Takes back the draws of the round that failed."""
@@ -154,7 +157,6 @@ class PolicyGradientTraining(Algorithm):
         return True
 
     def state_dict(self) -> dict[str, Any]:
-        """See `Algorithm.state_dict`."""
         return {
             "agent": self._agent.state_dict(),
             "episodes": self._episodes,
@@ -162,38 +164,23 @@ class PolicyGradientTraining(Algorithm):
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """See `Algorithm.load_state_dict`."""
         with fitting("agent"):
             self._agent.load_state_dict(state["agent"])
             self._episodes, self._stride = whole(state["episodes"]), whole(state["stride"])
             self._steps = whole(state["steps"])
 
     def environment_state(self) -> Any:
-        """The states of the environments' generators; there is no episode under way."""
+        """Returns the states of the environments' generators. No episode is under way."""
         return self._source.state()
 
     def start_environment(self, state: Any, say: Say) -> None:
-        """See `Algorithm.start_environment`."""
-        self._source.seed()  # the episodes' own resets go on from here
+        self._source.seed()  # the resets of the episodes continue from here
         if state is not None:
             self._source.load_state(state)
         self._source.mark()
 
     def restore_environment(self, state: Any, say: Say) -> None:
-        """See `Algorithm.restore_environment`; the next episode begins with a reset anyway."""
-        self._source.load_state(state)
+        self._source.load_state(state)  # the next episode begins with a reset anyway
 
     def close(self) -> None:
-        """Closes all environments."""
         self._source.close()
-
-
-def make(options: TrainingOptions) -> PolicyGradientTraining:
-    """A new training; see `make_algorithm`."""
-
-    def learning_in(envs: list[gymnasium.Env[Any, Any]]) -> PolicyGradientTraining:
-        agent = make_agent(options, envs[0])
-        source = LocalEpisodes(envs, agent, options.run.seed)
-        return PolicyGradientTraining(options, envs[0], agent, source)
-
-    return in_its_environments(options, learning_in)

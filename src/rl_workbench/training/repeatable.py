@@ -1,7 +1,7 @@
 """The environment of a training, with what brings back the episode under way.
 
-No environment has a way to be saved in the middle of an episode. But the same start and the
-same actions bring it back there: that is what is kept.
+No environment can be saved in the middle of an episode. But the same start and the same actions lead there
+again: these are saved.
 """
 
 import json
@@ -14,6 +14,7 @@ from gymnasium import spaces
 
 from rl_workbench.states import array, whole
 from rl_workbench.training.environments import as_vector
+from rl_workbench.training.generators import generator_state
 
 
 class EpisodeMark(NamedTuple):
@@ -21,8 +22,8 @@ class EpisodeMark(NamedTuple):
 
     start: str
     seed: int | None
-    actions: list[Any]  # those that come later, too
-    length: int  # of it [steps]
+    actions: list[Any]  # later ones are appended to the same list
+    length: int  # [steps] of it count
     last: np.ndarray
     generator: Any
 
@@ -30,13 +31,13 @@ class EpisodeMark(NamedTuple):
 class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     """An environment that can be brought back into the middle of an episode.
 
-    What is done with the environment inside, past this wrapper, is no part of the episode.
+    Steps and resets of the environment inside, past this wrapper, are not part of the episode.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         super().__init__(env)
         self._actions: list[Any] = []
-        self._start = ""  # the generator before the reset; nothing where that is seeded
+        self._start = ""  # the generator before the reset; empty if the reset was seeded
         self._seed: int | None = None  # of the reset, if it had one
         self._last = np.empty(0, np.float32)  # observation
 
@@ -48,7 +49,7 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     @property
     def generator(self) -> str:
         """The state of the environment's generator, as JSON."""
-        return json.dumps(self.env.unwrapped.np_random.bit_generator.state, default=_plain)
+        return generator_state(self.env.unwrapped.np_random)
 
     @generator.setter
     def generator(self, text: str) -> None:
@@ -57,7 +58,6 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begins an episode."""
         self._actions, self._seed = [], seed
         self._start = self.generator if seed is None else ""
         observation, info = self.env.reset(seed=seed, options=options)
@@ -65,7 +65,6 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """One step, which is remembered."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         self._actions.append(np.array(action))
         self._last = as_vector(observation)
@@ -74,12 +73,11 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
     def mark(self) -> EpisodeMark:
         """Remembers the place in the episode under way."""
         generator = self.env.unwrapped.np_random.bit_generator.state
-        return EpisodeMark(
-            self._start, self._seed, self._actions, self.length, self._last.copy(), generator
-        )
+        last = self._last.copy()
+        return EpisodeMark(self._start, self._seed, self._actions, self.length, last, generator)
 
     def take_back(self, mark: EpisodeMark) -> None:
-        """Forgets what was done since `mark`: `state_dict` tells of that place again.
+        """Forgets what was done since `mark`: `state_dict` describes that place again.
 
         The environment itself isn't moved: this is for the end of a training.
         """
@@ -88,7 +86,7 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         self.env.unwrapped.np_random.bit_generator.state = mark.generator
 
     def state_dict(self) -> dict[str, Any]:
-        """How the episode began, its actions, and where they led."""
+        """Returns how the episode began, its actions, and where they led."""
         shape = (self.length, *(self.action_space.shape or ()))
         actions = np.array(self._actions, dtype=self.action_space.dtype).reshape(shape)
         return {
@@ -102,7 +100,7 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Repeats the episode.
 
         Returns:
-            Its last observation as a vector, or None if it went another way: then there is no episode, and
+            Its last observation as a vector; None if it went another way. Then no episode is under way, and
             the generator is as it was.
         """
         after = self.generator
@@ -131,8 +129,3 @@ class RepeatableEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         if not all(map(space.contains, actions)):
             raise ValueError(f"an episode with other actions than {space}")
         return actions
-
-
-def _plain(value: Any) -> Any:
-    """For generators whose state holds arrays."""
-    return value.tolist()

@@ -37,10 +37,10 @@ def observations(subject: Subject) -> None:
             expect(type(given[-1]) is dict, f"an info is {given[-1]!r}, and no dict")
             if len(given) == 5:
                 kinds = [type(each) for each in given[1:4]]
-                told = ", ".join(kind.__name__ for kind in kinds)
+                names = ", ".join(kind.__name__ for kind in kinds)
                 expect(
                     kinds == [float, bool, bool],
-                    f"reward, terminated and truncated are {told}, and not float, bool, bool",
+                    f"reward, terminated and truncated are {names}, and not float, bool, bool",
                 )
 
 
@@ -83,8 +83,11 @@ def beginnings(subject: Subject) -> None:
         first = "step() before the first reset()"
         expect_error(lambda: env.step(action), first, gymnasium.error.ResetNeeded)
         unknown = {"no_such_option": 1}
-        told = "reset() with an option that doesn't exist"
-        expect_error(lambda: env.reset(options=unknown), told, ValueError)
+        expect_error(
+            lambda: env.reset(options=unknown),
+            "reset() with an option that doesn't exist",
+            ValueError,
+        )
         begin = {"initial_state": InitialState()}
         states = []
         for seed in (0, 0):
@@ -104,8 +107,8 @@ def wrong_actions(subject: Subject) -> None:
         undisturbed = _given(env, actions, [])
         disturbed = _given(env, actions, _wrong(env.action_space))
         if env.backend.deterministic:
-            told = differences(undisturbed, disturbed)
-            expect(not told, f"a refused action has moved something: {told}")
+            difference = differences(undisturbed, disturbed)
+            expect(not difference, f"a refused action has moved something: {difference}")
 
 
 def _given(env: Any, actions: list[Any], wrong: list[Any]) -> list[tuple[Any, ...]]:
@@ -139,8 +142,7 @@ def closed(subject: Subject) -> None:
         env.close()
         env.close()
         for name, call in (("reset", env.reset), ("step", lambda: env.step(action))):
-            told = f"{name}() behind close()"
-            expect_error(call, told, gymnasium.error.ClosedEnvironmentError)
+            expect_error(call, f"{name}() behind close()", gymnasium.error.ClosedEnvironmentError)
 
 
 def wrong_options(subject: Subject) -> None:
@@ -239,8 +241,9 @@ def _check_own_goal(env: Any) -> None:
         f'reset(options={{"goal": {wanted}}}) has the desired goal {seen["desired_goal"]}',
     )
     wrong = np.full_like(wanted, np.nan)
-    told = "reset() with a goal of NaN"
-    expect_error(lambda: env.reset(options={"goal": wrong}), told, ValueError)
+    expect_error(
+        lambda: env.reset(options={"goal": wrong}), "reset() with a goal of NaN", ValueError
+    )
 
 
 def _near(one: Any, other: Any) -> bool:

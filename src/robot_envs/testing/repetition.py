@@ -9,7 +9,15 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import SyncVectorEnv, VectorEnv
 
-from robot_envs.testing.rollouts import Subject, differences, expect, expect_error, rollout, same
+from robot_envs.testing.rollouts import (
+    Given,
+    Subject,
+    differences,
+    expect,
+    expect_error,
+    rollout,
+    same,
+)
 
 WORLDS, SEED = 3, 11
 TRIES = 20  # actions, to find another one
@@ -25,14 +33,16 @@ def seeding(subject: Subject) -> None:
             )
             return
         first = rollout(env, subject.steps, SEED)
-        told = differences(first, rollout(env, subject.steps, SEED))
-        expect(not told, f"the same seed and actions give other bits the second time: {told}")
+        _expect_same(first, rollout(env, subject.steps, SEED), "the second time")
         rollout(env, 7, SEED + 1)
-        told = differences(first, rollout(env, subject.steps, SEED))
-        expect(not told, f"the same seed and actions give other bits after other episodes: {told}")
+        _expect_same(first, rollout(env, subject.steps, SEED), "after other episodes")
     with subject.made() as other:
-        told = differences(first, rollout(other, subject.steps, SEED))
-        expect(not told, f"the same seed and actions give other bits in another instance: {told}")
+        _expect_same(first, rollout(other, subject.steps, SEED), "in another instance")
+
+
+def _expect_same(first: Given, again: Given, when: str) -> None:
+    difference = differences(first, again)
+    expect(not difference, f"the same seed and actions give other bits {when}: {difference}")
 
 
 def two_phases(subject: Subject) -> None:
@@ -52,8 +62,8 @@ def two_phases(subject: Subject) -> None:
             )
         again = rollout(env, subject.steps, SEED, two_phases=True)
         env.begin_step(action)  # dropped by close()
-        told = differences(first, again) if env.backend.deterministic else ""
-        expect(not told, f"steps that are begun first give other bits: {told}")
+        difference = differences(first, again) if env.backend.deterministic else ""
+        expect(not difference, f"steps that are begun first give other bits: {difference}")
 
 
 def _samples(env: gymnasium.Env[Any, Any]) -> Iterator[Any]:
@@ -66,8 +76,8 @@ def backends(subject: Subject, other: Subject) -> None:
     for each in (subject, other):
         with each.made() as env:
             runs.append(rollout(env, subject.steps, SEED))
-    told = differences(*runs)
-    expect(not told, f"{subject.backend} and {other.backend} give other bits: {told}")
+    difference = differences(*runs)
+    expect(not difference, f"{subject.backend} and {other.backend} give other bits: {difference}")
 
 
 def specification(subject: Subject) -> None:

@@ -62,7 +62,7 @@ OPTIONS = (  # in the order of drawing, which is part of the bits: new ones go t
 ROUNDING = 1e-9  # 1 - 0.9 is a little less than 0.1
 
 
-class Interval(NamedTuple):
+class UniformRange(NamedTuple):
     """The bounds between which a number is drawn, uniformly."""
 
     low: float
@@ -82,7 +82,7 @@ def check_names(given: Iterable[str]) -> None:
             raise ValueError(f"randomisation has no option {name!r}{hint}")
 
 
-def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, Interval]:
+def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, UniformRange]:
     """The intervals of an option, by name.
 
     Args:
@@ -107,7 +107,7 @@ def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, Interv
     }
 
 
-def _range(option: Option, given: Any, what: str) -> Interval:
+def _range(option: Option, given: Any, what: str) -> UniformRange:
     numbers = list(given) if isinstance(given, (Sequence, np.ndarray)) else [given]
     if len(numbers) not in (1, 2) or not all(map(is_number, numbers)):
         raise ValueError(
@@ -127,7 +127,7 @@ def _range(option: Option, given: Any, what: str) -> Interval:
             f"randomisation of {what} from {low:g} to {high:g}: it must lie within {least:g} and {most:g}, "
             "the lower number first"
         )
-    return Interval(max(low, least), min(high, most))
+    return UniformRange(max(low, least), min(high, most))
 
 
 Drawn = dict[str, Any]
@@ -171,7 +171,7 @@ class UniformRandomisation:
             LINKS: parts.axes, SOLIDS: parts.solids, JOINTS: parts.joints,
             CONTROLLERS: parts.controllers, WORLD: (WORLD.name,),
         }  # fmt: skip
-        self._ranges: dict[str, dict[str, Interval]] = {}
+        self._ranges: dict[str, dict[str, UniformRange]] = {}
         self._places: dict[
             str, dict[str, int]
         ] = {}  # indices of an option's numbers among those drawn

@@ -1,6 +1,7 @@
 """Small, quick robots and environments to learn on; all but one deterministic."""
 
 import random
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import gymnasium
@@ -8,11 +9,22 @@ import numpy as np
 import pytest
 import torch
 
-from rl_workbench.agents.document import PolicyGradientAgent
+from rl_workbench.agents.document import Episode, PolicyGradientAgent
 from rl_workbench.agents.reinforce import ReinforceAgent
-from rl_workbench.training.episodes import run_episode
+from rl_workbench.training.episodes import play, play_all
 
 DT = 0.008  # [s]
+
+
+def run_episode(
+    env: gymnasium.Env,
+    act: Callable[[np.ndarray], Any],
+    should_stop: Callable[[], bool],
+    limited: Callable[[Any], Any] = lambda action: action,
+) -> Episode | None:
+    """Plays one episode alone."""
+    episodes = play_all([play(env, act, limited)], should_stop)
+    return episodes[0] if episodes else None
 
 
 def register_with(monkeypatch: pytest.MonkeyPatch, kind: type[gymnasium.Env]) -> str:

@@ -205,7 +205,7 @@ def test_ctrl_c_before_the_training(capsys, monkeypatch) -> None:
     def interrupted(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pg_train, "train", interrupted)
+    monkeypatch.setattr(pg_train, "run_training", interrupted)
     assert main(BULLET) == 130
     assert "before the training began" in capsys.readouterr().err
 
@@ -213,7 +213,7 @@ def test_ctrl_c_before_the_training(capsys, monkeypatch) -> None:
 def test_private_parameters_of_dqn_train(monkeypatch) -> None:
     """As every node takes them: rosrun cartpole dqn_train.py _gamma:=0.5."""
     chosen: list[TrainingOptions] = []
-    monkeypatch.setattr(cli, "train", lambda options, *_: chosen.append(options))
+    monkeypatch.setattr(cli, "run_training", lambda options, *_: chosen.append(options))
     assert dqn_train.main(["_gamma:=0.5", "--seed=3", "_seed:=4", "_dueling:=true"]) == 0
     (options,) = chosen
     assert (options.kind.name, options.run.seed) == ("dqn", 3)

@@ -72,12 +72,7 @@ class LockstepWorld:
         world.join(self)
 
     def look(self, query: StateQuery) -> None:
-        """See `RobotBackend.look`.
-
-        Raises:
-            ValueError: for a link that is named twice.
-            SimulatorError: for a name of nothing in the simulator's world, or if it doesn't answer.
-        """
+        """See `RobotBackend.look`."""
         link_keys(query)
         with self._simulator:
             its_turn = self._world.claim_if_free(self)
@@ -88,12 +83,7 @@ class LockstepWorld:
         self._query, self._names = query, names
 
     def reset(self, initial: InitialState) -> WorldState:
-        """See `RobotBackend.reset`; the state asked for is the state reached, exactly.
-
-        Raises:
-            ValueError: for a joint to place that isn't there.
-            SimulatorError: if it is refused or the simulator doesn't answer.
-        """
+        """See `RobotBackend.reset`; the state asked for is the state reached, exactly."""
         joints = self.scene.placed_joints(initial).values()
         self._drop()
         request = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=self._moved)
@@ -112,13 +102,7 @@ class LockstepWorld:
         return state._replace(commands=self._held)
 
     def begin(self, commands: Commands) -> None:
-        """See `RobotBackend.begin`.
-
-        Raises:
-            SimulatorError: if the simulator doesn't answer, or another environment has moved the robots
-                since the reset.
-            ValueError: if a step is under way.
-        """
+        """See `RobotBackend.begin`."""
         if self._pending is not None:
             raise ValueError(
                 "a step was begun and not taken: act() with the same commands comes next"
@@ -135,13 +119,7 @@ class LockstepWorld:
         self._pending = commands
 
     def act(self, commands: Commands) -> WorldState:
-        """See `RobotBackend.act`.
-
-        Raises:
-            SimulatorError: if the step is refused or the simulator doesn't answer, or another environment
-                has moved the robots since the reset.
-            ValueError: if a step was begun with other commands.
-        """
+        """See `RobotBackend.act`."""
         if self._pending is None:
             self.begin(commands)
         elif self._pending != commands:
@@ -226,11 +204,7 @@ class LockstepWorld:
         self._variation.undo()
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
-        """See `RobotBackend.poses`; one call, however many there are.
-
-        Raises:
-            SimulatorError: if the simulator doesn't answer, or has no such link.
-        """
+        """See `RobotBackend.poses`; one call, however many there are."""
         self._take()
         answer = self._look(_names(StateQuery(links=tuple(map(LinkQuery, links)))))
         return [pose for pose, _ in motions_of(answer.numbers[3 * len(answer.joints) :])]

@@ -181,9 +181,8 @@ def _log_folder() -> Path:
     try:
         folder.mkdir(parents=True)
     except OSError as error:
-        raise RobotEnvError(
-            f"{folder}: {error.strerror}: set ROS_LOG_DIR to a folder that can be written"
-        ) from error
+        hint = "set ROS_LOG_DIR to a folder that can be written"
+        raise RobotEnvError(f"{folder}: {error.strerror}: {hint}") from error
     return folder
 
 

@@ -270,7 +270,7 @@ class RealtimeWorld:
     def look(self, query: StateQuery) -> None:
         """See `RobotBackend.look`."""
         if query != StateQuery():
-            raise RobotEnvError(f"{_ONLY_JOINTS}: links, models and contacts aren't told")
+            raise RobotEnvError(f"{_ONLY_JOINTS}: it has no links, models and contacts")
 
     def vary(self, variation: Variation) -> None:
         """See `RobotBackend.vary`."""

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 import torch
 from support.training.goal_environments import REACH
+from support.training.learning_fakes import run_episode
 from torch.distributions import Normal
 
 from rl_workbench.agents.policy_networks import Bounds, GaussianNetwork
 from rl_workbench.agents.reinforce import ReinforceAgent
 from rl_workbench.agents.settings import ReinforceSettings
 from rl_workbench.training.environments import make_environment
-from rl_workbench.training.episodes import run_episode
 
 BOUNDS = Bounds(np.array([-1.0, 0.0, -np.inf], np.float32), np.array([1.0, 6.0, 2.0], np.float32))
 SCALE = (1.0, 2.0)

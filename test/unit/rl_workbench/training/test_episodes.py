@@ -5,11 +5,10 @@ import random
 import gymnasium
 import numpy as np
 import torch
-from support.training.learning_fakes import POLE
+from support.training.learning_fakes import POLE, run_episode
 
 from rl_workbench.agents.reinforce import ReinforceAgent
-from rl_workbench.training.episodes import run_episode
-from rl_workbench.training.generators import EpisodeGenerators
+from rl_workbench.training.episodes import EpisodeSource
 
 
 def pole(**options: object) -> gymnasium.Env:
@@ -53,7 +52,7 @@ def test_what_was_drawn_is_taken_back() -> None:
 
     env, agent = pole(noise=0.05), ReinforceAgent(5)
     env.reset(seed=3)
-    generators = EpisodeGenerators([env], [agent.generator])
+    generators = EpisodeSource([env], agent, 3)
     generators.mark()
     first = draw()
     generators.rewind()
@@ -65,7 +64,7 @@ def test_what_was_drawn_is_taken_back() -> None:
 def test_an_environment_that_was_seeded_anew_comes_back_too() -> None:
     env, agent = pole(noise=0.05), ReinforceAgent(5)
     env.reset(seed=3)
-    generators = EpisodeGenerators([env], [agent.generator])
+    generators = EpisodeSource([env], agent, 3)
     state = generators.state()
     wanted = env.reset()[0]
     env.reset(seed=4)

@@ -86,7 +86,7 @@ def test_one_that_its_last_holder_removes_meanwhile(
     lock = fcntl.flock
     monkeypatch.setattr(fcntl, "flock", removed)
     (tmp_path / "run").mkdir()
-    with pytest.raises(WorkbenchError, match="removed just now"), held(tmp_path / "run"):
+    with pytest.raises(WorkbenchError, match="is no run folder"), held(tmp_path / "run"):
         pass
     assert (tmp_path / "run").exists() == again
 

@@ -6,7 +6,15 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from support.training.learning_fakes import POLE, Elsewhere, Fragile, OnlyOne, Pole, register_with
+from support.training.learning_fakes import (
+    POLE,
+    Elsewhere,
+    Fragile,
+    OnlyOne,
+    Pole,
+    register_with,
+    run_episode,
+)
 from support.training.training_runs import (
     InterruptAfter,
     assert_no_doubles,
@@ -24,8 +32,7 @@ from support.training.training_runs import (
 from rl_workbench.agents.reinforce import ReinforceAgent
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.environments import make_environment
-from rl_workbench.training.episodes import LocalEpisodes, run_episode
-from rl_workbench.training.generators import action_generator
+from rl_workbench.training.episodes import EpisodeSource
 
 NOISY = {"env_id": POLE, "env_kwargs": {"noise": 0.05}}
 MANY = {**NOISY, "num_envs": 3, "batch_episodes": 2, "episodes": 14}
@@ -44,11 +51,11 @@ def test_each_plays_what_it_would_play_alone() -> None:
         return [make_environment(POLE, {"noise": 0.05}) for _ in range(3)]
 
     agent = ReinforceAgent(7, environments=3)
-    source = LocalEpisodes(environments(), agent, 7)
+    source = EpisodeSource(environments(), agent, 7)
     source.seed()
     rounds = [source.collect(lambda: False) for _ in range(2)]
     for index, env in enumerate(environments()):
-        generator = action_generator(7, index) if index else ReinforceAgent(7).generator
+        generator = np.random.default_rng((7, index)) if index else ReinforceAgent(7).generator
         env.reset(seed=7 + index)
         for episodes in rounds:
             act = partial(agent.draw, generator=generator)
