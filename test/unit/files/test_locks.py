@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from files.locks import locked_file, locked_folder
+from files.locks import is_locked, locked_file, locked_folder
 
 HOLDER = """
 import sys
@@ -15,18 +15,6 @@ with locks.{function}(Path(sys.argv[1])):
     print("locked", flush=True)
     sys.stdin.read()
 """
-
-
-def is_locked(path) -> bool:
-    """Whether somebody holds the lock of a folder or file."""
-    if not path.exists():
-        return False
-    lock = locked_folder if path.is_dir() else locked_file
-    try:
-        with lock(path, wait=False):
-            return False
-    except BlockingIOError:
-        return True
 
 
 @pytest.fixture(params=[locked_folder, locked_file])
