@@ -9,21 +9,22 @@ bound for a service to come up and again for its answer [s]. A failure is logged
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
-from controller_manager_msgs.srv import ListControllerTypes, SwitchController
+from controller_manager_msgs.srv import (
+    ListControllers,
+    ListControllerTypes,
+    LoadController,
+    SwitchController,
+    UnloadController,
+)
 
 from ros_calls.service import ServiceFailed
 from ros_calls.waiting import TIMEOUT, wait_and_call
 from ros_utils._internal import log as _log
-from ros_utils._internal.controller_calls import names, service_name, states, until_ok
-from ros_utils._internal.controller_loading import (
-    load_controller_list_srv,
-    load_controller_srv,
-    unload_controller_list_srv,
-    unload_controller_srv,
-)
 
 __all__ = [
+    "ListResult",
     "kill_controllers_srv",
     "list_controller_types_srv",
     "list_controllers_srv",
@@ -37,6 +38,153 @@ __all__ = [
     "unload_controller_list_srv",
     "unload_controller_srv",
 ]
+
+
+class ListResult(int):
+    """Whether a call succeeded for each controller of a list: true or false, and `failed`, the names
+    of those for which it didn't."""
+
+    failed: list[str]
+
+    def __new__(cls, failed: Sequence[str]) -> ListResult:
+        self = super().__new__(cls, not failed)
+        self.failed = list(failed)
+        return self
+
+    def __repr__(self) -> str:
+        return f"<ListResult: failed {self.failed}>"
+
+
+def _names(controllers: Sequence[str]) -> str:
+    return ", ".join(controllers) or "none"
+
+
+def _service_name(ns: str | None, service: str) -> str:
+    return f"{(ns or '').rstrip('/')}/controller_manager/{service}"
+
+
+def _states(ns: str | None, timeout: float) -> dict[str, str] | None:
+    """Name and state of the loaded controllers, or None if the manager doesn't tell."""
+    try:
+        answer = wait_and_call(
+            _service_name(ns, "list_controllers"), ListControllers, timeout=timeout
+        )
+    except ServiceFailed as fault:
+        _log.error(str(fault))
+        return None
+    return {controller.name: controller.state for controller in answer.controller}
+
+
+def _until_ok(
+    service: str,
+    kind: Any,
+    request: tuple[Any, ...],
+    what: str,
+    ns: str | None,
+    max_retries: int,
+    timeout: float,
+) -> bool:
+    """Call a service until its answer is ok, at most `max_retries` times; a failed call ends it."""
+    try:
+        for _ in range(max_retries):
+            if wait_and_call(_service_name(ns, service), kind, *request, timeout=timeout).ok:
+                return True
+    except ServiceFailed as fault:
+        _log.error(f"{service} ({what}): {fault}")
+        return False
+    _log.error(
+        f"{service} ({what}): refused {max_retries} times; the controller manager's log says why"
+    )
+    return False
+
+
+def load_controller_srv(
+    controller_name: str,
+    ns: str | None = None,
+    max_retries: int = 5,
+    *,
+    service_timeout: float = TIMEOUT,
+) -> bool:
+    """Load a controller, with up to `max_retries` attempts.
+
+    Returns:
+        True once the manager has loaded it. False if it refuses (already loaded, no parameters,
+        unknown type or joint) or doesn't answer.
+    """
+    return _until_ok(
+        "load_controller",
+        LoadController,
+        (controller_name,),
+        controller_name,
+        ns,
+        max_retries,
+        service_timeout,
+    )
+
+
+def load_controller_list_srv(
+    controller_list: Sequence[str],
+    ns: str | None = None,
+    max_retries: int = 5,
+    *,
+    service_timeout: float = TIMEOUT,
+) -> ListResult:
+    """Load several controllers; all are tried.
+
+    Returns:
+        True if every one was loaded; its `failed` names those that were not.
+    """
+    return ListResult(
+        [
+            name
+            for name in controller_list
+            if not load_controller_srv(name, ns, max_retries, service_timeout=service_timeout)
+        ]
+    )
+
+
+def unload_controller_srv(
+    controller_name: str,
+    ns: str | None = None,
+    max_retries: int = 5,
+    *,
+    service_timeout: float = TIMEOUT,
+) -> bool:
+    """Unload a controller that doesn't run, with up to `max_retries` attempts.
+
+    Returns:
+        True once it is unloaded. False if it runs, is unknown, or the manager doesn't answer.
+    """
+    return _until_ok(
+        "unload_controller",
+        UnloadController,
+        (controller_name,),
+        controller_name,
+        ns,
+        max_retries,
+        service_timeout,
+    )
+
+
+def unload_controller_list_srv(
+    controller_list: Sequence[str],
+    ns: str | None = None,
+    max_retries: int = 5,
+    *,
+    service_timeout: float = TIMEOUT,
+) -> ListResult:
+    """Unload several controllers; all are tried.
+
+    Returns:
+        True if every one was unloaded; its `failed` names those that were not.
+    """
+    return ListResult(
+        [
+            name
+            for name in controller_list
+            if not unload_controller_srv(name, ns, max_retries, service_timeout=service_timeout)
+        ]
+    )
 
 
 def switch_controllers_srv(
@@ -66,9 +214,11 @@ def switch_controllers_srv(
         True if the manager has switched. With BEST_EFFORT this doesn't say that each one runs.
     """
     request = (list(start_controllers), list(stop_controllers), strictness, start_asap, timeout)
-    what = f"start {names(start_controllers)}, stop {names(stop_controllers)}"
+    what = f"start {_names(start_controllers)}, stop {_names(stop_controllers)}"
     patience = max(service_timeout, timeout + 2.0)  # the manager gives up after timeout + 1 s
-    return until_ok("switch_controller", SwitchController, request, what, ns, max_retries, patience)
+    return _until_ok(
+        "switch_controller", SwitchController, request, what, ns, max_retries, patience
+    )
 
 
 def start_controllers_srv(
@@ -149,7 +299,7 @@ def spawn_controllers_srv(
         True if every one is loaded and the manager has started them. One that can't be loaded
         doesn't keep the others from starting.
     """
-    known = states(ns, service_timeout)
+    known = _states(ns, service_timeout)
     if known is None:
         return False
     missing = [name for name in spawn_controllers if name not in known]
@@ -191,14 +341,14 @@ def list_controllers_srv(
 ) -> dict[str, str] | None:
     """Name and state (initialized, running, stopped) of the loaded controllers, or None, with an
     error in the log, if the manager doesn't tell."""
-    return states(ns, service_timeout)
+    return _states(ns, service_timeout)
 
 
 def list_controller_types_srv(
     ns: str | None = None, *, service_timeout: float = TIMEOUT
 ) -> list[str] | None:
     """The types of controllers that can be loaded, or None. See `list_controllers_srv`."""
-    name = service_name(ns, "list_controller_types")
+    name = _service_name(ns, "list_controller_types")
     try:
         answer = wait_and_call(name, ListControllerTypes, timeout=service_timeout)
     except ServiceFailed as fault:

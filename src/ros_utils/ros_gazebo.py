@@ -14,21 +14,24 @@ from ros_utils._internal.gazebo.physics import (
     gazebo_get_ODE_physics,
     gazebo_get_physics_properties,
     gazebo_get_time_step,
+    gazebo_pause_physics,
+    gazebo_reset_sim,
+    gazebo_reset_world,
     gazebo_set_default_properties,
     gazebo_set_gravity,
     gazebo_set_max_update_rate,
     gazebo_set_ODE_physics,
     gazebo_set_physics_properties,
     gazebo_set_time_step,
+    gazebo_step_physics,
+    gazebo_unpause_physics,
 )
-from ros_utils._internal.gazebo.spawn import gazebo_delete_model
-from ros_utils._internal.gazebo.spawn_sdf import (
+from ros_utils._internal.gazebo.spawn import (
+    gazebo_delete_model,
     gazebo_spawn_sdf_param,
     gazebo_spawn_sdf_path,
     gazebo_spawn_sdf_pkg,
     gazebo_spawn_sdf_string,
-)
-from ros_utils._internal.gazebo.spawn_urdf import (
     gazebo_spawn_urdf_param,
     gazebo_spawn_urdf_path,
     gazebo_spawn_urdf_pkg,
@@ -44,13 +47,6 @@ from ros_utils._internal.gazebo.state import (
     gazebo_set_link_state,
     gazebo_set_model_configuration,
     gazebo_set_model_state,
-)
-from ros_utils._internal.gazebo.time import (
-    gazebo_pause_physics,
-    gazebo_reset_sim,
-    gazebo_reset_world,
-    gazebo_step_physics,
-    gazebo_unpause_physics,
 )
 
 __all__ = [

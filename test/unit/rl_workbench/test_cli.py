@@ -39,7 +39,8 @@ def test_ctrl_c_while_it_is_still_being_read(tmp_path: Path) -> None:
         [*PROGRAM, "train", "--algo=dqn"], env={**os.environ, "PYTHONPATH": paths}, capture_output=True,
         text=True, check=False,
     )  # fmt: skip
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "rl_workbench: interrupted\n")
+    line = "rl-workbench train: interrupted before the training began\n"
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", line)
 
 
 @pytest.mark.parametrize("prog", ["rl-workbench", "workbench.py"])
@@ -90,7 +91,7 @@ def test_every_algorithm_shows_its_own_flags(
         main(["train", "--algo", name, "--help"])
     told = " ".join(capsys.readouterr().out.split())
     assert ended.value.code == 0 and told.startswith("usage: rl-workbench train")
-    assert flag in told and "to the same bits as a training that was never interrupted" in told
+    assert flag in told and "bit-identical to a training that was never interrupted" in told
 
 
 @pytest.mark.extras("stable_baselines3")

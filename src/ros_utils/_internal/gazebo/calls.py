@@ -1,16 +1,73 @@
-"""Calls of the simulator's services. Part of `ros_gazebo`."""
+"""Calls of the simulator's services, and the results of several values. Part of `ros_gazebo`."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import std_srvs.srv
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
+from std_msgs.msg import Header
 
 from ros_calls import waiting
 from ros_calls.service import ServiceFailed, ServiceHangs, ServiceMissing
 from ros_utils._internal import log as _log
+
+
+class SpawnResult(NamedTuple):
+    """Whether a model was spawned, and the simulator's text or what went wrong before."""
+
+    success: bool
+    status_message: str
+
+    def __bool__(self) -> bool:
+        return self.success
+
+
+class ModelStateResult(NamedTuple):
+    """A model's pose [m, quaternion] and twist [m/s, rad/s]; all zeros without success."""
+
+    header: Header
+    pose: Pose
+    twist: Twist
+    success: bool
+
+    def __bool__(self) -> bool:
+        return self.success
+
+
+class LinkStateResult(NamedTuple):
+    """A link's pose [m, quaternion] and twist [m/s, rad/s]; all zeros without success."""
+
+    pose: Pose
+    twist: Twist
+    success: bool
+
+    def __bool__(self) -> bool:
+        return self.success
+
+
+class JointPropertiesResult(NamedTuple):
+    """A joint's position [rad, m] and velocity [rad/s, m/s]; zeros without success."""
+
+    position: float
+    rate: float
+    success: bool
+
+    def __bool__(self) -> bool:
+        return self.success
+
+
+class WorldPropertiesResult(NamedTuple):
+    """What is in the world: the simulated time [s], and the models' names."""
+
+    success: bool
+    sim_time: float
+    model_names: list[str]
+
+    def __bool__(self) -> bool:
+        return self.success
+
 
 GAZEBO = "/gazebo"
 TIMEOUT = waiting.TIMEOUT

@@ -18,18 +18,16 @@ from ros_utils._internal.gazebo.calls import (
     GAZEBO,
     TIMEOUT,
     BadNumber,
+    JointPropertiesResult,
+    LinkStateResult,
+    ModelStateResult,
+    WorldPropertiesResult,
     call,
     check_finite,
     make_pose,
     make_twist,
     pose_numbers,
     succeeded,
-)
-from ros_utils._internal.gazebo.results import (
-    JointPropertiesResult,
-    LinkStateResult,
-    ModelStateResult,
-    WorldPropertiesResult,
 )
 
 

@@ -63,12 +63,12 @@ def test_actions_that_are_whole_numbers(tmp_path: Path, monkeypatch) -> None:
             self.action_space = gymnasium.spaces.Box(0, 9, (2,), np.int64)
 
     env_id = register_with(monkeypatch, Stepper)
-    with pytest.raises(WorkbenchError, match="REINFORCE needs a choice of single actions"):
+    with pytest.raises(WorkbenchError, match="REINFORCE needs discrete actions"):
         train(tmp_path, "reinforce", env_id=env_id, env_kwargs=None)
 
 
 @pytest.mark.parametrize("name", ["dqn", "reinforce-document"])
 def test_others_say_what_fits(tmp_path: Path, name: str) -> None:
-    words = r"needs a choice of single actions, Discrete\(n\); .*--algo reinforce, or Stable-Bas"
+    words = r"needs discrete actions, Discrete\(n\); .*--algo reinforce, or Stable-Bas"
     with pytest.raises(WorkbenchError, match=words):
         train(tmp_path, name, **BOX)

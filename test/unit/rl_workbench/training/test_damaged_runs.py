@@ -120,14 +120,14 @@ def test_the_record_of_a_version_before_is_refused(stopped: Path) -> None:
     old = record(stopped)
     old["dqn"] = old.pop("hyperparameters")
     (stopped / "config.json").write_text(json.dumps(old))
-    assert "isn't the configuration of a training of this version" in refusal(stopped)
+    assert "isn't the record of a training" in refusal(stopped)
 
 
 @pytest.mark.parametrize("old", ["rl_workbench 1", "cartpole dqn 1", None])
 def test_checkpoints_of_a_version_before_are_refused(stopped: Path, capsys, old: str) -> None:
     rewrite(stopped, lambda content: content.update(format=old))
     assert "holds no checkpoint to go on from" in refusal(stopped)
-    assert f"{stopped / 'last.pt'} is no checkpoint of this version" in capsys.readouterr().out
+    assert f"{stopped / 'last.pt'} is no checkpoint of a training" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("left", [None, 0, 10, 300])

@@ -145,6 +145,6 @@ def test_two_trainings_started_into_a_new_folder_at_once(start: Start, tmp_path:
     both = [start(*new("dqn", tmp_path / "run"), *few) for _ in range(2)]
     told = {each.wait(120): each.stdout.read() for each in both}
     assert set(told) == {0, 1}
-    assert re.search(r"is running in|isn't empty|was removed just now", told[1])
+    assert re.search(r"is running in|isn't empty|is no run folder", told[1])
     assert "Traceback" not in told[1] and len(told[1].splitlines()) == 1
     assert summary(tmp_path / "run")["complete"]

@@ -94,7 +94,7 @@ def test_other_observations_are_flattened() -> None:
 def test_what_cannot_be_flattened_is_refused(monkeypatch) -> None:
     texts = gymnasium.spaces.Text(5)
     monkeypatch.setattr(gymnasium.registry[POLE].entry_point, "observation_space", texts)
-    with pytest.raises(WorkbenchError, match=f"{POLE} observes Text.*only vectors of numbers"):
+    with pytest.raises(WorkbenchError, match=f"{POLE} observes Text.*only from vectors of numbers"):
         make_environment(POLE)
 
 

@@ -209,7 +209,7 @@ def test_continuous_actions_are_refused_with_what_takes_them(
     capsys, tmp_path: Path, algorithm: list[str]
 ) -> None:
     line = failed(capsys, *algorithm, "--env-id=Pendulum-v1", "--run-dir=run")
-    assert "needs a choice of single actions, Discrete(n); Pendulum-v1 has Box" in line
+    assert "needs discrete actions, Discrete(n); Pendulum-v1 has Box" in line
     assert (
         "--algo reinforce, or Stable-Baselines3's ppo, a2c, sac, td3 or ddpg: these fit it" in line
     )
