@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from files.locks import locked_folder
+from file_access.locks import locked_folder
 
 PREFIX = "bullet_gazebo_scratch_"
 

@@ -16,8 +16,8 @@ from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, conjugate, rotate
 from bullet_gazebo.state import did_you_mean
-from files.content import FileError
-from files.xml_text import parse
+from file_access.content import FileError
+from file_access.xml_text import parse
 from package_writing import CannotWrite
 
 PLUGIN = "libgazebo_ros_control.so"

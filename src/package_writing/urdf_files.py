@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
-from files.expansion import CannotExpand, expand, included_files
+from file_access.expansion import CannotExpand, expand, included_files
 from package_writing import CannotWrite
 from robot_envs.errors import RobotEnvError
 from robot_envs.files import PACKAGE, locate

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from files.content import open_text
+from file_access.content import open_text
 from rl_workbench.errors import WorkbenchError
 
 Writer = Callable[[BinaryIO], object]  # fills a file

@@ -9,9 +9,9 @@ from typing import Any
 
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.state import did_you_mean
-from files.content import FileError, read_file
-from files.expansion import CannotExpand, expand
-from files.yaml_text import load_documents
+from file_access.content import FileError, read_file
+from file_access.expansion import CannotExpand, expand
+from file_access.yaml_text import load_documents
 from robot_envs.errors import RobotEnvError
 
 Source = str | Path

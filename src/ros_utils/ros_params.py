@@ -7,8 +7,8 @@ from typing import Any
 
 import rosparam
 
-from files.content import FileError, read_file
-from files.yaml_text import load_parameters
+from file_access.content import FileError, read_file
+from file_access.yaml_text import load_parameters
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages

@@ -8,8 +8,8 @@ from xml.etree.ElementTree import Element
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.joint import JointHandle, JointLimits, SoftLimits
-from files.content import FileError
-from files.xml_text import parse
+from file_access.content import FileError
+from file_access.xml_text import parse
 
 PREFIX = "hardware_interface/"
 OVERRIDES = {  # what: field of the limits, and its parameter

@@ -240,7 +240,7 @@ def _pose(x: float, y: float, z: float, qx: float, qy: float, qz: float, qw: flo
 def main(arguments: Sequence[str]) -> int:
     """Draws until standard input ends; SIGTERM drops the frames that aren't drawn yet."""
     from bullet_gazebo.pictures.renderer import Renderer
-    from viewer.video import EncoderFailed, Mp4Writer
+    from web_viewer.video import EncoderFailed, Mp4Writer
 
     logging.basicConfig(format="recording: %(message)s")
     path, rate, width, height, model = arguments

@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     from rl_workbench.tools.recording import draws_itself
     from rl_workbench.tools.run_page import show_run
     from rl_workbench.tools.runs import open_run
-    from viewer.address import LOOPBACK
+    from web_viewer.address import LOOPBACK
 
     run, options = open_run(arguments.run), env_options(arguments)
     on_page = arguments.gui

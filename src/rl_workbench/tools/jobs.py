@@ -19,7 +19,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from files.content import open_text
+from file_access.content import open_text
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.starting import Interrupt, search_path
 from rl_workbench.storage import as_json, write_file

@@ -147,7 +147,7 @@ def _write_scene(
     """Writes one HTML file with the episodes in 3-D, beside each other."""
     from rl_workbench.storage import write_file
     from rl_workbench.tools.recording import SceneView
-    from viewer.server import hidden_page
+    from web_viewer.server import hidden_page
 
     if arguments.size:
         raise WorkbenchError("--size: a recording in 3-D is as large as the browser's window")
@@ -269,7 +269,7 @@ def _write_html(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -
 
 def _write_mp4(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -> None:
     """Lets ffmpeg, which can't write to a stream, write a temporary file."""
-    from viewer.video import EncoderFailed, Mp4Writer
+    from web_viewer.video import EncoderFailed, Mp4Writer
 
     with tempfile.TemporaryDirectory(prefix="rl_workbench_") as folder:
         path = Path(folder, "video.mp4")

@@ -24,9 +24,9 @@ from rl_workbench.tools.recording import (
 )
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training.progress import tell, warn
-from viewer.address import PortInUse, find_address
-from viewer.curves import Curves
-from viewer.server import open_browser, serve, stop
+from web_viewer.address import PortInUse, find_address
+from web_viewer.curves import Curves
+from web_viewer.server import open_browser, serve, stop
 
 PERIOD = 1.0 / 30.0  # [s] between two pictures
 CURVES_PERIOD = 1.0  # [s] between two looks at the table

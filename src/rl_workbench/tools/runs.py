@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from files.content import open_text
+from file_access.content import open_text
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.storage import CONFIG_RECORD
 from rl_workbench.training.scalar_log import EVALUATION, RETURN, SUCCESS

@@ -38,7 +38,7 @@ from rl_workbench.training.options import (
 )
 from rl_workbench.training.progress import tell
 from rl_workbench.training.scalar_log import EVALUATION
-from viewer.table import GrowingTable
+from web_viewer.table import GrowingTable
 
 RECORD, JOURNAL, STUDY = "sweep.json", "study.journal", "sweep"
 PRUNERS = ("median", "hyperband", "none")

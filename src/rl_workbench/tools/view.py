@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import POLICIES, add_environment_flags, env_options
-from viewer.address import add_flags as add_page_flags
+from web_viewer.address import add_flags as add_page_flags
 
 NICENESS = 10  # of a page beside a training, which goes first
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import torch
 
-from files.content import open_file
+from file_access.content import open_file
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.storage import save_tensors
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from files.locks import is_locked, locked_folder
+from file_access.locks import is_locked, locked_folder
 from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.storage import CONFIG_RECORD, as_json, read_record, write_atomically

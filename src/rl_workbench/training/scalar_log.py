@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from files.content import open_file
+from file_access.content import open_file
 
 NAME = "scalars.csv"
 # Tags, as CleanRL and Stable-Baselines3 name them.

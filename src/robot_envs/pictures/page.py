@@ -16,8 +16,8 @@ from bullet_gazebo.pictures.camera import Camera, overview
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.visuals import VisibleLink, VisibleModel, visible_model
 from robot_envs.pictures.placement import Placement
-from viewer.address import LOOPBACK, find_address
-from viewer.server import serve, stop
+from web_viewer.address import LOOPBACK, find_address
+from web_viewer.server import serve, stop
 
 WORLD = "/world"  # node
 GAP = 0.15  # between robots, as a share of what one of them can reach

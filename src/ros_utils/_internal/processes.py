@@ -21,7 +21,7 @@ from pathlib import Path
 import psutil
 import rospkg
 
-from files.locks import locked_file
+from file_access.locks import locked_file
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
 

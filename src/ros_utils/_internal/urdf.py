@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from files.expansion import CannotExpand, expand
+from file_access.expansion import CannotExpand, expand
 from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages
 

@@ -29,9 +29,9 @@ from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.files.world_file import parse_world, read_entity
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World
-from files.content import FileError
-from files.expansion import CannotExpand, expand
-from files.yaml_text import load_parameters
+from file_access.content import FileError
+from file_access.expansion import CannotExpand, expand
+from file_access.yaml_text import load_parameters
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 LONGEST = 5000  # characters of a refusal

@@ -15,7 +15,7 @@ ROOT = SRC.parent
 MODULES = sorted(SRC.rglob("*.py"))
 FOLDERS = sorted({path.parent for path in MODULES} | {SRC})
 OURS = {"bullet_gazebo", "cartpole", "rl_workbench", "robot_envs", "ros_calls", "ros_utils",
-        "files", "lockstep_runner", "package_writing", "viewer"}  # fmt: skip
+        "file_access", "lockstep_runner", "package_writing", "web_viewer"}  # fmt: skip
 LEARNING = {"gymnasium", "torch", "stable_baselines3", "matplotlib"}
 MOST_ENTRIES = 25
 MOST_DOUBLE_CLASSES = 3
@@ -31,15 +31,15 @@ ROS_ROOMS = (
 
 # A library, and which of ours it may import.
 ALLOWED = {
-    "bullet_gazebo": {"ros_calls", "files", "viewer"},
-    "ros_calls": {"files"},
-    "files": set(),
-    "ros_utils": {"ros_calls", "files"},
-    "robot_envs": {"bullet_gazebo", "files", "ros_calls", "ros_utils", "viewer"},
+    "bullet_gazebo": {"ros_calls", "file_access", "web_viewer"},
+    "ros_calls": {"file_access"},
+    "file_access": set(),
+    "ros_utils": {"ros_calls", "file_access"},
+    "robot_envs": {"bullet_gazebo", "file_access", "ros_calls", "ros_utils", "web_viewer"},
     "lockstep_runner": {"ros_calls"},
-    "package_writing": {"bullet_gazebo", "files", "robot_envs", "ros_calls"},
-    "rl_workbench": {"files", "viewer"},
-    "viewer": {"files"},
+    "package_writing": {"bullet_gazebo", "file_access", "robot_envs", "ros_calls"},
+    "rl_workbench": {"file_access", "web_viewer"},
+    "web_viewer": {"file_access"},
     "cartpole": {"rl_workbench", "robot_envs"},
 }
 # A folder, and what nothing in it may import beside that.

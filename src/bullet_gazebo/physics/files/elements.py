@@ -6,8 +6,8 @@ from contextlib import contextmanager
 from xml.etree.ElementTree import Element
 
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
-from files.content import FileError, TooLarge
-from files.xml_text import parse
+from file_access.content import FileError, TooLarge
+from file_access.xml_text import parse
 
 SHOWN = 80  # characters of a faulty value that an error quotes
 

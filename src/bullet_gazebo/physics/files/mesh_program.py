@@ -20,8 +20,8 @@ from bullet_gazebo.physics.description import DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import finite, numbers, place, shown
 from bullet_gazebo.physics.files.hull import hull_points
 from bullet_gazebo.physics.files.meshes import Submesh
-from files.content import FileError, read_file
-from files.xml_text import parse
+from file_access.content import FileError, read_file
+from file_access.xml_text import parse
 
 MOST_BYTES = 200_000_000  # of a file: a million triangles as COLLADA writes them
 MOST_TRIANGLES = 1_000_000

@@ -9,7 +9,7 @@ import numpy as np
 
 from bullet_gazebo.physics.description import DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import place
-from files.limited import LimitedProcess, Limits, RequestRefused
+from file_access.limited import LimitedProcess, Limits, RequestRefused
 
 SUFFIXES = (".stl", ".dae", ".obj")
 LIMITS = Limits(processor_time=60, wall_time=120.0, memory=4 << 30, output=1 << 30)

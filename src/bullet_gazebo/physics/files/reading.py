@@ -11,8 +11,8 @@ from xml.etree.ElementTree import Element
 from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, Mesh
 from bullet_gazebo.physics.files.elements import files_named_by_a_model, parse_xml, place, shown
 from bullet_gazebo.physics.files.meshes import Submesh, check_mesh, read_mesh
-from files.content import MAX_BYTES, FileError, TooLarge, read_file
-from files.xml_text import MAX_ELEMENTS
+from file_access.content import MAX_BYTES, FileError, TooLarge, read_file
+from file_access.xml_text import MAX_ELEMENTS
 
 MeshFile = tuple[str, Mesh | None]
 """A file's path, and its mesh if it was read."""

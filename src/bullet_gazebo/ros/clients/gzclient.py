@@ -22,7 +22,7 @@ from bullet_gazebo.ros.common.node_process import (
 from bullet_gazebo.ros.common.rospy_node import stop_hearing_clock
 from ros_calls.master import NoAnswer, living_address
 from ros_calls.requirements import WINDOW, lack
-from viewer.address import PortInUse, add_flags, find_address
+from web_viewer.address import PortInUse, add_flags, find_address
 
 NAME = "gazebo_gui"
 

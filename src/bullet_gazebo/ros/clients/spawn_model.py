@@ -17,9 +17,9 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.ros.clients import gazebo_interface
 from bullet_gazebo.ros.common.node_process import SignalHandler, init_node
-from files.content import MAX_BYTES, FileError, read_file
-from files.xml_text import decode
-from files.xml_text import parse as parse_xml
+from file_access.content import MAX_BYTES, FileError, read_file
+from file_access.xml_text import decode
+from file_access.xml_text import parse as parse_xml
 from ros_calls.service import ServiceClient, ServiceFailed
 from ros_calls.waiting import wait_until
 

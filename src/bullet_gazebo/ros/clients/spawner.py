@@ -20,8 +20,8 @@ from std_msgs.msg import Bool
 
 from bullet_gazebo.ros.clients.manager_interface import BEST_EFFORT, STRICT, ManagerClient
 from bullet_gazebo.ros.common.node_process import SignalHandler, init_node
-from files.content import FileError, read_file
-from files.yaml_text import load_parameters
+from file_access.content import FileError, read_file
+from file_access.yaml_text import load_parameters
 from ros_calls.service import ServiceFailed
 from ros_calls.waiting import wait_until
 

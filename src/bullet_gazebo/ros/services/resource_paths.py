@@ -8,8 +8,8 @@ from pathlib import Path
 import rospkg
 
 from bullet_gazebo.physics.files.reading import Resources
-from files.content import FileError, read_file
-from files.xml_text import decode, parse
+from file_access.content import FileError, read_file
+from file_access.xml_text import decode, parse
 
 RESOURCES = "GAZEBO_RESOURCE_PATH"
 MODELS = "GAZEBO_MODEL_PATH"

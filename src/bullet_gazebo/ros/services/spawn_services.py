@@ -26,7 +26,7 @@ from bullet_gazebo.ros.common.messages import from_pose_msg
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.ros.services.resource_paths import find_world, resources
 from bullet_gazebo.simulator import Simulator
-from files.content import MAX_BYTES
+from file_access.content import MAX_BYTES
 
 ROOT_TAG = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
 PACKAGE = re.compile(r"package://([^/\"'<>\s]+)")

@@ -23,9 +23,9 @@ from bullet_gazebo.ros.window.model_panel import ModelPanel
 from bullet_gazebo.ros.window.panels import Controllers, TimePanel
 from bullet_gazebo.ros.window.remote_scene import Commands, RemoteScene
 from ros_calls.service import ServiceFailed
-from viewer.address import Address
-from viewer.curves import Curves
-from viewer.server import open_browser, serve, stop
+from web_viewer.address import Address
+from web_viewer.curves import Curves
+from web_viewer.server import open_browser, serve, stop
 
 TITLE = "gzclient"
 CAMERA, LOOK_AT = (1.4, -1.9, 1.1), (0.0, 0.0, 0.35)  # [m]

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import rosgraph
 from gazebo_msgs import srv
 
-from files.content import FileError, read_file
-from files.xml_text import decode
+from file_access.content import FileError, read_file
+from file_access.xml_text import decode
 from ros_calls import master as _master
 from ros_calls.service import ServiceFailed
 from ros_calls.waiting import wait_and_call, wait_until

@@ -10,7 +10,7 @@ from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files import mesh_program, meshes
 from bullet_gazebo.physics.files.hull import MOST_POINTS, hull_points
 from bullet_gazebo.physics.files.meshes import read_mesh
-from files.limited import Limits
+from file_access.limited import Limits
 
 CUBE = np.array(sorted(CORNERS))
 OBJ, DAE, POLYLIST, TEXT = (data.decode() for data in (obj(), dae(), polylist(), ascii_stl()))

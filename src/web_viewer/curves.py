@@ -10,7 +10,7 @@ import numpy as np
 import viser
 from viser import uplot
 
-from viewer.table import GrowingTable, TableUpdate
+from web_viewer.table import GrowingTable, TableUpdate
 
 EPISODES, LENGTHS, SPEED = "charts/episodic_return", "charts/episodic_length", "charts/SPS"
 # The tags of trainings, in the order of the charts. Further losses follow as they come.

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
-from files.content import NotAFile, open_file
+from file_access.content import NotAFile, open_file
 
 NAME = "scalars.csv"  # in a run folder
 HEADER = b"step,tag,value,wall_time\n"

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import pytest
 
-from files import expansion
-from files.expansion import LIMITS, CannotExpand, expand, included_files
+from file_access import expansion
+from file_access.expansion import LIMITS, CannotExpand, expand, included_files
 from robot_envs import files as descriptions
 from robot_envs.errors import RobotEnvError
 from ros_utils import ros_gazebo, ros_urdf
@@ -89,7 +89,7 @@ def test_a_pipe_that_nobody_writes(tmp_path):
 def test_narrower_limits_of_the_caller_stay(bad):
     script = f"""
 import resource
-from files.expansion import CannotExpand, expand, included_files
+from file_access.expansion import CannotExpand, expand, included_files
 resource.setrlimit(resource.RLIMIT_AS, (400 << 20, 400 << 20))
 try:
     expand({bad("${'a' * 5 * 10**8}")!r})

@@ -22,7 +22,7 @@ from contextlib import suppress
 from dataclasses import astuple, dataclass
 from typing import NoReturn
 
-from files.content import one_line
+from file_access.content import one_line
 
 STARTING = 30.0  # [s] beyond the time limit, for Python to start on a busy machine
 HEADER = struct.Struct("<cQ")  # of a message: its kind and its length [bytes]
@@ -106,7 +106,7 @@ class LimitedProcess:
             self._end()
         code = (
             f"import sys; sys.path[:] = {[os.path.abspath(each) for each in sys.path]!a}; "
-            f"from files.limited import serve; serve({self._program!r}, {astuple(self._limits)!r})"
+            f"from file_access.limited import serve; serve({self._program!r}, {astuple(self._limits)!r})"
         )
         try:
             self._process = subprocess.Popen(

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from files import content, xml_text
-from files.content import FileError, TooLarge, read_file
-from files.xml_text import parse
+from file_access import content, xml_text
+from file_access.content import FileError, TooLarge, read_file
+from file_access.xml_text import parse
 
 TEXT = '<a name="Gelände">\r\n<b/>\r\n</a>'
 BEFORE = ["", " ", "\n\n", "\t\r\n", "<!-- by hand -->\n", "\n<!-- one --><!-- two -->\n "]

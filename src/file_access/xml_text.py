@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
-from files.content import MAX_BYTES, FileError, TooLarge
+from file_access.content import MAX_BYTES, FileError, TooLarge
 
 MAX_DEPTH = 100  # nested elements; real models have about ten
 MAX_ELEMENTS = 500_000  # of one text: some 200 MB of memory; large worlds have tens of thousands

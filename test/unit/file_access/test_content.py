@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from files.content import FileError, NotAFile, open_file, open_text, read_file
+from file_access.content import FileError, NotAFile, open_file, open_text, read_file
 
 KINDS = ["pipe", "socket", "device", "folder"]
 

@@ -21,7 +21,7 @@ from viser import _messages as messages
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from viewer.address import LOOPBACK, TOKEN_BYTES, Address, PortInUse, has_display, is_loopback
+from web_viewer.address import LOOPBACK, TOKEN_BYTES, Address, PortInUse, has_display, is_loopback
 
 Answer = Callable[[Any, Request], Response | None]
 Point = tuple[float, float, float]  # [m]

@@ -5,12 +5,12 @@ import sys
 
 import pytest
 
-from files.locks import is_locked, locked_file, locked_folder
+from file_access.locks import is_locked, locked_file, locked_folder
 
 HOLDER = """
 import sys
 from pathlib import Path
-from files import locks
+from file_access import locks
 with locks.{function}(Path(sys.argv[1])):
     print("locked", flush=True)
     sys.stdin.read()

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from files.content import FileError, TooLarge
+from file_access.content import FileError, TooLarge
 
 MAX_BYTES = 2**20  # takes the parser seconds; a robot's controllers have some kilobytes
 MAX_VALUES = 100_000  # in lists and mappings, counted for each reference to an anchor

@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
-from files.limited import (
+from file_access.limited import (
     LimitedProcess,
     Limits,
     ProcessDied,
@@ -24,7 +24,7 @@ from files.limited import (
     limit_time,
     why_ended,
 )
-from files.xml_text import decode, without_declaration
+from file_access.xml_text import decode, without_declaration
 
 LIMITS = Limits(
     processor_time=30,  # [s], far more than the largest robots in use need
@@ -75,7 +75,7 @@ def included_files(
 def _ask(wanted: str, path: str, mappings: Mapping[str, str] | None, limits: Limits) -> str:
     request = {"wanted": wanted, "path": path, "mappings": dict(mappings or {})}
     # A process for each file: xacro keeps its state in module variables.
-    process = LimitedProcess("files.expansion:answer", limits)
+    process = LimitedProcess("file_access.expansion:answer", limits)
     try:
         return process.ask(json.dumps(request).encode()).decode(errors="surrogateescape")
     except ProcessDied as fault:

@@ -7,7 +7,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
-from viewer.video import EncoderFailed, Mp4Writer
+from web_viewer.video import EncoderFailed, Mp4Writer
 
 FRAMES = [np.full((31, 45, 3), 8 * level, np.uint8) for level in range(20)]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rl_workbench.plotting import moving_average
-from viewer.curves import MAX_BUCKETS, Series
+from web_viewer.curves import MAX_BUCKETS, Series
 
 
 def filled(values):

@@ -6,8 +6,8 @@ import pytest
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from viewer.address import Address, PortInUse, find_address
-from viewer.server import Gate
+from web_viewer.address import Address, PortInUse, find_address
+from web_viewer.server import Gate
 
 TOKEN = "a-token"
 WINDOW = ("the window", "moves the simulation")

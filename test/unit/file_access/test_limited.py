@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from files.limited import LimitedProcess, Limits, ProcessDied, RequestRefused
+from file_access.limited import LimitedProcess, Limits, ProcessDied, RequestRefused
 
 LIMITS = Limits(processor_time=1, wall_time=30.0, memory=512 << 20, output=1000)
 PROGRAM = """

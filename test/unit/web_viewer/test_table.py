@@ -5,8 +5,8 @@ import random
 
 import pytest
 
-from viewer import table
-from viewer.table import GrowingTable
+from web_viewer import table
+from web_viewer.table import GrowingTable
 
 HEADER = "step,tag,value,wall_time\n"
 

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from files.content import FileError
-from files.yaml_text import load_documents, load_parameters
+from file_access.content import FileError
+from file_access.yaml_text import load_documents, load_parameters
 
 TEXT = "# Gelände\r\narm:\r\n  gain: 1.5\r\n  joints: [a, b]\r\n"
 MERGES = "a0: &a0 {" + ", ".join(f"k{i}: 1" for i in range(10)) + "}\n"
