@@ -163,7 +163,7 @@ def test_python_that_cannot_be_started(bad, monkeypatch):
 
 def program(*arguments, **constants):
     limits = replace(LIMITS, **constants)
-    start = "from files.limited import Limits; from files import expansion"
+    start = "from file_access.limited import Limits; from file_access import expansion"
     script = f"{start}; expansion.LIMITS = {limits}; {PROGRAM}"
     return [sys.executable, "-c", script, *arguments]
 
