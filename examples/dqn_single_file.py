@@ -1,4 +1,4 @@
-"""Deep Q-learning in one file, to be read from top to bottom.
+"""Deep Q-learning in one file, to read from top to bottom.
 
     ./ws python3 examples/dqn_single_file.py --seed 1
 
@@ -9,8 +9,8 @@ and observations that are normalised by their own statistics. What is left is pl
 
     --n-step 1 --no-double --no-dueling --loss mse --reward-scale 1 --no-normalize-observations
 
-On the robot: --env-id cartpole:cartpole/Classic-v0 (Gymnasium imports what stands before the colon).
-The project's own agent, trained with the same options, comes to the same weights: a test sees to it.
+On the robot: --env-id cartpole:cartpole/Classic-v0 (Gymnasium imports the module before the colon).
+With the same options the project's own agent gets the same weights; a test checks this.
 """
 
 import argparse
@@ -28,7 +28,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 
 def option(default: Any, text: str, **how: Any) -> Any:
-    """A field of Args, with what argparse has to know of it."""
+    """Makes a field of Args, with its arguments for argparse."""
     is_switch = isinstance(default, bool)
     kind = {"action": argparse.BooleanOptionalAction} if is_switch else {"type": type(default)}
     return field(default=default, metadata={**kind, "help": text, **how})
@@ -69,7 +69,7 @@ def parse_args(argv: list[str] | None = None) -> Args:
 
 
 class QNetwork(nn.Module):
-    """Observations (N, D) to the value of each action (N, A)."""
+    """Maps observations (N, D) to the value of each action (N, A)."""
 
     def __init__(self, inputs: int, actions: int, args: Args) -> None:
         super().__init__()
@@ -86,12 +86,12 @@ class QNetwork(nn.Module):
         values = self.actions(features)
         if self.state is None:
             return values
-        # Dueling: Q = V + A - mean(A). Without the mean, nothing would tell V from A.
+        # Dueling: Q = V + A - mean(A). Without the mean, V and A would be ambiguous.
         return self.state(features) + values - values.mean(dim=1, keepdim=True)
 
 
 class ReplayBuffer:
-    """The newest transitions. Their discount is gamma^n, or 0 where nothing follows the n steps."""
+    """Keeps the newest transitions. The discount is gamma^n, or 0 if the episode terminated."""
 
     def __init__(self, capacity: int, size: int) -> None:
         self.observations, self.next_observations = np.zeros((2, capacity, size), np.float32)
@@ -105,11 +105,13 @@ class ReplayBuffer:
         self.observations[index], self.actions[index] = observation, action
         self.rewards[index], self.discounts[index] = reward, discount
         self.next_observations[index] = next_observation
-        self.position = (index + 1) % self.capacity  # the oldest one's place, once it is full
+        self.position = (
+            index + 1
+        ) % self.capacity  # the oldest transition, once the buffer is full
         self.size = max(self.size, index + 1)
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
-        """A batch in which no transition comes twice; all there are, if these are fewer."""
+        """Draws a batch without replacement; if there are too few transitions, it holds them all."""
         drawn = np.arange(self.size)
         if self.size > batch_size:
             drawn = rng.choice(self.size, batch_size, replace=False, shuffle=False)
@@ -118,7 +120,7 @@ class ReplayBuffer:
 
 
 class Normalizer:
-    """Brings observations to mean 0 and deviation 1, as seen so far (Welford's way)."""
+    """Normalises observations to mean 0 and deviation 1 by running statistics (Welford's method)."""
 
     def __init__(self, size: int) -> None:
         self.count, self.mean, self.squares = 0, np.zeros(size), np.zeros(size)
@@ -136,11 +138,11 @@ class Normalizer:
 
 
 def td_loss(q_network: QNetwork, target: QNetwork, batch: Any, args: Args) -> torch.Tensor:
-    """How far Q(s, a) is from r + γ max Q(s', a'), of which the second Q is the target network."""
+    """Returns the loss between Q(s, a) and r + γ max Q(s', a'), the latter by the target network."""
     observations, actions, rewards, next_observations, discounts = batch
     with torch.no_grad():
         next_values = target(next_observations)
-        # The maximum of noisy values is too high on average; double DQN has another network pick.
+        # The maximum of noisy values is too high on average, so in double DQN another network picks.
         picking = q_network(next_observations) if args.double else next_values
         best = picking.argmax(dim=1, keepdim=True)
         targets = rewards + discounts * next_values.gather(1, best).squeeze(1)
@@ -151,14 +153,14 @@ def td_loss(q_network: QNetwork, target: QNetwork, batch: Any, args: Args) -> to
 
 def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
     """Returns both networks, the function that acts greedily, and the returns of all episodes."""
-    torch.set_num_threads(1)  # networks this small only lose by more
+    torch.set_num_threads(1)  # networks this small are slower with more
     torch.manual_seed(args.seed)
     explore_rng, replay_rng = (np.random.default_rng([args.seed, use]) for use in (0, 1))
     env: Any = gymnasium.make(args.env_id)
     size, actions = env.observation_space.shape[0], int(env.action_space.n)
     q_network, target_network = (QNetwork(size, actions, args) for _ in range(2))
     target_network.load_state_dict(q_network.state_dict())
-    # One vector holds all weights, so that Adam and clipping have one tensor to handle, not eight.
+    # One vector holds all weights, so that Adam and clipping handle one tensor, not eight.
     weights = nn.Parameter(nn.utils.parameters_to_vector(q_network.parameters()).detach())
     nn.utils.vector_to_parameters(weights.data, q_network.parameters())
     optimizer = torch.optim.Adam([weights], lr=args.learning_rate, fused=True)
@@ -172,10 +174,10 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
     exploration = max(args.exploration_fraction * args.total_timesteps, 1e-9)  # [steps]
     window: deque[tuple[np.ndarray, int, float]] = deque()  # steps whose n rewards aren't known yet
     returns, episode_return, updates = [], 0.0, 0
-    env.reset(seed=args.seed)  # seeds the environment; every episode has a reset of its own
+    env.reset(seed=args.seed)  # only seeds the environment; every episode has a reset of its own
     observation = np.array(env.reset()[0], np.float32)
     for step in range(1, args.total_timesteps + 1):
-        # Act: at random with probability epsilon, else as the network thinks best.
+        # Act: randomly with probability epsilon, else greedily.
         share = min(1.0, (step - 1) / exploration)
         epsilon = args.start_e + (args.end_e - args.start_e) * share
         is_random = explore_rng.random() < epsilon
@@ -184,8 +186,8 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
         following = np.array(following, np.float32)
         episode_return += float(reward)
 
-        # Remember. An episode that a time limit cut off might have gone on: its last state keeps
-        # its value, and only a termination makes that 0.
+        # Store. An episode that a time limit cut off could have continued, so its last state keeps its
+        # value; only a termination makes that 0.
         normalizer.update(observation)
         window.append((observation, action, float(reward) * args.reward_scale))
         while len(window) == args.n_step or (window and (terminated or truncated)):
@@ -227,7 +229,7 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
 
 
 def evaluate(act: Callable[..., int], env_id: str, seed: int, episodes: int) -> list[float]:
-    """Returns of episodes in which no action is random."""
+    """Plays greedy episodes; returns their returns."""
     env, returns = gymnasium.make(env_id), []
     for episode in range(episodes):
         observation, done, total = env.reset(seed=seed + episode)[0], False, 0.0

@@ -1,8 +1,8 @@
-"""Draws what a cart-pole's policy prefers over the pole's angle and velocity, with an episode on top.
+"""Draws a cart-pole policy's preference over the pole's angle and velocity, with an episode on top.
 
     ./ws python3 examples/plot_policy.py runs/CartPole-v1__dqn__0__1700000000 policy.png
 
-The cart stands in the middle, at rest. Other environments need another pair of `observe` and `locate`.
+The cart is in the middle, at rest. Other environments need their own `observe` and `locate`.
 """
 
 import math
@@ -24,7 +24,7 @@ MAX_STEPS = 1500  # of the episode
 class StatePlane(NamedTuple):
     """How an environment observes the pole."""
 
-    angle: float  # [rad], the largest that is shown
+    angle: float  # [rad], the largest shown
     velocity: float  # [rad/s]
     observe: Callable[[np.ndarray, np.ndarray], np.ndarray]  # (N,), (N,) to (N, D)
     locate: Callable[[np.ndarray], tuple[float, float]]  # (D,) to angle and velocity
@@ -67,14 +67,14 @@ def main(folder: Path, out: Path) -> None:
 
     figure = new_figure(8, 6)
     axes = figure.subplots()
-    # Rare corners with huge values would leave no colour for the rest.
+    # Otherwise rare corners with huge values would use up the colour range.
     strongest = max(float(np.percentile(np.abs(values), 95)), 1e-9)
     mesh = axes.pcolormesh(np.degrees(angles), velocities, values, cmap="RdBu_r", vmin=-strongest,
                            vmax=strongest, shading="auto", rasterized=True)  # fmt: skip
     figure.colorbar(mesh, ax=axes, label=f"{policy.meaning}: red pushes right, blue left")
     if values.min() < 0.0 < values.max():
         axes.contour(np.degrees(angles), velocities, values, levels=[0.0], colors="black")
-    # A turn through hanging jumps from one edge to the other; NaN leaves that line out.
+    # When the pole swings through the bottom, its angle jumps between the edges; NaN breaks the line.
     line = visited.copy()
     line[1:][np.abs(np.diff(visited[:, 0])) > 180.0] = np.nan
     axes.plot(*line.T, color="0.1", linewidth=0.8, label="a greedy episode")

@@ -1,16 +1,16 @@
-"""REINFORCE with a learned baseline in one file, to be read from top to bottom.
+"""REINFORCE with a learned baseline in one file, to read from top to bottom.
 
     ./ws python3 examples/reinforce_single_file.py --seed 1
 
-REINFORCE (Williams 1992) plays whole episodes and makes those actions more probable that came out
-better than expected. What was to be expected, the baseline V(s), is fitted to the same episodes. How
-much better an action was, its advantage, is estimated by weighted sums of temporal differences
+REINFORCE (Williams 1992) plays whole episodes and makes actions more probable that turned out better
+than expected. The expected return, the baseline V(s), is fitted to the same episodes. How much
+better an action was, its advantage, is estimated by weighted sums of temporal differences
 (generalised advantages, Schulman et al. 2016). With --gae-lambda 1 these are whole returns less the
 baseline, and with --value-epochs 0 the baseline stays as it was drawn: what is left is REINFORCE.
 
-By default it learns to balance this project's robot, simulated in this process. Elsewhere no scale of
-the observations is known: --env-id CartPole-v1 --normalize-observations --batch-episodes 4
-The project's own agent, trained with the same options, comes to the same weights: a test sees to it.
+By default it learns to balance this project's robot, simulated in this process. In other environments
+the observations' scale isn't known: --env-id CartPole-v1 --normalize-observations --batch-episodes 4
+With the same options the project's own agent gets the same weights; a test checks this.
 """
 
 import argparse
@@ -25,14 +25,14 @@ import torch
 from torch import nn
 from torch.utils.tensorboard import SummaryWriter
 
-import cartpole  # noqa: F401  it registers the robot's environments
+import cartpole  # noqa: F401  registers the robot's environments
 
 ROBOT = "cartpole/Balance-v0"
-SCALE = (0.4, 1.0, 0.2, 2.0)  # [m], [m/s], [rad], [rad/s]: what the robot's observations come to
+SCALE = (0.4, 1.0, 0.2, 2.0)  # [m], [m/s], [rad], [rad/s]: magnitudes of the robot's observations
 
 
 def option(default: Any, text: str, **how: Any) -> Any:
-    """A field of Args, with what argparse has to know of it."""
+    """Makes a field of Args, with its arguments for argparse."""
     is_switch = isinstance(default, bool)
     kind = {"action": argparse.BooleanOptionalAction} if is_switch else {"type": type(default)}
     return field(default=default, metadata={**kind, "help": text, **how})
@@ -64,7 +64,7 @@ def parse_args(argv: list[str] | None = None) -> Args:
 
 
 def policy_network(inputs: int, actions: int, hidden: int) -> nn.Sequential:
-    """Observations (N, D) to the probabilities of the actions (N, A), which are alike at first."""
+    """Maps observations (N, D) to the probabilities of the actions (N, A), which start equal."""
     layers = [nn.Linear(inputs, hidden), nn.Tanh()] if hidden else []
     last = nn.Linear(hidden or inputs, actions)
     nn.init.zeros_(last.weight)
@@ -73,7 +73,7 @@ def policy_network(inputs: int, actions: int, hidden: int) -> nn.Sequential:
 
 
 def value_network(inputs: int, hidden: int) -> nn.Sequential:
-    """Observations (N, D) to the baseline (N, 1): the return that is to be expected."""
+    """Maps observations (N, D) to the baseline (N, 1), the expected return."""
     return nn.Sequential(
         nn.Linear(inputs, hidden), nn.Tanh(),
         nn.Linear(hidden, hidden), nn.Tanh(),
@@ -82,7 +82,7 @@ def value_network(inputs: int, hidden: int) -> nn.Sequential:
 
 
 class Normalizer:
-    """Brings observations to mean 0 and deviation 1, as seen so far (Welford's way)."""
+    """Normalises observations to mean 0 and deviation 1 by running statistics (Welford's method)."""
 
     def __init__(self, size: int) -> None:
         self.count, self.mean, self.squares = 0, np.zeros(size), np.zeros(size)
@@ -100,12 +100,12 @@ class Normalizer:
 
 
 class Episode(NamedTuple):
-    """T steps; of the observations there is one more."""
+    """An episode of T steps, with T + 1 observations."""
 
     observations: list[np.ndarray]
     actions: list[int]
     rewards: list[float]
-    terminated: bool  # else it was cut off, and would have gone on
+    terminated: bool  # else it was cut off, and could have continued
 
 
 def run_episode(env: gymnasium.Env, act: Callable[[np.ndarray], int], **reset: Any) -> Episode:
@@ -121,10 +121,10 @@ def run_episode(env: gymnasium.Env, act: Callable[[np.ndarray], int], **reset: A
 
 
 def advantages_of(rewards: list[float], values: np.ndarray, args: Args) -> np.ndarray:
-    """How much better each of T actions was than the baseline had expected.
+    """Returns how much better each of T actions was than the baseline expected, (T,).
 
-    A step's surprise is δ = r + γ V(s') - V(s). An advantage is the sum of all surprises from its
-    step on, each next one weighing γλ times as much.
+    A step's temporal difference is δ = r + γ V(s') - V(s). An advantage is the sum of the differences
+    from its step on, each weighing γλ times as much as the one before.
 
     Args:
         rewards: of T steps.
@@ -139,7 +139,7 @@ def advantages_of(rewards: list[float], values: np.ndarray, args: Args) -> np.nd
 
 def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
     """Returns policy, baseline, the function that acts greedily, and the returns of all episodes."""
-    torch.set_num_threads(1)  # networks this small only lose by more
+    torch.set_num_threads(1)  # networks this small are slower with more
     torch.manual_seed(args.seed)
     rng = np.random.default_rng(args.seed)
     env: Any = gymnasium.make(args.env_id)
@@ -168,7 +168,7 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
 
     returns, steps = [], 0
     batch: list[Episode] = []
-    env.reset(seed=args.seed)  # seeds the environment; every episode has a reset of its own
+    env.reset(seed=args.seed)  # only seeds the environment; every episode has a reset of its own
     for index in range(args.episodes):
         episode = run_episode(env, act)
         batch.append(episode)
@@ -180,8 +180,8 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
         if len(batch) < args.batch_episodes:
             continue
 
-        # Judge every action by the baseline. An episode that was cut off might have gone on: its
-        # last state keeps its value, and only a termination makes that 0.
+        # Compare every action with the baseline. An episode that was cut off could have continued, so
+        # its last state keeps its value; only a termination makes that 0.
         judged, wanted = [], []
         for episode in batch:
             with torch.no_grad():
@@ -193,7 +193,7 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
         advantages, targets = (
             torch.from_numpy(np.concatenate(each).astype(np.float32)) for each in (judged, wanted)
         )
-        # Actions that did better than average will become more probable, all others less.
+        # Actions that did better than average become more probable, all others less.
         spread = float(advantages.std(correction=0))
         advantages = (advantages - advantages.mean()) / (spread + 1e-8)
 
@@ -203,14 +203,14 @@ def train(args: Args, writer: SummaryWriter) -> tuple[Any, ...]:
         chances = policy(seen)
         chosen = torch.log(chances.gather(1, taken.unsqueeze(1)).squeeze(1))
         policy_loss = -(chosen * advantages).mean()
-        if args.entropy_coefficient:  # keeps it from being sure too early
+        if args.entropy_coefficient:  # keeps the policy from becoming deterministic too early
             entropy = torch.special.entr(chances.clamp_min(np.finfo(np.float32).tiny)).sum(1)
             policy_loss = policy_loss - args.entropy_coefficient * entropy.mean()
         policy_optimizer.zero_grad()
         policy_loss.backward()
         policy_optimizer.step()
 
-        # Many steps of the baseline, which is to tell the returns as well as it can.
+        # Many steps of the baseline, to fit the returns closely.
         for _ in range(args.value_epochs):
             value_loss = nn.functional.mse_loss(value(seen).squeeze(1), targets)
             value_optimizer.zero_grad()
@@ -229,7 +229,7 @@ if __name__ == "__main__":
     name = f"{args.env_id.replace('/', '_')}__reinforce__{args.seed}__{int(time.time())}"
     with SummaryWriter(f"runs/{name}") as writer:
         *_, act, _ = train(args, writer)
-        # The robot repeats itself: from upright all greedy episodes would be one.
+        # Without noise the robot always starts the same, so all greedy episodes would be identical.
         options: dict[str, Any] = {"noise": 0.02} if args.env_id == ROBOT else {}
         env = gymnasium.make(args.env_id, **options)
         greedy = [run_episode(env, act, seed=1_000_000 + args.seed + k) for k in range(20)]

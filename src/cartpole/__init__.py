@@ -10,7 +10,7 @@ import gymnasium
 __all__ = ["NAMESPACE"]
 
 NAMESPACE = "cartpole"
-_ENVIRONMENTS = {  # name: task, and the return from which on it counts as solved
+_ENVIRONMENTS = {  # name: task, and the return at which it counts as solved
     "Balance": ("balance", 1200.0),  # of up to 1500: all 3000 steps, the cart near the middle
     "Classic": ("classic", 475.0),  # of 500 steps, as for CartPole-v1
     "SwingUp": ("swing-up", 1000.0),  # of 1250 steps, of which swinging up takes 200 and more

@@ -11,7 +11,7 @@ NODE = "dqn_train"
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Trains as the arguments say; returns the process's exit code."""
+    """Runs the command line; returns the process's exit code."""
     try:
         with ended_by_ctrl_c():
             flags, parameters, _ = ros_options(sys.argv[1:] if argv is None else argv, NODE)

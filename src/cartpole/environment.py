@@ -110,7 +110,7 @@ class CartPoleEnv(RobotEnv):
 
 
 def _by_joint(noise: float | Sequence[float] | np.ndarray | Mapping[str, Any]) -> Any:
-    """Noise in the order of `CartPoleState`, by the name of the joint."""
+    """Converts noise in the order of `CartPoleState` to noise by joint name."""
     if isinstance(noise, Mapping):
         return noise
     sizes = np.ravel(noise).tolist() * (1 if np.ndim(noise) else 4)
@@ -129,7 +129,7 @@ class CartPoleVariation(NamedTuple):
     pole_friction: float = 0.0  # [N m s/rad]
 
     def of_robot(self) -> Variation:
-        """The same, by names of links and joints."""
+        """Returns the same variation by names of links and joints."""
         return Variation(
             {
                 CART_LINK: LinkScale(self.cart_mass),
@@ -170,9 +170,9 @@ class CartPoleRandomisation:
                 raise ValueError(f"randomisation of {name} must lie in [0, {most}], not {value}")
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, np.ndarray]:
-        """Draws one robot; the array, (5,), is its `CartPoleVariation`.
+        """Draws one robot; returns it also as a `CartPoleVariation` in an array, (5,).
 
-        Always draws five numbers, so that later draws don't depend on what is varied.
+        It always draws five numbers, so that later draws don't depend on which properties vary.
         """
         cart, pole, length, rail, hinge = (float(value) for value in rng.random(5))
         drawn = CartPoleVariation(

@@ -29,7 +29,7 @@ LARGEST_NOISE = 0.2  # [m], [rad]; just inside the angle at which an episode end
 
 @dataclass(frozen=True)
 class RobotOptions:
-    """Where the robot is, and how its episodes start; raises WorkbenchError for a value beyond its limits."""
+    """Where the robot is, and how its episodes start; raises WorkbenchError for values outside the limits."""
 
     backend: str | None = option(
         None, "ros: a simulator over ROS, which is started if none runs; bullet: in this process, "
@@ -53,22 +53,22 @@ class RobotOptions:
 
     @property
     def environment(self) -> dict[str, Any]:
-        """The same as options of the environment."""
+        """Returns these options as options of the environment."""
         noise = {"noise": self.start_noise} if self.start_noise else {}
         if not self.realtime:
             installed = "ros" if has_ros() else "bullet"
             return {"backend": self.backend or installed, **noise}
-        # As the existing script does, take the newest joint state without waiting.
+        # Like the existing script, take the newest joint state without waiting.
         return {"backend": "ros-realtime", "control_period": 0.0, **noise}
 
 
 ROBOT_OPTIONS = Options(RobotOptions)
-_ANYWHERE = (False, 0.0, "bullet")  # values that every environment takes
+_ANYWHERE = (False, 0.0, "bullet")  # values that suit every environment
 
 
 @reader_may_go()
 def main(argv: list[str] | None = None) -> int:
-    """Trains as the arguments say; returns the process's exit code."""
+    """Runs the command line; returns the process's exit code."""
     argv = sys.argv[1:] if argv is None else argv
     interrupt = Interrupt().install()
     try:
@@ -80,7 +80,7 @@ def main(argv: list[str] | None = None) -> int:
                 over_ros = needs_session(options)
                 if over_ros:
                     beside.enter_context(session(options, name, argv, robot, folder))
-                # A single robot over ROS is seen in its simulator's window.
+                # A single robot over ROS is shown in its simulator's window.
                 if not over_ros or options.run.num_envs > 1:
                     beside.enter_context(shown(options, folder, PROGRAM))
 
@@ -106,7 +106,7 @@ def _failed(error: Exception, interrupt: Interrupt) -> int:
 
 
 def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOptions, RobotOptions]:
-    """Options of the training and of the robot, from flags and private parameters.
+    """Reads the options of training and robot from flags and private parameters.
 
     Raises:
         SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.
@@ -162,7 +162,7 @@ def _combined(
 
 
 def needs_session(options: TrainingOptions) -> bool:
-    """Whether the cart-pole is trained over ROS."""
+    """Returns whether the cart-pole is trained over ROS."""
     return options.run.env_id.startswith(f"{NAMESPACE}/") and _backend(options) != "bullet"
 
 
@@ -174,17 +174,17 @@ def _backend(options: TrainingOptions) -> str:
 def session(
     options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions, folder: Path
 ) -> Iterator[None]:
-    """Keeps running what the robot needs over ROS.
+    """Runs what the robot needs over ROS until the block ends.
 
     Args:
         options: of the training.
         name: this node's full name.
         argv: the process's arguments, with roslaunch's remappings.
-        robot: whether RViz is opened.
-        folder: of the training, whose curves the simulator's window shows.
+        robot: the robot's options, among them whether to open RViz.
+        folder: the run folder, whose curves the simulator's window shows.
 
     Raises:
-        RobotEnvError: if something can't be started, or what runs doesn't fit.
+        RobotEnvError: if something can't be started, or an already running part doesn't fit.
     """
     backend = _backend(options)
     need_ros(f"the backend {backend}")

@@ -1,4 +1,4 @@
-"""The command policy_node.py: a trained policy moves a robot over ROS."""
+"""The command policy_node.py: moves a robot over ROS with a trained policy."""
 
 import argparse
 import contextlib
@@ -45,13 +45,13 @@ class Deployed(NamedTuple):
 
     robot: Robot
     task: Task
-    act: Callable[[Any], Any]  # the action for the task's observation
-    period: float  # [s] of control
+    act: Callable[[Any], Any]  # returns the action for the task's observation
+    period: float  # [s], control period
 
 
 @reader_may_go()
 def main(argv: list[str] | None = None) -> int:
-    """Runs the policy as the arguments say; returns the process's exit code."""
+    """Runs the command line; returns the process's exit code."""
     argv = sys.argv[1:] if argv is None else argv
     interrupt = Interrupt().install()
     try:
@@ -84,7 +84,7 @@ def main(argv: list[str] | None = None) -> int:
 
 @contextlib.contextmanager
 def _errors_in_one_line() -> Iterator[None]:
-    """Converts any error of the user's task, once the robot is stopped."""
+    """Turns any error of the user's task into one line, once the robot has stopped."""
     try:
         yield
     except RobotEnvError:
@@ -156,13 +156,13 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
     """Loads the policy of a run folder or an exported file, with its robot and task.
 
     Args:
-        path: of the folder or file.
-        which: checkpoint of a run folder.
-        options: of the environment, on top of the training's own.
+        path: the run folder or the exported file.
+        which: the checkpoint of a run folder.
+        options: options of the environment on top of the training's.
 
     Raises:
         WorkbenchError: if there is no such policy or environment.
-        RobotEnvError: if its environment has no robot, or several.
+        RobotEnvError: if its environment doesn't have exactly one robot.
     """
     if path.is_dir():
         run = open_run(path)
@@ -189,10 +189,10 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
 
 
 def _in_process(options: dict[str, Any]) -> dict[str, Any]:
-    """The same options without a simulator over ROS: only robot and task are needed."""
+    """Returns the options for an environment in this process: only its robot and task are needed."""
     if options.get("backend") in OVER_ROS:
         options["backend"] = IN_PROCESS
-    if options.get("control_period") == 0.0:  # in real time: as fast as joint states come
+    if options.get("control_period") == 0.0:  # real time, one action per joint state
         options["control_period"] = None
     return options
 
@@ -209,7 +209,7 @@ def _check_same(path: Path, metadata: dict[str, Any], env: gymnasium.Env[Any, An
 
 
 def _of_task(env: gymnasium.Env[Any, Any], act: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """The policy for the task's own observations, which the training may have flattened."""
+    """Returns the policy as a function of the task's observations, which the training may have flattened."""
     own = env.unwrapped.observation_space
     if env.observation_space == own:
         return lambda observation: act(as_float32(observation))

@@ -28,25 +28,25 @@ class CartPoleState(NamedTuple):
 
     @classmethod
     def of(cls, state: WorldState) -> Self:
-        """The joints of a world."""
+        """Returns the cart-pole's joints in a world's state."""
         cart, pole = state.joints[CART_JOINT], state.joints[POLE_JOINT]
         return cls(cart.position, cart.velocity, pole.position, pole.velocity)
 
     def to_begin(self, height: float = 0.0) -> InitialState:
-        """An episode that begins in this state, with the stand raised by a height [m]."""
+        """Returns an episode's initial state, with the stand raised by a height [m]."""
         joints = {CART_JOINT: (self[0], self[1]), POLE_JOINT: (self[2], self[3])}
         raised = {MODEL: Pose((0.0, 0.0, height))} if height else {}
         return InitialState(joints, raised)
 
 
 class CartPoleTask(Task):
-    """One thing to learn on the cart-pole.
+    """Base class of the cart-pole's tasks.
 
     Actions move the set-point of the cart's position controller. Set-points add up over an
-    episode, starting from where the cart stands.
+    episode, starting where the cart stands.
 
     Args:
-        noise: half-width of the uniform noise on the initial state; 0: every episode starts alike.
+        noise: half-width of the uniform noise on the initial state; with 0 all episodes start alike.
 
     Raises:
         ValueError: for an impossible noise.
@@ -88,7 +88,7 @@ class BalanceTask(CartPoleTask):
         return gymnasium.spaces.Discrete(2)
 
     def observation_space(self) -> gymnasium.spaces.Box:
-        """Float32, shape (4,): the state in its own order."""
+        """Float32, shape (4,): the fields of `CartPoleState` in order."""
         high = np.array([2 * POSITION_LIMIT, _ANY, np.pi, _ANY], dtype=np.float32)
         return gymnasium.spaces.Box(-high, high, dtype=np.float32)
 
@@ -188,7 +188,7 @@ class SwingUpTask(CartPoleTask):
 
 
 def _bell(x: float) -> float:
-    """1 at 0, 0.1 at 1."""
+    """Returns the bell curve 0.1 ** x²: 1 at 0, 0.1 at +-1."""
     return 0.1 ** (x * x)
 
 

@@ -11,12 +11,12 @@ from rl_workbench.starting import program
 from robot_envs.backends import need_ros
 from robot_envs.errors import RobotEnvError
 
-PROGRAM = program("cartpole.workbench")  # knows the same environments
+PROGRAM = program("cartpole.workbench")  # this module, since it registers the same environments
 REMAPPING = ":="  # in every argument of ROS's: __name:=pg_train, _gamma:=0.9, old:=new
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Does what the arguments say; returns the process's exit code."""
+    """Runs the command line; returns the process's exit code."""
     argv = sys.argv[1:] if argv is None else argv
     plain = [each for each in argv if not (each.startswith("__") and ":=" in each)]  # roslaunch's
     return cli.main(plain, Path(sys.argv[0]).name, PROGRAM)

@@ -1,12 +1,12 @@
-"""Writes a catkin package for a robot of the user's; only scripts/new_robot.py uses it.
+"""Writes a catkin package for the user's own robot; only scripts/new_robot.py uses it.
 
 `cli` reads the command line, `urdf_files` copies the URDF with what it includes, `survey` finds out what
-it is made of, `contents` fills in the files of `template/`, and `package` puts all of that together. Knows
-no robot by name.
+it is made of, `contents` fills in the files of `template/`, and `package` combines the results. It knows no
+robot by name.
 """
 
 __all__ = ["CannotWrite"]
 
 
 class CannotWrite(Exception):
-    """Why a package can't be written: one line with what is wrong and what to do."""
+    """A package can't be written. The text is one line with what is wrong and what to do."""

@@ -17,7 +17,7 @@ VALID = re.compile(r"[a-z][a-z0-9_]*")
 
 
 def check_name(name: str) -> None:
-    """Raises CannotWrite unless catkin and Python allow a name and it is free; suggests another one."""
+    """Raises CannotWrite, with a suggestion, unless a name is free and valid for catkin and Python."""
     if VALID.fullmatch(name) and not keyword.iskeyword(name):
         if _is_taken(name):
             raise CannotWrite(f"the name '{name}' is taken: {_other(name)}")
@@ -30,7 +30,7 @@ def check_name(name: str) -> None:
 
 
 def _other(name: str) -> str:
-    """Suggests a similar name."""
+    """Returns a similar name as a suggestion."""
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
     near = re.sub(r"[^a-z0-9]+", "_", words).strip("_") or "robot"
     tried = (near, f"my_{near}", *(f"my_{near}_{number}" for number in range(2, 10)))
@@ -43,7 +43,7 @@ def _other(name: str) -> str:
 
 
 def _is_taken(name: str) -> bool:
-    """Whether a package or a Python module has the name."""
+    """Returns whether a package or a Python module has the name."""
     if importlib.util.find_spec(name) is not None:
         return True
     if importlib.util.find_spec("rospkg") is None:
@@ -58,7 +58,7 @@ INTERRUPTED = 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Writes a package as the command line says; returns the exit code."""
+    """Runs the command line; returns the exit code."""
     args = _parser().parse_intermixed_args(argv)  # arguments may follow options
     try:
         parent = package.PARENT if args.to is None else args.to.expanduser()
@@ -118,7 +118,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _write(args: argparse.Namespace, parent: Path) -> list[str]:
-    """Writes the package beside its place, and moves it there when complete; returns lines for the user."""
+    """Writes the package beside its destination, and moves it there once complete; returns lines to print."""
     check_name(args.name)
     folder = parent.absolute() / args.name
     if os.path.lexists(folder):

@@ -1,4 +1,4 @@
-"""What a package says: the template's files with the robot's names and numbers, and gains for a start."""
+"""A package's files: the template filled with the robot's names and numbers, and initial gains."""
 
 import math
 import string
@@ -17,23 +17,23 @@ from package_writing.survey import EFFORT, POSITION, Motor, Survey
 FREQUENCY = (
     12.0  # [rad/s], at least, of a joint on its p and d with all that it carries stretched out
 )
-HIGHEST = 250.0  # [rad/s], of what a joint moves in itself: steps of 1 ms can't follow more
-MOST = 25.0  # times that, which it may carry
-SAG = 0.1  # [rad, m], at most, by its weight on p alone
-SHARE = 0.05  # of its range, at most as well
+HIGHEST = 250.0  # [rad/s], of a joint's own inertia; steps of 1 ms can't follow a higher one
+MOST = 25.0  # largest ratio of carried to own inertia
+SAG = 0.1  # [rad, m], largest sag under its weight with p alone
+SHARE = 0.05  # largest sag as a share of the joint's range
 GRAVITY = 9.81  # [m/s²]
-VELOCITY = 5.0  # [1/s], where the output is a velocity
+VELOCITY = 5.0  # [1/s], p if the output is a velocity
 
-CLAMP = 5.0  # [rad/s], of a wheel: i does no more than p where it is that much too slow
+CLAMP = 5.0  # [rad/s], of a wheel: i gives at most what p gives at this velocity error
 
 Gains = dict[str, float]
 
 
 def effort_gains(model: ModelDescription) -> dict[str, Gains]:
-    """Gains of position controllers whose output is an effort, by joint.
+    """Returns gains of position controllers with an effort as output, by joint.
 
-    p and d make joint and load a critically damped spring, stiff enough for its weight; i, within its clamp,
-    holds the weight against gravity.
+    p and d make joint and load a critically damped spring, stiff enough for their weight; i, within its
+    clamp, compensates gravity.
     """
     carried = most_inertias(model)
     own = effective_inertias(model, poses_at_zero(model))
@@ -42,7 +42,7 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
     for name, inertia in carried.items():
         ratio = min(inertia / own[name], MOST) if own[name] > 0.0 else 1.0
         moved = own[name] * ratio or inertia
-        weight = GRAVITY * math.sqrt(below[name] * inertia)  # no less than it can weigh [N m, N]
+        weight = GRAVITY * math.sqrt(below[name] * inertia)  # upper bound of the load [N m, N]
         joint = model.joints[name]
         sag = min(SAG, SHARE * (joint.upper - joint.lower)) if joint.bounded else SAG
         frequency = min(max(FREQUENCY, math.sqrt(weight / sag / moved)), HIGHEST / ratio)
@@ -54,14 +54,14 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
 
 
 def velocity_gains() -> Gains:
-    """Gains of a position controller whose output is a velocity."""
+    """Returns the gains of a position controller with a velocity as output."""
     return {"p": VELOCITY}
 
 
 def wheel_gains(model: ModelDescription) -> dict[str, Gains]:
-    """Gains of velocity controllers whose output is an effort, by joint.
+    """Returns gains of velocity controllers with an effort as output, by joint.
 
-    p is as stiff as steps of 1 ms allow with the wheel in the air; i works against slopes and friction.
+    p is as stiff as steps of 1 ms allow with the wheel in the air; i compensates slopes and friction.
     """
     found = {}
     for name, inertia in effective_inertias(model, poses_at_zero(model)).items():
@@ -71,7 +71,7 @@ def wheel_gains(model: ModelDescription) -> dict[str, Gains]:
 
 
 def _masses(model: ModelDescription) -> dict[str, float]:
-    """The mass that each movable joint carries [kg]."""
+    """Returns the mass that each movable joint carries [kg]."""
     found = {}
     for joint in model.movable_joints:
         links = [joint.child]
@@ -87,14 +87,14 @@ def _rounded(gains: Gains) -> Gains:
 
 
 TEMPLATE = Path(__file__).resolve().parent / "template"
-PARTS = TEMPLATE.with_name("parts")  # of a xacro file that adds what a robot's own lacks
+PARTS = TEMPLATE.with_name("parts")  # of a xacro file that adds what the robot's file lacks
 QUOTE = {'"': "&quot;"}
-FILLED = ".in"  # the end of the names of files that have something to be filled in
+FILLED = ".in"  # suffix of template files with values to fill in
 PERIOD = 0.04  # [s] of an action
 
 
 class Filled(string.Template):
-    """A template whose delimiter launch files, xacro and CMake don't use."""
+    """A template with a delimiter that launch files, xacro and CMake don't use."""
 
     delimiter = "%"
 
@@ -103,9 +103,9 @@ def fill(folder: Path, package: str, values: Mapping[str, str]) -> None:
     """Writes the template's files, except the default robot.
 
     Args:
-        folder: of the package.
-        package: its name.
-        values: to be filled in, by their names in the template.
+        folder: the package's folder.
+        package: the package's name.
+        values: the values to fill in, by their names in the template.
     """
     for source in sorted(TEMPLATE.rglob(f"*{FILLED}")):
         place = source.relative_to(TEMPLATE).with_suffix("")
@@ -117,12 +117,12 @@ def fill(folder: Path, package: str, values: Mapping[str, str]) -> None:
 
 
 def controller(motor: Motor) -> str:
-    """The name of a joint's controller."""
+    """Returns the name of a joint's controller."""
     return f"{motor.joint}_controller"
 
 
 def controllers_text(survey: Survey) -> str:
-    """The controllers, as YAML."""
+    """Returns the controllers as YAML."""
     by_joint, of_wheels = effort_gains(survey.model), wheel_gains(survey.model)
     lines = []
     for motor in survey.motors:
@@ -164,7 +164,7 @@ def _units(motor: Motor) -> str:
 
 
 def ranges_text(survey: Survey) -> str:
-    """The postures to reach, as the inside of a Python dict."""
+    """Returns the ranges of the postures to reach, as the inside of a Python dict."""
     return "".join(
         f'    "{motor.joint}": ({_inwards(motor.low, math.ceil)}, {_inwards(motor.high, math.floor)}),\n'
         for motor in survey.motors
@@ -172,12 +172,12 @@ def ranges_text(survey: Survey) -> str:
 
 
 def _inwards(bound: float, rounded: Callable[[float], int]) -> float:
-    """A bound rounded to three decimals, inwards."""
+    """Rounds a bound to three decimals, inwards."""
     return rounded(bound * 1000.0) / 1000.0
 
 
 def wheels_text(survey: Survey) -> dict[str, str]:
-    """The template's values about wheels; empty if there are none."""
+    """Returns the template's values about wheels; empty if there are no wheels."""
     listed = "".join(f'    "{each.joint}",\n' for each in survey.motors if each.wheel)
     where = (
         '        """Where the joints are{}."""\n        return np.array([{} for joint in RANGES])'
@@ -197,18 +197,18 @@ def wheels_text(survey: Survey) -> dict[str, str]:
 
 
 def names_text(survey: Survey) -> str:
-    """Joints and their controllers, as the inside of a Python dict."""
+    """Returns joints and their controllers, as the inside of a Python dict."""
     return "".join(f'    "{each.joint}": "{controller(each)}",\n' for each in survey.motors)
 
 
 def control_text(package: str, urdf: str, survey: Survey | None, loose: str) -> str:
-    """A xacro file that includes the user's and adds what it lacks.
+    """Returns a xacro file that includes the user's file and adds what it lacks.
 
     Args:
-        package: its name.
-        urdf: the user's file, beside it.
-        survey: of that file; None: not known yet, so that it gets no motors.
-        loose: the link that has to be fixed to the world, if any.
+        package: the package's name.
+        urdf: the user's file, in the same folder.
+        survey: of that file; None if not known yet, so that no motors are added.
+        loose: the link to fix to the world; "" for none.
     """
     parts = []
     if loose:

@@ -1,4 +1,4 @@
-"""Writes one package, and reports what it has."""
+"""Writes one package, and reports its contents."""
 
 import json
 import math
@@ -24,22 +24,22 @@ PARENT = TREE.parent if IS_CHECKOUT else Path()
 
 INTERFACES = ("effort", "position", "velocity")
 ARM = contents.TEMPLATE / "urdf/two_link_arm.urdf.xacro"
-NOTES = 3  # of a URDF's warnings, that are shown
+NOTES = 3  # largest number of a URDF's warnings to show
 OURS = ("cartpole", "controller_manager", "gazebo_ros", "xacro")  # the template depends on them
 
 
 @dataclass(frozen=True)
 class PackageRequest:
-    """What the user asks for.
+    """The user's request for a package.
 
     Args:
-        name: of the package.
-        folder: where it will be.
-        urdf: the robot's file; None: a two-link arm.
-        arguments: of xacro.
-        base: "fixed" or "free", for a robot that isn't fixed to the world; None: not given.
-        height: at which it is spawned [m]; None: 0, or where a free base stands on the ground.
-        interface: of its joints, if they have no transmissions; None: velocity for wheels, effort for others.
+        name: the package's name.
+        folder: its destination.
+        urdf: the robot's file; None for a two-link arm.
+        arguments: xacro's arguments.
+        base: "fixed" or "free", for a robot that isn't fixed to the world; None if not given.
+        height: where to spawn it [m]; None for 0, or so that a free base stands on the ground.
+        interface: of joints without transmissions; None for velocity on wheels and effort on others.
         passive: joints that get no motor, if none has a transmission.
     """
 
@@ -54,7 +54,7 @@ class PackageRequest:
 
 
 def read_arguments(texts: Sequence[str]) -> dict[str, str]:
-    """Parses arguments of xacro; raises CannotWrite if one isn't NAME:=VALUE."""
+    """Parses xacro's arguments; raises CannotWrite if one isn't NAME:=VALUE."""
     found = {}
     for text in texts:
         name, sign, value = text.partition(":=")
@@ -68,7 +68,7 @@ def write(request: PackageRequest, made: Path) -> list[str]:
     """Writes the package into an empty folder.
 
     Returns:
-        Lines for the user.
+        Lines to print.
 
     Raises:
         CannotWrite: if the robot can't be read, simulated or moved.
@@ -90,7 +90,7 @@ def write(request: PackageRequest, made: Path) -> list[str]:
         (made / "urdf" / control).write_text(text, encoding="utf-8")
         return expanded(made / "urdf" / control, request.arguments)
 
-    if loose:  # a base without mass can't be simulated before it is fixed
+    if loose:  # a base without mass can't be simulated until it is fixed
         urdf, xml = control, with_more(None)
     survey = look_at(xml, interface, resources, free=free, passive=request.passive)
     lacks, added = list(_lacks(survey, loose)), survey.added
@@ -115,7 +115,7 @@ def write(request: PackageRequest, made: Path) -> list[str]:
 
 
 def _loose_link(request: PackageRequest, root: str, source: Path) -> str:
-    """The link that has to be fixed to the world; empty: none."""
+    """Returns the link to fix to the world; "" for none."""
     if root == "world" or request.base == "free":
         return ""
     if request.base == "fixed":
@@ -174,7 +174,7 @@ def _values(request: PackageRequest, survey: Survey, urdf: str, copied: Copied) 
 
 
 def _lacks(survey: Survey, loose: str) -> Iterator[str]:
-    """What the robot's file lacks."""
+    """Yields what the robot's file lacks."""
     if loose:
         yield f"a joint that fixes '{loose}' to the world"
     if survey.added:
@@ -218,7 +218,7 @@ def _report(
 
 
 def _commands(request: PackageRequest, copied: Copied) -> list[str]:
-    """Commands for the next steps, run in the checkout."""
+    """Returns commands for the next steps, to run in the checkout."""
     place = (
         os.path.relpath(request.folder, TREE) if request.folder.parent == PARENT else request.folder
     )
@@ -239,7 +239,7 @@ def _commands(request: PackageRequest, copied: Copied) -> list[str]:
 
 
 def _others(copied: Copied) -> Iterator[str]:
-    """Folders given to ws that have packages which the robot needs."""
+    """Yields folders passed to ws that hold packages which the robot needs."""
     needed = [path.resolve() for each in copied.packages if (path := _package(each)) is not None]
     for folder in filter(None, os.environ.get("CARTPOLE_WITH", "").split(":")):
         if any(path.is_relative_to(Path(folder).resolve()) for path in needed):

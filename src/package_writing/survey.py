@@ -1,4 +1,4 @@
-"""What a URDF is made of, as far as a package for it has to know, and how high the robot stands."""
+"""Surveys a URDF: its motors and passive joints, its plugin, and the height at which the robot stands."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -24,32 +24,32 @@ PLUGIN = "libgazebo_ros_control.so"
 EFFORT, POSITION, VELOCITY = (
     f"{kind}JointInterface" for kind in ("Effort", "Position", "Velocity")
 )
-SHARE = 0.6  # of a joint's range, about its middle, that postures to reach are drawn from
-WIDEST = 1.8  # [rad, m], half of what they are drawn from
+SHARE = 0.6  # of a joint's range, about its middle, from which postures to reach are drawn
+WIDEST = 1.8  # [rad, m], largest half-width of that range
 FASTEST = 5.0  # [rad/s], of wheels
 
 
 @dataclass(frozen=True)
 class Motor:
-    """A joint that is moved, and the interface that moves it."""
+    """A joint with a motor, and the interface that moves it."""
 
     joint: str
     interface: str
-    low: float  # of the postures to reach [rad, m], or of a wheel's speeds [rad/s]
+    low: float  # bounds of the postures to reach [rad, m], or of a wheel's speeds [rad/s]
     high: float
     linear: bool
-    limited: bool  # whether the URDF's limits of effort and velocity leave it able to move
+    limited: bool  # whether the URDF's limits of effort and velocity let it move
     wheel: bool  # a continuous joint of a robot whose base is free, which gets velocity commands
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What is known of a URDF."""
+    """The result of `look_at`."""
 
     model: ModelDescription
     motors: tuple[Motor, ...]
-    passive: tuple[str, ...]  # joints that move without a motor
-    added: bool  # whether the motors are missing in the URDF, which needs transmissions
+    passive: tuple[str, ...]  # movable joints without a motor
+    added: bool  # whether the URDF lacks transmissions, so that they must be added
     has_plugin: bool
     namespace: str  # of the plugin
 
@@ -62,11 +62,11 @@ def look_at(
     free: bool = False,
     passive: Sequence[str] = (),
 ) -> Survey:
-    """Reads a URDF.
+    """Surveys a URDF.
 
     Args:
-        xml: the text.
-        interface: of the joints, if none has a transmission; None: velocity for wheels, effort for others.
+        xml: the URDF's text.
+        interface: of the joints, if none has a transmission; None for velocity on wheels, effort on others.
         resources: finds meshes.
         free: whether the robot's base stays free.
         passive: joints that get no motor, if none has a transmission.
@@ -110,7 +110,7 @@ def look_at(
 
 
 def root_link(xml: str) -> str:
-    """The root link, "world" for a robot that is fixed to the world; raises CannotWrite if it is no URDF."""
+    """Returns the root link, "world" for a robot fixed to it; raises CannotWrite if the text is no URDF."""
     try:
         robot = parse(xml)
     except FileError as error:
@@ -182,9 +182,9 @@ def _plugins(robot: Element) -> Iterator[Element]:
 
 
 def standing_height(model: ModelDescription) -> float | None:
-    """The smallest height at which no collision is below the ground, joints at zero [m, three decimals].
+    """Returns the least height at which no collision is below the ground, joints at zero [m, three decimals].
 
-    None: there is no collision.
+    None if there are no collisions.
     """
     lows = [
         _low(shape, pose.compose(shape.pose))
@@ -197,7 +197,7 @@ def standing_height(model: ModelDescription) -> float | None:
 
 
 def height_note(height: float, stands: float | None) -> str:
-    """A line about the height at which a robot is spawned [m], and that at which it stands on the ground."""
+    """Returns a line on the height at which a robot is spawned, and at which it stands on the ground [m]."""
     if stands is None:
         return "note: it has no <collision>, so that it falls through the ground"
     spawned = f"spawned at a height of {height:g} m"
@@ -207,8 +207,8 @@ def height_note(height: float, stands: float | None) -> str:
 
 
 def _low(shape: Shape, pose: Pose) -> float:
-    """The height of a shape's lowest point [m]."""
-    up = np.array(rotate(conjugate(pose.orientation), (0.0, 0.0, 1.0)))  # as the shape sees it
+    """Returns the height of a shape's lowest point [m]."""
+    up = np.array(rotate(conjugate(pose.orientation), (0.0, 0.0, 1.0)))  # in the shape's frame
     size = np.array(shape.size)
     if shape.kind == "sphere":
         reach = float(size[0])

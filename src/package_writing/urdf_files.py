@@ -25,8 +25,8 @@ class Copied:
     Args:
         place: its path in the package's folder `urdf`.
         xml: the copy, expanded.
-        packages: that it names.
-        outside: files that it includes from outside of any package.
+        packages: the packages that it names.
+        outside: the files that it includes from outside of any package.
     """
 
     place: str
@@ -36,13 +36,13 @@ class Copied:
 
 
 def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Path) -> Copied:
-    """Copies a file, and the files it includes by relative paths, which stay the same.
+    """Copies a file and those that it includes by relative paths; the paths stay the same.
 
     Args:
         path: the URDF or xacro file.
-        arguments: of xacro.
-        package: the name of the package.
-        folder: its folder.
+        arguments: xacro's arguments.
+        package: the package's name.
+        folder: the package's folder.
 
     Raises:
         CannotWrite: if one of them can't be read or copied.
@@ -80,7 +80,7 @@ def copy_urdf(path: Path, arguments: Mapping[str, str], package: str, folder: Pa
 
 
 def expanded(path: Path, arguments: Mapping[str, str]) -> str:
-    """The URDF in a file, expanded if it is xacro; raises CannotWrite if it can't be read."""
+    """Returns a file's URDF, expanded if it is xacro; raises CannotWrite if it can't be read."""
     try:
         return expand(path, arguments)
     except CannotExpand as error:
@@ -88,9 +88,9 @@ def expanded(path: Path, arguments: Mapping[str, str]) -> str:
 
 
 def _own(files: list[Path], texts: list[str]) -> list[Path]:
-    """The files that are included by relative paths; others are found where they are."""
+    """Returns the files to copy: those included by relative paths. Others are found where they are."""
     found = {Path(each[2]).name for text in texts for each in FOUND.finditer(text)}
-    near = files[0].resolve().parent.parent  # a package's folder, of one that lies in its `urdf`
+    near = files[0].resolve().parent.parent  # the package's folder, if the file lies in its `urdf`
     own = {
         Path(os.path.normpath(each)): None
         for each in files[1:]
@@ -112,7 +112,7 @@ def _copy(source: Path, target: Path, package: str, folder: Path) -> None:
         parts = [part for part in place.parts if part not in ("..", "meshes")]
         copy = Path("meshes", *parts)
         (folder / copy).parent.mkdir(parents=True, exist_ok=True)
-        for each in mesh.parent.glob(f"{glob.escape(mesh.stem)}.*"):  # its colours, too
+        for each in mesh.parent.glob(f"{glob.escape(mesh.stem)}.*"):  # also its material file
             shutil.copyfile(each, (folder / copy).with_name(each.name))
         return f"{match[1]}{match[2]}{PACKAGE}{package}/{copy}{match[2]}"
 
@@ -122,7 +122,7 @@ def _copy(source: Path, target: Path, package: str, folder: Path) -> None:
 
 
 def _mesh(source: Path, name: str) -> Path | None:
-    """A mesh that is found only relative to the file that names it; None: there is none."""
+    """Returns a mesh that is found only relative to the file that names it, else None."""
     if not name.startswith(PACKAGE):
         found = [] if ":" in name else [source.parent / name]
     elif _is_found(name):

@@ -4,7 +4,7 @@ import sys
 
 from rl_workbench.starting import ended_by_ctrl_c
 
-with ended_by_ctrl_c():  # main() sees to the rest
+with ended_by_ctrl_c():  # main() handles signals from then on
     from rl_workbench.cli import main
 
 sys.exit(main())

@@ -19,7 +19,7 @@ Exit codes: 0 done, 1 failed, 2 wrong arguments; 130 after Ctrl-C."""
 
 
 TRAIN = "train"
-# Each has a module of its name in rl_workbench.tools, with add_flags and run; and a line of help.
+# Name: line of help. The module rl_workbench.tools.NAME has add_flags and run.
 COMMANDS = {
     "eval": "greedy episodes of a run: mean, deviation, every episode",
     "enjoy": "watch greedy episodes in a window, or on a page in the browser",
@@ -39,7 +39,7 @@ COMMANDS = {
 def main(
     argv: list[str] | None = None, prog: str = PROG, program: tuple[str, ...] = training.PROGRAM
 ) -> int:
-    """Does what the arguments say; returns the process's exit code.
+    """Runs the command line; returns the process's exit code.
 
     Args:
         prog: the command's name, for --help and errors.
@@ -67,7 +67,7 @@ def main(
 
 
 def parse(argv: list[str], prog: str = PROG) -> argparse.Namespace:
-    """The arguments of the subcommand.
+    """Parses the arguments of a subcommand.
 
     Raises:
         SystemExit: with code 2 and a usage line, if they are wrong; with 0 after --help.

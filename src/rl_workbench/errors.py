@@ -23,7 +23,7 @@ _LIBRARIES = (
 
 
 class WorkbenchError(RuntimeError):
-    """Something that the user can mend. The text says what is wrong and what to do."""
+    """An error that the user can fix. The text says what is wrong and what to do."""
 
 
 class EnvironmentFailure(WorkbenchError):

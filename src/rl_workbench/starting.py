@@ -1,4 +1,4 @@
-"""How commands start and end: signals, an output that nobody reads, and how one starts another."""
+"""How commands start and end: signals, an output without a reader, and how one starts another."""
 
 import contextlib
 import os
@@ -15,7 +15,7 @@ def ended_by_ctrl_c() -> Iterator[None]:
     """Lets Ctrl-C end the process with one line and 130 while modules are imported.
 
     A module that is being imported could swallow a KeyboardInterrupt and stay half imported, as torch does.
-    A process that ignores Ctrl-C goes on ignoring it.
+    A process that was started ignoring Ctrl-C still ignores it.
     """
     before = signal.getsignal(signal.SIGINT)
     if before is signal.default_int_handler:
@@ -44,7 +44,7 @@ def program(module: str) -> tuple[str, ...]:
 
 def search_path() -> str:
     """Returns a PYTHONPATH with which another process finds the modules that this one finds."""
-    import sysconfig  # not before Ctrl-C is seen to
+    import sysconfig  # only after Ctrl-C is handled
 
     standard = sysconfig.get_path("stdlib")
     found = sys.path.index(standard) if standard in sys.path else len(sys.path)

@@ -1,4 +1,4 @@
-"""Scores of several seeds as figures: mean, deviation, median, interquartile mean, intervals."""
+"""Statistics of several seeds' scores: mean, deviation, median, interquartile mean, intervals."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -12,11 +12,11 @@ Statistic = Callable[..., np.ndarray]  # of an array along `axis`
 
 
 class Statistics(NamedTuple):
-    """Of n scores; an interval needs two of them."""
+    """Statistics of n scores; the intervals are None for a single score."""
 
     n: int
     mean: float
-    std: float  # of the seeds, n - 1
+    std: float  # with n - 1 degrees of freedom
     median: float
     iqm: float
     mean_interval: tuple[float, float] | None
@@ -24,14 +24,14 @@ class Statistics(NamedTuple):
 
 
 def iqm(scores: np.ndarray, axis: int = -1) -> np.ndarray:
-    """The mean of the middle half: neither a lucky nor a failed seed decides it alone."""
-    from scipy import stats  # takes a second, which no training has to wait for
+    """Returns the mean of the middle half, which no single lucky or failed seed decides."""
+    from scipy import stats  # takes a second to import, which a training can do without
 
     return np.asarray(stats.trim_mean(scores, CUT, axis=axis))
 
 
 def describe(scores: np.ndarray) -> Statistics:
-    """All figures of scores (N,), N at least 1; intervals by percentile bootstrap over them."""
+    """Returns all statistics of scores (N,), N at least 1; intervals by percentile bootstrap."""
     several = len(scores) > 1
     return Statistics(
         len(scores),
@@ -45,7 +45,7 @@ def describe(scores: np.ndarray) -> Statistics:
 
 
 def interval(scores: np.ndarray, statistic: Statistic) -> tuple[float, float]:
-    """The bootstrap interval of a statistic over scores (N,); always the same for the same."""
+    """Returns the bootstrap interval of a statistic over scores (N,); the same scores give the same."""
     low, high = bands(scores[:, None], statistic, RESAMPLES)
     return float(low[0]), float(high[0])
 
@@ -53,7 +53,7 @@ def interval(scores: np.ndarray, statistic: Statistic) -> tuple[float, float]:
 def bands(
     scores: np.ndarray, statistic: Statistic, resamples: int = 1_000
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Percentile bootstrap intervals over the first axis of (N, P): two arrays (P,)."""
+    """Returns percentile bootstrap intervals over the first axis of (N, P), as two arrays (P,)."""
     from scipy import stats
 
     found = stats.bootstrap(

@@ -1,4 +1,4 @@
-"""Writes files so that each is either complete or as it was before, and reads config.json."""
+"""Writes files atomically, so that each is either complete or unchanged, and reads config.json."""
 
 import io
 import json
@@ -35,7 +35,7 @@ def write_atomically(path: Path, write: Writer) -> None:
 
 
 def write_file(path: Path, write: Writer, told: Path | None = None) -> None:
-    """Does the same for what a user asked for: it makes the folder, and its errors are for the user.
+    """Writes a file that the user asked for, atomically; also makes its folder.
 
     Args:
         path: The file.
@@ -69,12 +69,12 @@ def check_writable(path: Path) -> None:
 
 
 def as_text(text: str) -> Writer:
-    """Returns what writes a text."""
+    """Returns a writer of a text."""
     return lambda stream: stream.write(text.encode())
 
 
 def as_json(content: Any) -> Writer:
-    """Returns what writes JSON.
+    """Returns a writer of JSON.
 
     Raises:
         ValueError: If a number is NaN or infinite.
@@ -83,14 +83,14 @@ def as_json(content: Any) -> Writer:
 
 
 def save_tensors(path: Path, content: dict[str, Any]) -> None:
-    """Writes what `torch.load` reads.
+    """Writes a file for `torch.load`.
 
-    It goes through memory, since torch hides the error of a full disk behind its own.
+    The content is serialised in memory first, since torch hides a full disk behind an error of its own.
 
     Raises:
         OSError: If it can't be written. An older file of that name is untouched.
     """
-    import torch  # takes seconds, and most files need none of it
+    import torch  # takes seconds to import, and most files don't need it
 
     memory = io.BytesIO()
     torch.save(content, memory)

@@ -1,4 +1,4 @@
-"""`enjoy`: greedy episodes in a window, or on a page in the browser."""
+"""`enjoy`: plays greedy episodes in a window, or on a page in the browser."""
 
 import argparse
 import os
@@ -8,7 +8,7 @@ from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import add_policy_flags, env_options, number
 from rl_workbench.training.progress import tell
 
-# Where none of these is set, no window can be opened.
+# Without any of these, no window can be opened.
 WINDOWS = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
 
 
@@ -22,7 +22,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Plays the episodes where they can be watched."""
+    """Plays the episodes in a window or on a page."""
     from rl_workbench.tools.eval import episode_lines
     from rl_workbench.tools.policies import environment_of, load_learned, play
     from rl_workbench.tools.recording import draws_itself

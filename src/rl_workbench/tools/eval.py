@@ -1,4 +1,4 @@
-"""`eval`: greedy or random episodes of a run and their statistics."""
+"""`eval`: plays greedy or random episodes of a run, and prints their statistics."""
 
 import argparse
 import json
@@ -23,7 +23,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Plays the episodes, and prints a line for each and one for all."""
+    """Plays the episodes; prints a line for each and a summary."""
     from rl_workbench.env_ids import threshold
     from rl_workbench.storage import as_json, check_writable, write_file
     from rl_workbench.tools.policies import load_any, play
@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     line = threshold(run.env_id)
     checkpoint = str(getattr(policy, "checkpoint", RANDOM))
     found = {"run": str(run.folder), "checkpoint": checkpoint, **statistics(result, line)}
-    # With the figures on standard output, the text goes to standard error.
+    # With JSON on standard output, the text goes to standard error.
     stream = sys.stderr if to_stdout else sys.stdout
     tell(episode_lines(result), stream)
     tell(_summary(found, line), stream)
@@ -52,11 +52,11 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
 
 
 def statistics(result: "Evaluation", threshold: float | None) -> dict[str, Any]:
-    """Returns the figures of episodes as plain numbers, for JSON.
+    """Returns the statistics of episodes as plain numbers, for JSON.
 
     Args:
         result: the episodes.
-        threshold: the mean return from which the environment counts as solved, if there is one.
+        threshold: the mean return at which the environment counts as solved, if there is one.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""Flags that several commands share, and pictures as files."""
+"""Flags that several commands share, and the writing of pictures."""
 
 import argparse
 from pathlib import Path
@@ -9,7 +9,7 @@ from rl_workbench.errors import WorkbenchError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-WHICH = ("best", "last")  # checkpoints: by evaluation, the newest
+WHICH = ("best", "last")  # checkpoints: the best by evaluation, the newest
 RANDOM = "random"
 POLICIES = (*WHICH, RANDOM)
 
@@ -38,7 +38,7 @@ def add_environment_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def add_job_flags(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags that say where trainings run, and how many at a time."""
+    """Adds the flags for where trainings run, and how many at a time."""
     parser.add_argument("--jobs", type=number(1), metavar="N",
                         help="trainings at a time, each on one core (default 1; with --ray the "
                         "number of cores)")  # fmt: skip

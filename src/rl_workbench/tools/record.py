@@ -1,4 +1,4 @@
-"""`record`: episodes as GIF, MP4, or an HTML file that plays them."""
+"""`record`: writes episodes as GIF, MP4, or an HTML file that plays them."""
 
 import argparse
 import base64
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from rl_workbench.tools.runs import Run
 
 RATES = {".gif": 25.0, ".mp4": 50.0, ".html": 25.0}  # [Hz] by default, by the suffix
-MAX_GIF_RATE = 50.0  # [Hz]: browsers slow down what is faster
+MAX_GIF_RATE = 50.0  # [Hz]; browsers slow down faster ones
 GIF_TICK = 10  # [ms], the format's own
 COLOURS = 96  # of a GIF; drawings have few
 PAGE = Path(__file__).with_name("page.html")
 TEXT, PAPER = (40, 44, 52), (255, 255, 255)
-LINES = 14.0  # of text that would fit into a picture's height
-END = 1.0  # [s] for which a 3-D recording shows the end before it starts again
+LINES = 14.0  # lines of text that fit into a picture's height
+END = 1.0  # [s] for which a 3-D recording shows its last frame before it restarts
 
 
 class Film(NamedTuple):
@@ -116,7 +116,9 @@ def _policy(
     except WorkbenchError:
         if not sized:
             raise
-    return load_any(run, which, options, arguments.seed)  # pictures of its own size are scaled
+    return load_any(
+        run, which, options, arguments.seed
+    )  # pictures of another size are scaled later
 
 
 def _record(arguments: argparse.Namespace, which: str, policy: Any, view: Any, rate: float) -> Film:
@@ -144,7 +146,7 @@ def _pictures(
 def _write_scene(
     arguments: argparse.Namespace, policies: dict[str, Any], rate: float
 ) -> list[Film]:
-    """Writes one HTML file with the episodes in 3-D, beside each other."""
+    """Writes one HTML file with the episodes side by side in 3-D."""
     from rl_workbench.storage import write_file
     from rl_workbench.tools.recording import SceneView
     from web_viewer.server import hidden_page
@@ -162,7 +164,7 @@ def _write_scene(
             if moment:
                 recording.insert_sleep(1.0 / films[0].rate)
             for film, view, frame in zip(films, views, frames, strict=True):
-                if frame is not None:  # an episode that has ended stays as it is
+                if frame is not None:  # a finished episode keeps its last frame
                     caption = "" if arguments.no_captions else frame.caption(film.title)
                     view.show(frame.seen, caption)
         recording.insert_sleep(END)
@@ -172,7 +174,7 @@ def _write_scene(
 
 
 class SideBySide(Sequence["np.ndarray"]):
-    """The pictures of all films at once, (H, W, 3) of uint8; one that has ended shows its last."""
+    """The pictures of all films side by side, (H, W, 3) uint8; a finished film shows its last one."""
 
     def __init__(self, films: Sequence[Film], captions: bool) -> None:
         self._films, self._captions = films, captions
@@ -202,7 +204,7 @@ class SideBySide(Sequence["np.ndarray"]):
 
 
 def _captioned(picture: "Image", text: str) -> "Image":
-    """Adds a line of text below, in a size that fits the width."""
+    """Returns the picture with a line of text below, in a size that fits the width."""
     from PIL import Image, ImageDraw, ImageFont
 
     high = max(8, round(picture.height / LINES))
@@ -218,12 +220,12 @@ def _captioned(picture: "Image", text: str) -> "Image":
 
 
 def write_video(path: Path, frames: "Sequence[np.ndarray]", rate: float) -> None:
-    """Writes a video in the format of the file's suffix; replaces an older file as a whole.
+    """Writes a video in the format of the file's suffix; replaces an older file atomically.
 
     Args:
         path: the file.
-        frames: of one size, (H, W, 3) of uint8; at least one.
-        rate: of the frames [Hz].
+        frames: at least one, all of one size, (H, W, 3) uint8.
+        rate: frame rate [Hz].
 
     Raises:
         WorkbenchError: if the file can't be written.
@@ -235,7 +237,7 @@ def write_video(path: Path, frames: "Sequence[np.ndarray]", rate: float) -> None
 
 
 def _write_gif(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -> None:
-    """All frames share the colours of three of them, so that only what moves is stored."""
+    """Writes a GIF. All frames share a palette from three of them, so that only changes are stored."""
     import numpy as np
     from PIL import Image
 
@@ -244,7 +246,7 @@ def _write_gif(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) ->
     reduced = [
         Image.fromarray(each).quantize(palette=palette, dither=Image.Dither.NONE) for each in frames
     ]
-    # Frames last whole ticks, on average as long as they should.
+    # Each frame lasts whole ticks; on average they last 1 / rate.
     ticks = accumulate([1000.0 / rate / GIF_TICK] * len(reduced), initial=0.0)
     reduced[0].save(
         stream, format="GIF", save_all=True, append_images=reduced[1:], loop=0, optimize=False,
@@ -253,7 +255,7 @@ def _write_gif(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) ->
 
 
 def _write_html(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -> None:
-    """One file that needs no other: pictures as WebP in base64, and a script that shows them."""
+    """Writes a self-contained page: pictures as WebP in base64, and a script that plays them."""
     from PIL import Image
 
     height, width, _ = frames[0].shape
@@ -268,7 +270,7 @@ def _write_html(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -
 
 
 def _write_mp4(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) -> None:
-    """Lets ffmpeg, which can't write to a stream, write a temporary file."""
+    """Writes an MP4 by way of a temporary file, since ffmpeg can't write this format to a stream."""
     from web_viewer.video import EncoderFailed, Mp4Writer
 
     with tempfile.TemporaryDirectory(prefix="rl_workbench_") as folder:

@@ -1,7 +1,7 @@
-"""Episodes as they are seen, frame by frame: what `record` writes and what the page of `view` plays.
+"""Records episodes frame by frame, for the files of `record` and for the page of `view`.
 
-For the page a thread records them, because an environment may be slower than its own time, and some have
-to stay in one thread.
+For the page a thread records them, because an environment may be slower than real time, and some
+environments have to stay in one thread.
 """
 
 import contextlib
@@ -39,17 +39,17 @@ if TYPE_CHECKING:
 Size = tuple[int, int]  # width and height [pixels]
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
-DEFAULT_RATE = 30.0  # [Hz] of an environment that doesn't say its own
+DEFAULT_RATE = 30.0  # [Hz], for an environment that doesn't state its own
 MAX_NUMBERS = 3  # of an action, in a caption
 DRAW = "draw_on"  # the method of an environment that draws itself on viser's pages
 CAMERA, LOOK_AT = (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)  # in front of a picture on a page
 HEIGHT, WIDTH = 1.2, 1.8  # of a picture on a page, at most
 FACING = (np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0)  # turns a picture's down to the page's, wxyz
 QUALITY = 85  # of JPEG on a page
-PATIENCE = 10.0  # [s] for the thread that records to end
-MAX_STEPS = 20_000  # of an episode on a page; some have no end
-MAX_BYTES = 2**28  # of its pictures
-BACKEND = "backend"  # the option by which an environment may move a robot outside of its process
+PATIENCE = 10.0  # [s] to wait for the recording thread to end
+MAX_STEPS = 20_000  # of an episode on a page; some never end
+MAX_BYTES = 2**28  # of an episode's pictures
+BACKEND = "backend"  # the option that may let an environment move a robot outside of its process
 IN_PROCESS = ("bullet", "mujoco")
 
 
@@ -57,7 +57,7 @@ class EpisodeFrame(NamedTuple):
     """A moment of an episode; the first one is the reset."""
 
     step: int
-    seen: Any  # what the view took
+    seen: Any  # what `View.take` returned
     total_reward: float
     action: str  # empty at the reset
     success: bool | None = None  # at the end, if the environment says
@@ -70,24 +70,24 @@ class EpisodeFrame(NamedTuple):
 
 
 class View(Protocol):
-    """Takes what is seen of an environment, and shows it on a page later, maybe in another thread."""
+    """Captures an environment, and shows it on a page later, maybe in another thread."""
 
     def take(self) -> Any:
-        """Returns what is seen now; small enough to keep thousands."""
+        """Returns the present view, small enough to keep thousands of them."""
         ...
 
     def show(self, seen: Any, caption: str = "") -> None:
-        """Shows it on the page."""
+        """Shows what `take` returned on the page."""
         ...
 
 
 class PictureView:
-    """The pictures that `render` draws, in the middle of a page.
+    """Shows the pictures of `render` in the middle of a page.
 
     Args:
         env: the environment.
-        server: of the page; none if nothing will be shown.
-        size: of the pictures; by default as the environment draws them.
+        server: of the page; None if nothing will be shown.
+        size: of the pictures; by default the environment's own.
 
     Raises:
         WorkbenchError: if the environment draws no pictures.
@@ -139,7 +139,7 @@ class PictureView:
 
 
 class SceneView:
-    """An environment that draws itself in 3-D on a page.
+    """Shows an environment that draws itself in 3-D on a page.
 
     Args:
         env: the environment.
@@ -171,7 +171,7 @@ def draws_itself(env: gymnasium.Env[Any, Any]) -> bool:
 
 
 def make_view(server: "viser.ViserServer", env: gymnasium.Env[Any, Any]) -> View:
-    """Makes the best view that the environment has, seen from the front by those on the page already.
+    """Makes the best view that the environment has, and points the open pages' cameras at its front.
 
     Raises:
         WorkbenchError: if the environment can't be drawn.
@@ -196,15 +196,15 @@ def record_episode(
     stride: float = 1.0,
     max_steps: int = 0,
 ) -> Iterator[EpisodeFrame]:
-    """Plays one episode, and yields its frames.
+    """Plays one episode; yields its frames.
 
     Args:
         env: the environment.
         act: chooses the action for an observation.
         view: of the environment.
         seed: of the episode.
-        stride: steps from one frame to the next, on average; the last step has a frame in any case.
-        max_steps: number of steps after which the episode is cut off; 0 for never.
+        stride: average number of steps between frames; the last step always has a frame.
+        max_steps: steps after which the episode is cut off; 0 for never.
 
     Raises:
         WorkbenchError: if the environment can't be drawn.
@@ -235,14 +235,14 @@ def step_rate(env: gymnasium.Env[Any, Any]) -> float:
 
 
 def draw_without_display() -> None:
-    """Makes pygame use no screen, and MuJoCo none where there is none; call it before they are imported."""
+    """Makes pygame, and MuJoCo where there is no display, draw off screen; call it before importing them."""
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
     if not any(os.environ.get(name) for name in DISPLAYS):
         os.environ.setdefault("MUJOCO_GL", "egl")
 
 
 def size_options(env_id: str, size: Size | None) -> dict[str, int]:
-    """Returns options for an environment to draw pictures of that size; empty if it has none."""
+    """Returns the environment's options for pictures of that size; empty if it has no such options."""
     if size is None:
         return {}
     spec = spec_of(env_id)
@@ -258,15 +258,15 @@ def size_options(env_id: str, size: Size | None) -> dict[str, int]:
 
 @dataclass
 class RecordedEpisode:
-    """An episode; its frames grow while it is played."""
+    """An episode, whose frames grow while it is played."""
 
-    which: str  # policy
+    which: str  # the checkpoint, or "random"
     seed: int
     frames: list[EpisodeFrame] = field(default_factory=list)
-    policy: str = ""  # in words
-    rate: float = DEFAULT_RATE  # [Hz] of its steps
+    policy: str = ""  # its description
+    rate: float = DEFAULT_RATE  # steps per second of simulated time [Hz]
     is_over: bool = False
-    note: str = ""  # what went wrong, or that it was cut off
+    note: str = ""  # what failed, or that it was cut off
 
     @property
     def length(self) -> int:
@@ -275,14 +275,14 @@ class RecordedEpisode:
 
 
 class Superseded(Exception):
-    """Another episode was asked for."""
+    """Raised in the recording thread when another episode was requested."""
 
 
 class EpisodeRecorder:
     """Plays and records episodes of a run; only its thread touches the environment.
 
     Args:
-        folder: of the run; its training needn't have begun.
+        folder: the run folder, which may still be empty.
         server: of the page.
         env_options: of the environment, on top of the training's own.
     """
@@ -300,7 +300,7 @@ class EpisodeRecorder:
         self._thread.start()
 
     def play(self, which: str, seed: int) -> RecordedEpisode:
-        """Returns an episode that is played from now on; the one before it is given up."""
+        """Starts an episode and returns it; abandons the one before."""
         episode = RecordedEpisode(which, seed)
         with self._changed:
             self._wanted = episode
@@ -308,20 +308,20 @@ class EpisodeRecorder:
         return episode
 
     def close(self) -> None:
-        """Ends the thread, or leaves it behind if its environment doesn't answer."""
+        """Ends the thread, or abandons it if its environment doesn't answer."""
         with self._changed:
             self._is_closed = True
             self._changed.notify()
         self._thread.join(PATIENCE)
 
     def newest(self, which: str) -> tuple[int, ...]:
-        """Returns what identifies the checkpoint that would be played; empty if there is none."""
+        """Returns an identity of the checkpoint that `play` would load; empty if there is none."""
         if which == RANDOM:
             return (0,)
         for path in checkpoints.candidates(self._folder, best_first=which == "best"):
             try:
                 status = path.stat()
-            except OSError:  # the training has just replaced it
+            except OSError:  # the training may just have replaced it
                 continue
             return status.st_ino, status.st_mtime_ns
         return ()
@@ -347,10 +347,10 @@ class EpisodeRecorder:
             self._close_environment()
 
     def _close_environment(self) -> None:
-        """The next episode makes a new one."""
+        """Closes the environment; the next episode makes a new one."""
         if self._env is not None:
             env, self._env = self._env, None
-            with contextlib.suppress(WorkbenchError):  # a failure that was reported already
+            with contextlib.suppress(WorkbenchError):  # the failure was already reported
                 env.close()
 
     def _play(self, episode: RecordedEpisode) -> None:
@@ -358,7 +358,7 @@ class EpisodeRecorder:
         check_robot_is_free(run, {**run.env_kwargs, **self._env_options})
         if self._env is None or self.view is None:
             self._env = drawn_environment(run, self._env_options)
-            self._server.scene.reset()  # removes the view of an environment that has failed
+            self._server.scene.reset()  # removes the view of a failed environment
             self.view = make_view(self._server, self._env)
         act = self._policy(run, episode, self._env)
         episode.rate = step_rate(self._env)
@@ -396,14 +396,14 @@ class EpisodeRecorder:
 
 
 def check_robot_is_free(run: Run, options: dict[str, Any]) -> None:
-    """Makes sure that an episode doesn't move the robot of a running training.
+    """Checks that an episode won't move the robot of a running training.
 
-    An environment says so by `shares_robot`, but it has joined the training's world by then. So this
-    decides by the name of the backend.
+    `shares_robot` would tell, but an environment that has it is already in the training's world. So this
+    goes by the name of the backend.
 
     Args:
         run: the run.
-        options: of the environment that is to be played.
+        options: of the episode's environment.
 
     Raises:
         WorkbenchError: if it would.
@@ -429,5 +429,5 @@ def drawn_environment(run: Run, options: dict[str, Any]) -> gymnasium.Env[Any, A
     try:
         return environment_of(run, {**options, "render_mode": "rgb_array"})
     except WorkbenchError as error:
-        environment_of(run, options).close()  # raises what else is wrong
+        environment_of(run, options).close()  # raises if the cause isn't the drawing
         raise WorkbenchError(f"the environment draws no pictures: {error}") from error

@@ -1,4 +1,4 @@
-"""The figures of runs, and Markdown tables of them: every run, and statistics of each group of seeds."""
+"""Results of runs, and Markdown tables of them: one row per run, and statistics of each group of seeds."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -20,19 +20,19 @@ from rl_workbench.training.scalar_log import CONFIRMED, EVALUATION
 
 @dataclass(frozen=True)
 class RunResult:
-    """The figures of one run. A figure that is missing is None, and `fault` says why."""
+    """The results of one run. Missing ones are None, and `fault` says why."""
 
-    group: str  # of seeds that are compared with other groups
+    group: str  # the group of seeds, to be compared with others
     seed: int
     run: str  # the name of the folder
     score: float | None = None  # mean return of greedy episodes, by which groups are compared
-    success: float | None = None  # their success rate, 0 to 1, if the environment says
+    success: float | None = None  # their success rate, 0 to 1, if the environment reports it
     final: float | None = None  # mean return of the last checkpoint's greedy episodes
-    training_mean: float | None = None  # return of the last training episodes
+    training_mean: float | None = None  # mean return of the last training episodes
     evaluations: float | None = None  # mean of all evaluations during the training
     avg20: float | None = None  # largest mean return of 20 consecutive training episodes
     solved_step: int | None = None  # of the first (confirmed) evaluation at the threshold
-    solved_seconds: float | None = None  # until then, with evaluations, without pauses
+    solved_seconds: float | None = None  # [s] until then, with evaluations, without pauses
     steps: int | None = None
     episodes: int | None = None
     seconds: float | None = None
@@ -48,16 +48,16 @@ def examine(
     which: str = "best",
     also_last: bool = False,
 ) -> RunResult:
-    """Collects the figures of a run; what can't be read becomes a fault in its row, not an error.
+    """Collects the results of a run; unreadable ones become the row's `fault`, not an error.
 
     Args:
         run: the run.
         group: of the result.
         episodes: greedy episodes on fresh seeds for each score; 0 to score a run by the mean of its
             last training episodes.
-        warn: receives a line for each checkpoint that is skipped.
-        which: of its checkpoints, "best" or "last".
-        also_last: play the last checkpoint, too.
+        warn: receives a line for each skipped checkpoint.
+        which: the checkpoint, "best" or "last".
+        also_last: whether to play the last checkpoint, too.
     """
     faults: list[str] = []
 
@@ -114,7 +114,7 @@ def _largest_mean(returns: np.ndarray) -> float | None:
 
 
 def _solved(run: Run) -> tuple[int, float | None] | None:
-    """Step and seconds of the first evaluation at the threshold; a confirmed one, if there are any."""
+    """Returns step and seconds of the first (if possible confirmed) evaluation at the threshold, or None."""
     line = threshold(run.env_id)
     curve = evaluation_curve(run, CONFIRMED)
     if not len(curve.values):
@@ -126,7 +126,7 @@ def _solved(run: Run) -> tuple[int, float | None] | None:
 
 
 def _seconds_until(run: Run, until: float) -> float | None:
-    """The time that it had trained, without the pauses of an interrupted benchmark [s]."""
+    """Returns the training time until then [s], without the pauses of an interrupted benchmark."""
     began, spans = run.config.get("began"), cost_of(run.folder).get("spans", [])
     if began is None:
         return None
@@ -138,15 +138,15 @@ def _seconds_until(run: Run, until: float) -> float | None:
     return round(until - began - sum(pauses), 1)
 
 
-# The columns of each table: the name, and the field of RunResult. A benchmark's costs have a table of
-# their own, because they depend on the clock: its results are the same bytes however it was interrupted.
+# The columns of each table: name and field of RunResult. A benchmark's costs depend on the clock, so they
+# have their own table: its results stay bit-identical however it was interrupted.
 COMPARE = {name: name for name in ("group", "run", "seed", "score", "success", "training_mean",
                                    "episodes", "steps", "seconds", "solved_step", "fault")}  # fmt: skip
 _RUN = {"variant": "group", "seed": "seed"}
 RESULTS = {**_RUN, "best": "score"} | {name: name for name in (
     "success", "final", "evaluations", "avg20", "solved_step", "steps", "episodes", "fault")}  # fmt: skip
 COSTS = _RUN | {name: name for name in ("solved_seconds", "seconds", "cpu_seconds")}
-SUCCESS = "success"  # a column of rates, left out where no environment says
+SUCCESS = "success"  # column of success rates, left out if no environment reports them
 
 
 def grouped(results: Sequence[RunResult]) -> dict[str, list[RunResult]]:
@@ -156,7 +156,7 @@ def grouped(results: Sequence[RunResult]) -> dict[str, list[RunResult]]:
 
 
 def statistics_of(results: Sequence[RunResult], field: str = "score") -> Statistics | None:
-    """Returns the statistics of a figure; None if no run has it."""
+    """Returns the statistics of a field; None if no run has it."""
     values = [value for each in results if (value := getattr(each, field)) is not None]
     return describe(np.array(values)) if values else None
 
@@ -167,7 +167,7 @@ def rows(results: Sequence[RunResult], columns: Mapping[str, str]) -> list[dict[
 
 
 def table(results: Sequence[RunResult], columns: Mapping[str, str]) -> str:
-    """Returns a Markdown table with a line for each run."""
+    """Returns a Markdown table with a row for each run."""
     shown = {name: field for name, field in columns.items() if _is_shown(results, name)}
     lines = [
         [_percent(value) if name == SUCCESS else _cell(value) for name, value in row.items()]
@@ -176,14 +176,14 @@ def table(results: Sequence[RunResult], columns: Mapping[str, str]) -> str:
     return _markdown([[name.replace("_", " ") for name in shown], *lines])
 
 
-# A cell of a summary, made of the results of a group.
+# Formats a group's results as one cell of a summary.
 Cell = Callable[[Sequence[RunResult]], str]
 
 
 def summary_table(
     groups: Mapping[str, Sequence[RunResult]], columns: Sequence[tuple[str, Cell]]
 ) -> str:
-    """Returns a Markdown table with a line for each group."""
+    """Returns a Markdown table with a row for each group."""
     every = [each for results in groups.values() for each in results]
     shown = [(name, cell) for name, cell in columns if _is_shown(every, name)]
     lines = [[cell(results) for _, cell in shown] for results in groups.values()]
@@ -210,7 +210,7 @@ def _cell(value: Any) -> str:
 
 
 def _of(field: str, show: Callable[[Statistics], str]) -> Cell:
-    """A statistic of a figure; says over how many seeds it is, if some lack the figure."""
+    """Makes a cell for a field's statistic; it names the number of seeds if some lack the field."""
 
     def cell(results: Sequence[RunResult]) -> str:
         found = statistics_of(results, field)
@@ -233,7 +233,7 @@ def _solved_count(results: Sequence[RunResult]) -> str:
 
 
 def _steps_to_solve(reduce: Callable[[list[float]], Any]) -> Cell:
-    """Over all seeds; one that never solved it counts as infinite."""
+    """Makes a cell for the steps to solve; a seed that never solved it counts as infinite."""
 
     def cell(results: Sequence[RunResult]) -> str:
         found = reduce([each.solved_step or math.inf for each in results])

@@ -29,10 +29,10 @@ from web_viewer.curves import Curves
 from web_viewer.server import open_browser, serve, stop
 
 PERIOD = 1.0 / 30.0  # [s] between two pictures
-CURVES_PERIOD = 1.0  # [s] between two looks at the table
-IDLE_PERIOD = 0.25  # [s] between two looks whether anybody watches
+CURVES_PERIOD = 1.0  # [s] between two reads of scalars.csv
+IDLE_PERIOD = 0.25  # [s] between two checks for a viewer
 SPEEDS = {"0.1 ×": 0.1, "0.25 ×": 0.25, "0.5 ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "5 ×": 5.0}
-LINGER = 1.0  # [s] at the end of an episode
+LINGER = 1.0  # [s] on the last frame of an episode
 MAX_SEED = 2**31 - 1
 
 
@@ -49,20 +49,20 @@ def show_run(
     interrupt: Interrupt,
     beside_training: bool = False,
 ) -> None:
-    """Serves the page until Ctrl-C, or until the training ends that has started it.
+    """Serves the page until Ctrl-C, or until the training that started it ends.
 
     Args:
-        folder: of the run.
-        policies: to choose from; the first one is played first.
+        folder: the run folder.
+        policies: the choices; the first one is played first.
         seed: of the first episode.
-        episodes: with seeds of their own, which are repeated.
-        env_options: of the environment, on top of the training's own.
-        host: to serve on.
-        port: to serve on; None for the first free one.
-        browser: whether to open one.
-        interrupt: ends it.
-        beside_training: a training has started this process and reads its output. The run folder may
-            still be empty, and this process ends when its standard input does.
+        episodes: number of episodes, with consecutive seeds, that are repeated.
+        env_options: options of the environment on top of the training's.
+        host: the address to serve on.
+        port: the port to serve on; None for the first free one.
+        browser: whether to open a browser.
+        interrupt: ends the serving.
+        beside_training: whether a training started this process and reads its output. The run folder may
+            still be empty, and this process ends when its standard input closes.
 
     Raises:
         WorkbenchError: if there is no such run, or the page can't be served.
@@ -94,11 +94,9 @@ def show_run(
             tell(line)
         if beside_training:
             _close_output()
-        if browser:  # opening one may take until its user closes it
+        if browser:  # some browsers block until the user closes them
             threading.Thread(target=open_browser, args=(address, warn), daemon=True).start()
-        while (
-            not server.get_clients() and not is_over()
-        ):  # nothing is played until somebody watches
+        while not server.get_clients() and not is_over():  # nothing is played without a viewer
             time.sleep(IDLE_PERIOD)
         if not is_over():
             with server.gui.add_folder("Episode"):
@@ -109,13 +107,13 @@ def show_run(
 
 
 def _await_end(ended: threading.Event) -> None:
-    """The training holds the other end of standard input; however it ends, the kernel closes that."""
+    """Waits for the end of standard input, which closes with the training even if that is killed."""
     sys.stdin.buffer.read()
     ended.set()
 
 
 def _close_output() -> None:
-    """The training reads the lines up to the end of the output."""
+    """Closes standard output, since the training reads it to its end."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)
@@ -146,14 +144,14 @@ def _draw(server: viser.ViserServer, curves: Curves, ended: threading.Event) -> 
 
 
 class Playback:
-    """The controls of the page. One thread calls `tick`; clicks come in threads of viser's.
+    """The controls of the page. One thread calls `tick`; clicks come in viser's threads.
 
     Args:
         gui: of the page.
         recorder: records the episodes.
-        policies: to choose from; the first one is played.
+        policies: the choices; the first one is played first.
         seed: of the first episode.
-        episodes: after each episode the next seed follows, until these have been played.
+        episodes: number of consecutive seeds to play before the first one follows again.
     """
 
     def __init__(
@@ -167,7 +165,7 @@ class Playback:
         self._recorder, self._first, self._episodes = recorder, seed, episodes
         self._lock = threading.RLock()
         self._position = 0.0  # [steps] in the episode
-        self._waited = 0.0  # [s] at its end
+        self._waited = 0.0  # [s] on its last frame
         self._is_playing = True
         self._drawn: tuple[RecordedEpisode, int] | None = None
         self._button = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
@@ -179,7 +177,7 @@ class Playback:
             "Newest by itself", True, hint="play a checkpoint as soon as it is written"
         )
         newest = gui.add_button("Play the newest now", icon=viser.Icon.REFRESH)
-        self._about = gui.add_html("")  # below what is clicked, which must not move
+        self._about = gui.add_html("")  # below the controls, so that its size doesn't move them
         self._button.on_click(lambda _: self.toggle())
         self._slider.on_update(self._seek)
         for choice in (self._which, self._seed):
@@ -188,7 +186,7 @@ class Playback:
         self._start()
 
     def _start(self) -> None:
-        """Plays what is chosen, with the newest checkpoint."""
+        """Starts an episode of the chosen policy's newest checkpoint."""
         with self._lock:
             self._checkpoint = self._recorder.newest(self._which.value)
             self._episode = self._recorder.play(self._which.value, int(self._seed.value))
@@ -206,7 +204,7 @@ class Playback:
             )
 
     def _seek(self, event: viser.GuiEvent[Any]) -> None:
-        if event.client is not None:  # not by `_show`
+        if event.client is not None:  # a user's change, not `_show`'s
             with self._lock:
                 self._position = float(self._slider.value)
 
@@ -214,7 +212,7 @@ class Playback:
         return self._episode.is_over and self._position >= self._episode.length
 
     def tick(self, period: float) -> None:
-        """Shows what is due `period` [s] after the last tick."""
+        """Shows the frame that is due `period` [s] after the last tick."""
         with self._lock:
             episode = self._episode
             if self._is_playing or not episode.frames:

@@ -1,4 +1,4 @@
-"""Run folders as trainings write them: config.json, scalars.csv as it grows, summary.json at the end."""
+"""Reads run folders: config.json, scalars.csv (also while it grows), summary.json at the end."""
 
 import csv
 import glob
@@ -25,7 +25,7 @@ class Run:
     """The folder of one training."""
 
     folder: Path
-    algorithm: str  # of --algo
+    algorithm: str  # value of --algo
     experiment: str
     env_id: str
     env_kwargs: dict[str, Any]  # of the evaluations
@@ -96,7 +96,7 @@ def read_leniently(path: Path) -> dict[str, Any]:
 
 
 def summary_of(run: Run) -> dict[str, Any]:
-    """Returns what a training wrote at its end; empty until then.
+    """Returns a training's summary; empty until its end.
 
     Raises:
         WorkbenchError: if it can't be read, or isn't a summary.
@@ -112,12 +112,12 @@ def summary_of(run: Run) -> dict[str, Any]:
 
 
 def cost_file(folder: Path) -> Path:
-    """Returns the file beside a run folder that says what its processes took."""
+    """Returns the path of the file beside a run folder with its processes' times."""
     return folder.with_name(f"{folder.name}.cost.json")
 
 
 def cost_of(folder: Path) -> dict[str, Any]:
-    """Returns the seconds of the clock and of the processor, and when it ran; empty if not known."""
+    """Returns wall time and processor time [s], and when the processes ran; empty if unknown."""
     return read_leniently(cost_file(folder))
 
 
@@ -130,8 +130,8 @@ def find_runs(patterns: Sequence[str], warn: Callable[[str], None]) -> list[Run]
     """Returns the runs of run folders, of patterns such as 'runs/*dqn*', and of folders that hold runs.
 
     Args:
-        patterns: as the user has typed them; what matches one and isn't a run is skipped.
-        warn: receives a line for each run that is skipped because its record is damaged.
+        patterns: as the user typed them; matches that aren't runs are skipped.
+        warn: receives a line for each run that is skipped for its damaged record.
 
     Raises:
         WorkbenchError: if a pattern matches no run, or names a run with a damaged record.
@@ -155,7 +155,7 @@ def _matching(pattern: str, warn: Callable[[str], None]) -> list[Run]:
         if is_run(folder):
             try:
                 found.append(open_run(folder))
-            except WorkbenchError as error:  # a damaged run must not hide the others
+            except WorkbenchError as error:  # one damaged run mustn't stop the others
                 warn(f"{error}; skipped")
     return found
 
@@ -195,7 +195,7 @@ def _scalars(run: Run, tag: str) -> Curve:
             points = [
                 (float(row["step"]), float(row["value"]), float(row["wall_time"]))
                 for row in csv.DictReader(file)
-                # A running training may not have written the end of the last line yet.
+                # A running training may not have completed the last line yet.
                 if row["tag"] == tag and row["wall_time"]
             ]
     except OSError as error:

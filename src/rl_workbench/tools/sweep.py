@@ -1,7 +1,7 @@
-"""`sweep`: Optuna searches for good options; every training is a run folder of its own.
+"""`sweep`: Optuna searches for good options; every training has its own run folder.
 
-FOLDER/sweep.json         what is searched; the folder takes no other search
-FOLDER/study.journal      the study; the same command goes on with it
+FOLDER/sweep.json         the search's settings; the folder accepts no other search
+FOLDER/study.journal      the study; the same command continues it
 FOLDER/trial_0000/seed_0  a training
 FOLDER/trials.json        the trials and their scores
 FOLDER/best.yaml          the best options, for --config
@@ -68,26 +68,26 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True)
 class Sweep:
-    """What is searched, and how much."""
+    """The settings of a search."""
 
     folder: Path
     algorithm: str
     options: dict[str, Any]  # of every training
     ranges: "dict[str, OptionRange]"
-    trials: int  # in all, those of earlier commands included
+    trials: int  # in all, including those of earlier commands
     seeds: int  # trainings of one trial
     seed: int  # of the search
     pruner: str
     section: str  # of best.yaml
 
     def record(self) -> dict[str, Any]:
-        """Returns what has to stay the same when a search is continued."""
+        """Returns the settings that must stay the same when a search is continued."""
         ranges = {name: each._asdict() for name, each in self.ranges.items()}
         return {"algorithm": self.algorithm, "options": self.options, "ranges": ranges,
                 "seeds": self.seeds, "seed": self.seed}  # fmt: skip
 
     def flags(self, values: dict[str, Any]) -> list[str]:
-        """Returns the flags of `train` for a trial, but for name, seed and folder."""
+        """Returns the flags of `train` for a trial, except name, seed and folder."""
         options = {**self.options, **values}
         pairs = [f"{key}={value}" for key, value in options.items()]
         return ["--algo", self.algorithm, "--params", *pairs]
@@ -99,7 +99,7 @@ class Sweep:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Searches until there are as many trials as wanted, or until interrupted."""
+    """Searches until there are --trials trials, or until interrupted."""
     need("optuna", "Optuna", "sweep")
     algorithm, env_id = arguments.algo, arguments.env_id
     kind = ALGORITHMS[algorithm]
@@ -107,7 +107,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     fixed: dict[str, Any] = {**key_values(arguments.params, "--params"), "env_id": env_id}
     if arguments.total_timesteps:
         fixed["total_timesteps"] = arguments.total_timesteps
-    known.read(fixed, "--params")  # else a mistake would show in every trial
+    known.read(fixed, "--params")  # checked here, else every trial would fail
     ranges = read_ranges(arguments.ranges, algorithm, env_id, known.names)
     ranges = {name: each for name, each in ranges.items() if name not in fixed}
     folder = arguments.out or Path(f"runs/sweep__{as_file_name(env_id)}__{algorithm}")
@@ -131,10 +131,10 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
 
 @contextlib.contextmanager
 def _disk_errors(folder: Path) -> Iterator[None]:
-    """Optuna writes to the folder, too.
+    """Turns disk errors into one line; Optuna writes to the folder, too.
 
     Raises:
-        WorkbenchError: if the disk refuses.
+        WorkbenchError: if the block raises OSError.
     """
     try:
         yield
@@ -143,10 +143,10 @@ def _disk_errors(folder: Path) -> Iterator[None]:
 
 
 def open_study(sweep: Sweep) -> Any:
-    """Opens or creates the study of a sweep, an `optuna.Study`.
+    """Opens or creates the `optuna.Study` of a sweep.
 
     Raises:
-        WorkbenchError: if there is one that can't be read.
+        WorkbenchError: if the existing one can't be read.
     """
     import optuna
     from optuna.storages.journal import JournalFileBackend
@@ -170,7 +170,7 @@ def open_study(sweep: Sweep) -> Any:
 
 
 def _repair(path: Path) -> None:
-    """Removes what a kill leaves: the lock, which nobody else can hold, and half a line at the end."""
+    """Removes what a killed search left: its lock, which nobody else can hold, and an unfinished line."""
     path.with_name(f"{path.name}.lock").unlink(missing_ok=True)
     with contextlib.suppress(FileNotFoundError):
         content = path.read_bytes()
@@ -181,7 +181,7 @@ def _repair(path: Path) -> None:
 
 
 def _seeded_sampler(seed: int) -> Any:
-    """TPE whose draws depend on the trial and the option alone: a search that is killed draws the same."""
+    """Returns TPE seeded by trial and option alone, so that a resumed search draws the same values."""
     import numpy as np
     from optuna.samplers import BaseSampler, TPESampler
 
@@ -215,27 +215,27 @@ def _pruner(sweep: Sweep) -> Any:
 
 
 class SearchInterrupted(BaseException):
-    """Leaves a trial as it is; Optuna would take an Exception for the trial's failure."""
+    """Interrupts a trial so that it can be continued; Optuna would count an Exception as its failure."""
 
 
 class Search:
     """Runs the trials of a study.
 
     Args:
-        sweep: what is wanted.
+        sweep: the search's settings.
         study: from `open_study`.
         pool: runs the trainings.
-        interrupt: ends the search; trials that are running go on with the next command.
+        interrupt: ends the search; the next command continues the running trials.
     """
 
     def __init__(self, sweep: Sweep, study: Any, pool: JobPool, interrupt: Interrupt) -> None:
         self._sweep, self._study, self._pool, self._interrupt = sweep, study, pool, interrupt
 
     def run(self) -> None:
-        """Finishes the trials that an earlier command has left, and makes new ones.
+        """Finishes the trials that an earlier command left, then makes new ones.
 
         Raises:
-            OSError: if the disk refuses.
+            OSError: if the folder can't be written to.
             WorkbenchError: if a training can't be started.
         """
         from optuna.trial import TrialState
@@ -254,7 +254,7 @@ class Search:
                 n_jobs=self._pool.at_once,
                 catch=(WorkbenchError,),
             )
-        if self._pool.failure is not None:  # Optuna loses those of its last trials
+        if self._pool.failure is not None:  # Optuna loses an error of its last trials
             raise self._pool.failure
 
     def _finish(self, left: Any) -> None:
@@ -270,7 +270,7 @@ class Search:
                 self._study.tell(trial, state=optuna.trial.TrialState.FAIL)
 
     def _objective(self, trial: Any) -> float:
-        """Trains all seeds of a trial one after the other; the first one decides whether it is pruned."""
+        """Trains all seeds of a trial in turn; the first one decides whether it is pruned."""
         import optuna
 
         sweep = self._sweep
@@ -302,13 +302,13 @@ class Search:
 
 
 class Judge:
-    """Reports the evaluations of a training to Optuna as they come.
+    """Reports a running training's evaluations to Optuna.
 
     Args:
-        study: of the trial.
+        study: the trial's study.
         trial: an `optuna.Trial`.
-        folder: of the run; may not exist yet.
-        frequency: steps between two evaluations that are due; 0 if only the end is evaluated.
+        folder: the run folder, which may not exist yet.
+        frequency: steps between two evaluations; 0 if only the end is evaluated.
     """
 
     def __init__(self, study: Any, trial: Any, folder: Path, frequency: int) -> None:
@@ -320,18 +320,19 @@ class Judge:
 
     @property
     def last_step(self) -> int:
-        """The step of the last evaluation that was reported."""
+        """The step of the last reported evaluation."""
         return max(self._steps, default=0)
 
     def is_promising(self) -> bool:
-        """Reports new evaluations; returns whether the trial goes on."""
+        """Reports new evaluations; returns whether to continue the trial."""
         has_more = True
         while has_more:
             update = self._table.read()
             has_more = update.has_more
             for step, tag, value in update.points:
                 if tag == EVALUATION and self._frequency and not self._is_pruned:
-                    # Episodes and vectors pass over some steps: the one that was due is comparable.
+                    # Episodes and vectors skip steps, so report the step at which the evaluation was due:
+                    # that one is comparable between trials.
                     self._report(int(step) // self._frequency * self._frequency, value)
         return not self._is_pruned
 
@@ -351,14 +352,14 @@ def score_of(job: Job) -> float:
     summary = job.summary()
     if summary.get("best"):
         return float(summary["best"][1])
-    open_run(job.folder)  # says what is wrong with it, if something is
+    open_run(job.folder)  # raises if the folder itself is damaged
     raise WorkbenchError(
         f"{job.folder} was never evaluated: eval_frequency is larger than its length"
     )
 
 
 def write_results(sweep: Sweep, study: Any) -> None:
-    """Writes trials.json and best.yaml, and says which trial was the best."""
+    """Writes trials.json and best.yaml, and prints the best trial."""
     import yaml
     from optuna.trial import TrialState
 
@@ -386,7 +387,7 @@ def write_results(sweep: Sweep, study: Any) -> None:
 
 
 class OptionRange(NamedTuple):
-    """The values that an option may have: from low to high, or one of the choices."""
+    """The values that the search may give an option: from low to high, or one of the choices."""
 
     low: float | int
     high: float | int
@@ -394,7 +395,7 @@ class OptionRange(NamedTuple):
     choices: tuple[Any, ...]
 
     def suggest(self, trial: Any, name: str) -> Any:
-        """Lets Optuna's trial pick a value."""
+        """Returns a value that Optuna's trial picks."""
         if self.choices:
             return trial.suggest_categorical(name, self.choices)
         if isinstance(self.low, int) and isinstance(self.high, int):
@@ -405,7 +406,7 @@ class OptionRange(NamedTuple):
 def read_ranges(
     path: Path | None, algorithm: str, env_id: str, known: list[str]
 ) -> dict[str, OptionRange]:
-    """Reads the ranges for an algorithm in an environment, or else those for the algorithm.
+    """Reads the ranges for an algorithm in an environment, else those for the algorithm.
 
     learning_rate: {low: 1.0e-4, high: 1.0e-2, log: true}
     n_step: {low: 1, high: 5}                  # whole numbers, since both ends are

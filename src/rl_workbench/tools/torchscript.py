@@ -1,6 +1,6 @@
-"""A run's policy as a TorchScript file, with a description of the policy in the same file.
+"""Exports a run's policy as a TorchScript file that also holds a description of the policy.
 
-The content of the file is compared with the policy before it is written.
+The file's content is compared with the policy before it is written.
 """
 
 import copy
@@ -30,20 +30,20 @@ from rl_workbench.training.folder import LIBRARIES, versions
 FORMAT = "rl_workbench policy 1"  # changes when older files can't be read any more
 METADATA = "metadata.json"  # its name within the file
 SAMPLES = 1000  # observations for the comparison
-ROUNDING = 1e-4  # the most that another order of the same float32 sums makes
+ROUNDING = 1e-4  # largest difference from summing the same float32 numbers in another order
 Observation = Any  # of one step: a float32 array, or a dict of those
 _DAMAGED = (RuntimeError, ValueError, KeyError, zipfile.BadZipFile, zlib.error)
 
 
 class ExportedPolicy(NamedTuple):
-    """A policy from a file."""
+    """A policy read from a file."""
 
     act: Callable[[Observation], Any]  # greedily, for one observation
     metadata: dict[str, Any]  # see `export`
 
 
 class Agreement(NamedTuple):
-    """How the actions of a file compare with those of the policy."""
+    """How a file's actions compare with the policy's."""
 
     observations: int
     equal: int  # observations with bit-identical actions
@@ -59,7 +59,7 @@ def open_exported(path: Path) -> ExportedPolicy:
     try:
         with open_file(path) as file:
             content = file.read()
-        # torch doesn't check the sums of a file that it reads.
+        # torch doesn't verify the checksums of a file that it reads.
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             if archive.testzip():
                 raise WorkbenchError(f"{path} is damaged")
@@ -88,10 +88,10 @@ def written(module: nn.Module, metadata: dict[str, Any]) -> bytes:
 
 
 def read(content: bytes) -> tuple[torch.jit.ScriptModule, dict[str, Any]]:
-    """Reads what `written` has returned.
+    """Reads what `written` returned.
 
     Raises:
-        RuntimeError, ValueError: if it is something else.
+        RuntimeError, ValueError: if the content is something else.
     """
     extra: dict[str, Any] = {METADATA: ""}
     with _no_deprecation():
@@ -102,14 +102,14 @@ def read(content: bytes) -> tuple[torch.jit.ScriptModule, dict[str, Any]]:
 
 @contextmanager
 def _no_deprecation() -> Iterator[None]:
-    """torch recommends its newer exporters wherever TorchScript is used."""
+    """Suppresses torch's advice to use its newer exporters, which every use of TorchScript prints."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         yield
 
 
 def batch(observations: Sequence[Observation]) -> Any:
-    """Returns observations as a module takes them: a tensor (N, ...), or a dict of those."""
+    """Stacks observations for a module: a tensor (N, ...), or a dict of those."""
     first = observations[0]
     if isinstance(first, dict):
         return {
@@ -120,7 +120,7 @@ def batch(observations: Sequence[Observation]) -> Any:
 
 
 def described(space: spaces.Space[Any]) -> dict[str, Any]:
-    """Returns a space for JSON; infinite bounds are null."""
+    """Describes a space as plain values for JSON; infinite bounds are None."""
     kind = type(space).__name__
     match space:
         case spaces.Dict():
@@ -162,8 +162,8 @@ class OfDicts(nn.Module):
     """Maps observations, a dict of (N, ...) of any number type, to greedy actions (N, ...).
 
     Args:
-        network: takes the parts side by side.
-        names: of the parts, in the network's order.
+        network: takes the parts concatenated.
+        names: the parts' names, in the network's order.
     """
 
     def __init__(self, network: nn.Module, names: Sequence[str]) -> None:
@@ -180,12 +180,12 @@ class OfDicts(nn.Module):
 
 
 def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement]:
-    """Returns the content of the file, and how it compares with the policy.
+    """Returns the file's content, and how it compares with the policy.
 
     Args:
-        run: the policy's.
+        run: the policy's run.
         policy: its environment is stepped.
-        seed: of the observations for the comparison.
+        seed: seeds the observations for the comparison.
 
     Raises:
         WorkbenchError: if the environment fails, its observations can't be exported, or the file
@@ -193,7 +193,7 @@ def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement
     """
     space, original = policy.env.observation_space, policy.env.unwrapped.observation_space
     module = _module(policy.network, space, run.env_id)
-    # Read back, because the content of the file is what has to agree.
+    # Read back, because the file's content is what must agree.
     agreement = _compare(read(written(module, {}))[0], module, policy, _observations(policy, seed))
     metadata = {
         "format": FORMAT,
@@ -216,7 +216,7 @@ def export(run: Run, policy: LearnedPolicy, seed: int) -> tuple[bytes, Agreement
 def _module(network: nn.Module, space: spaces.Space[Any], env_id: str) -> OfVectors | OfDicts:
     own = copy.deepcopy(network).cpu().eval().requires_grad_(False)
     for layer in own.modules():
-        if isinstance(layer, nn.Linear):  # TorchScript doesn't know NumPy's integers
+        if isinstance(layer, nn.Linear):  # TorchScript doesn't accept NumPy integers
             layer.in_features, layer.out_features = int(layer.in_features), int(layer.out_features)
     if not isinstance(space, spaces.Dict):
         return OfVectors(own)
@@ -229,7 +229,9 @@ def _module(network: nn.Module, space: spaces.Space[Any], env_id: str) -> OfVect
 
 
 def _observations(policy: LearnedPolicy, seed: int) -> list[Observation]:
-    """Half of them from episodes with greedy and random actions in turn, half scattered around those."""
+    """Returns observations: half from episodes of alternating greedy and random actions, half scattered
+    around those.
+    """
     env = policy.env
     env.action_space.seed(seed)
     met: list[Observation] = []
@@ -258,7 +260,7 @@ def _compare(
     policy: LearnedPolicy,
     observations: list[Observation],
 ) -> Agreement:
-    """Compares the file, for all observations at once and for single ones, with the policy.
+    """Compares the file's actions with the policy's, for all observations at once and for single ones.
 
     Raises:
         WorkbenchError: if actions differ by more than rounding.
@@ -270,7 +272,7 @@ def _compare(
     results = [_differences(found, wanted, policy.env.action_space) for found in (together, singly)]
     equal = np.logical_and(*(same for same, _ in results))
     distances = np.maximum(*(distance for _, distance in results))
-    if isinstance(module.network, Choice):  # where two actions are as good as tied, either is right
+    if isinstance(module.network, Choice):  # if two actions are nearly tied, either is right
         with torch.no_grad():
             margins = module.network.margins(module.joined(batch(observations)))
         close = margins.numpy() <= ROUNDING
@@ -288,7 +290,7 @@ def _compare(
 def _differences(
     found: np.ndarray, wanted: np.ndarray, space: spaces.Space[Any]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which actions are the same, (N,), and how far continuous ones are apart, see `Agreement`: (N,)."""
+    """Returns which actions are equal, (N,), and the distances of continuous ones, (N,), see `Agreement`."""
     if found.shape != wanted.shape:
         raise WorkbenchError(
             f"not written: the shape of its actions is {found.shape[1:]}, that of the run's "

@@ -1,4 +1,4 @@
-"""`view`: a run on a page in the browser, also while it trains."""
+"""`view`: shows a run on a page in the browser, also while it trains."""
 
 import argparse
 import os
@@ -8,7 +8,7 @@ from rl_workbench.starting import Interrupt
 from rl_workbench.tools.flags import POLICIES, add_environment_flags, env_options
 from web_viewer.address import add_flags as add_page_flags
 
-NICENESS = 10  # of a page beside a training, which goes first
+NICENESS = 10  # of a page beside a training, so that the training has priority
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -24,7 +24,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Serves the page until Ctrl-C, or until the training ends that has started it."""
+    """Serves the page until Ctrl-C, or until the training that started it ends."""
     from rl_workbench.tools.run_page import show_run
 
     if arguments.beside_training:
