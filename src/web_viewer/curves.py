@@ -125,7 +125,7 @@ class Curves:
         )  # fmt: skip
 
     def _scales(self, tag: str, last: float) -> dict[str, uplot.Scale]:
-        """An axis from 0 to somewhat beyond the last step."""
+        """Returns an axis from 0 to somewhat beyond the last step."""
         tens = 10.0 ** math.floor(math.log10(max(last, 1.0)))
         self._ends[tag] = next(each * tens for each in ENDS if each * tens >= last)
         return {"x": uplot.Scale(time=False, auto=False, range=(0.0, self._ends[tag]))}
@@ -213,6 +213,6 @@ def _join(one: _Bucket, following: _Bucket) -> _Bucket:
 
 
 def _extremes(values: list[float]) -> tuple[float, float]:
-    """The least and the greatest value, in the order in which they came."""
+    """Returns the least and the greatest value, in the order in which they came."""
     low, high = min(values), max(values)
     return (low, high) if values.index(low) <= values.index(high) else (high, low)

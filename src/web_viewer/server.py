@@ -1,4 +1,4 @@
-"""A viser server behind a gate, without viser's console output and its tunnel to the internet.
+"""A viser server behind a gate, without viser's console output or its tunnel to the internet.
 
 viser serves everybody who reaches the port. Pages of other sites in the same browser reach it too: a
 browser lets them connect anywhere and only reports where they come from. So `Gate` checks each request.

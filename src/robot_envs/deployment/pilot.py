@@ -51,7 +51,7 @@ class CommandLimits:
         ]
 
     def __call__(self, command: Command, held: Command) -> Limited:
-        """The nearest command that is allowed after the present one."""
+        """Returns the nearest command that is allowed after the present one."""
         exceeded, numbers = [], []
         wanted, before = self._numbers(command), self._numbers(held)
         for joint, value, start, (lower, upper), way in zip(
@@ -67,7 +67,7 @@ class CommandLimits:
         return [command] if self._port.single else list(command)  # type: ignore[list-item, arg-type]
 
     def stop(self, joints: Mapping[str, JointState]) -> Command:
-        """The command that stops the joints: their present positions, or zero velocity or effort."""
+        """Returns the command that stops the joints: their present positions, or zero velocity or effort."""
         return self._port.at_start({name: each.position for name, each in joints.items()})
 
 

@@ -159,7 +159,7 @@ class CommandTopic:
             )
 
     def _is_linked(self, bound: float) -> bool:
-        """Whether somebody subscribes within a time [s]."""
+        """Returns whether somebody subscribes within a time [s]."""
         deadline = time.monotonic() + bound
         while self._publisher.get_num_connections() == 0:
             if time.monotonic() > deadline:

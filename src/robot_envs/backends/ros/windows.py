@@ -36,7 +36,7 @@ def show_curves(folder: Path) -> Callable[[], None]:
 
 
 def is_open() -> bool:
-    """Whether the simulator has a window."""
+    """Returns whether the simulator has a window."""
     return living_address(f"/{NODE}") is not None
 
 
@@ -66,7 +66,7 @@ def report_opening(say: Say, registered: bool) -> None:
     """Waits for a window to open, and says where it is: the simulator's own output goes to its log.
 
     Args:
-        say: is called with each line.
+        say: called with each line.
         registered: whether its node has registered already, so that it has ended if it isn't there.
     """
     lines: list[str] = []
