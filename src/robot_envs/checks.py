@@ -107,7 +107,7 @@ def _array_reader(space: gymnasium.spaces.Box, task: str) -> Callable[[Any], np.
 
 
 def check_task(task: Any) -> None:
-    """Raises TaskError if something is no task, or if its objects or its query can't be used."""
+    """Raises TaskError if `task` is no `Task`, or if its objects or its query can't be used."""
     if isinstance(task, type) and issubclass(task, Task):
         raise TaskError(f"a task is an object, {task.__name__}(...), and not the class")
     if not isinstance(task, Task):

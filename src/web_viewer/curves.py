@@ -27,7 +27,7 @@ LOSSES = "losses/"
 SMOOTHED = (EPISODES, LENGTHS)  # and losses
 MAX_CHARTS = 16
 HEIGHT = 150  # [pixels]
-# Mantissas of the axes' ends. The range of steps is set by us, and seldom: when viser fits it to the
+# Mantissas of the axes' ends. We set the range of steps ourselves, and seldom: when viser fits it to the
 # data, a chart that is drawn while it is hidden loses its range.
 ENDS = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0, 6.4, 8.0, 10.0)
 AXES = (uplot.Axis(space=85), uplot.Axis(size=55))  # [pixels] for 100,000,000 and for 100,000

@@ -88,8 +88,8 @@ Say = Callable[[str], None]
 class Pilot:
     """Runs a policy on a task, as in an environment, from the robot's joint states.
 
-    All methods of the task are called as in an environment, also its reward, so that data which a task
-    stores is as in the training. Joints aren't moved to the task's initial state.
+    Calls all methods of the task as an environment does, even its reward, so that the task stores the same
+    data as in training. Joints aren't moved to the task's initial state.
 
     Args:
         robot: the robot.

@@ -162,7 +162,7 @@ class PolicyNode:
         """Runs until it should end, or the node is shut down.
 
         Args:
-            should_end: is polled. A signal handler can't end the run itself: it may have interrupted a
+            should_end: polled. A signal handler can't end the run itself: it may have interrupted a
                 command that is being published.
 
         Raises:

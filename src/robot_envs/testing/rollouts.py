@@ -52,7 +52,7 @@ class Subject:
 
 
 def expect(right: bool, otherwise: str) -> None:
-    """Raises AssertionError with a text unless something is right."""
+    """Raises AssertionError with the text `otherwise` unless `right`."""
     if not right:
         raise AssertionError(otherwise)
 
@@ -61,9 +61,9 @@ def expect_error(call: Callable[[], Any], what: str, *kinds: type[Exception]) ->
     """Raises AssertionError unless a call raises an error of some kinds.
 
     Args:
-        call: should be refused.
+        call: what should be refused.
         what: describes the call, for the error.
-        kinds: of errors that are right.
+        kinds: the errors that may be raised.
     """
     wanted = " or ".join(kind.__name__ for kind in kinds)
     try:

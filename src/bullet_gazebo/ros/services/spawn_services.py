@@ -189,7 +189,7 @@ def _warn(name: str, description: ModelDescription) -> None:
 
 
 def _log(what: str, warnings: list[str], left_out: list[str]) -> None:
-    """Logs what a file asked for in vain."""
+    """Logs a file's warnings, and what was left out of the world."""
     for warning in _at_most(warnings):
         rospy.logwarn("%s: %s", what, warning)
     if left_out:

@@ -160,7 +160,7 @@ class OwnSimulator:
         """Kills a simulator that has failed; returns how it ended, and the last line of its log.
 
         Args:
-            hangs: it won't end by itself.
+            hangs: whether it hangs, and so won't end by itself.
         """
         how = ""
         if not hangs and self.has_died():

@@ -54,7 +54,7 @@ def open_window(say: Say) -> Callable[[], object]:
 def report_open(say: Say) -> None:
     """Says where a window is that was open before.
 
-    A window for other machines keeps its address, which holds a token, to whoever opened it.
+    A window for other machines has a token in its address, so only whoever opened it is shown that.
     """
     for line in rospy.get_param(WINDOW, []) or [
         "the simulator's window is open already; whoever opened it was told its address"
