@@ -1,8 +1,8 @@
 """Policy gradient with a value baseline: a linear softmax policy, one update per episode.
 
-The algorithm of the existing script: the advantage of a step is its discounted return less
-the value network's estimate before the update; the policy's loss is the sum, not the mean,
-of -log pi(a|s) A; the value's loss is the mean squared error to the returns.
+This is the existing script's algorithm. The advantage of a step is its discounted return less the value
+network's estimate before the update. The policy's loss is the sum, not the mean, of -log pi(a|s) A; the
+value's loss is the mean squared error to the returns.
 """
 
 import json
@@ -22,7 +22,7 @@ from rl_workbench.states import array, load_optimizer, set_generator, switch
 
 
 class PolicyNetwork(nn.Module):
-    """Observation (N, 4) to the probabilities (N, 2) of the two actions."""
+    """Maps observations (N, 4) to the probabilities of the two actions (N, 2)."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -33,7 +33,7 @@ class PolicyNetwork(nn.Module):
 
 
 class ValueNetwork(nn.Module):
-    """Observation (N, 4) to the estimated return (N, 1)."""
+    """Maps observations (N, 4) to the estimated return (N, 1)."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -47,10 +47,10 @@ class ValueNetwork(nn.Module):
 
 @dataclass
 class Episode:
-    """What happened, step by step: observation before the action, action, reward."""
+    """One episode, step by step: the observation before the action, the action, the reward."""
 
     observations: list[np.ndarray] = field(default_factory=list)  # each float32 (D,)
-    actions: list[Any] = field(default_factory=list)  # numbers, or arrays (n,), float32
+    actions: list[Any] = field(default_factory=list)  # indices, or arrays (n,), float32
     rewards: list[float] = field(default_factory=list)
     final_observation: np.ndarray | None = None  # after the last step
     terminated: bool = False  # by the task; False: it was cut off
@@ -67,11 +67,11 @@ class Episode:
 
     @property
     def total_reward(self) -> float:
-        """The undiscounted sum, added in order as the existing script does."""
+        """The undiscounted return, summed in order like the existing script's."""
         return float(sum(self.rewards))
 
     def states(self) -> list[np.ndarray]:
-        """All observations, the final one included: T + 1.
+        """Returns all T + 1 observations, the final one included.
 
         Raises:
             ValueError: if the episode isn't over.
@@ -81,7 +81,7 @@ class Episode:
         return [*self.observations, self.final_observation]
 
     def state_dict(self) -> dict[str, Any]:
-        """Tensors and plain values, for a checkpoint.
+        """Returns the episode as tensors and plain values, for a checkpoint.
 
         Raises:
             ValueError: if the episode isn't over.
@@ -95,15 +95,15 @@ class Episode:
 
     @classmethod
     def from_state(cls, state: dict[str, Any], size: int, kind: int | tuple[int, ...]) -> "Episode":
-        """The episode that `state_dict` told of.
+        """Rebuilds an episode from what `state_dict` returned.
 
         Args:
-            state: of the episode.
-            size: D, of observations.
-            kind: number of single actions, or the shape of continuous ones.
+            state: the return value of `state_dict`.
+            size: D of the observations.
+            kind: the number of discrete actions, or the shape of continuous ones.
 
         Raises:
-            TypeError, ValueError, LookupError: if it is something else.
+            TypeError, ValueError, LookupError: if `state` is malformed.
         """
         *observations, final = array(state["observations"], torch.float32, (None, size))
         length = len(observations)
@@ -120,21 +120,21 @@ class Episode:
 
 
 def as_tensor(actions: list[Any]) -> torch.Tensor:
-    """Actions of all steps: numbers (T,), or arrays (T, n)."""
+    """Stacks the actions of all steps: (T,) if discrete, (T, n) if continuous."""
     if actions and isinstance(actions[0], np.ndarray):
         return torch.from_numpy(np.stack(actions))
     return torch.tensor(actions)
 
 
 class Losses(NamedTuple):
-    """The two losses of one update, taken before the weights change."""
+    """The two losses of one update, computed before the weights change."""
 
     policy: float
     value: float
 
 
 def discounted_returns(rewards: list[float], gamma: float) -> np.ndarray:
-    """Each step's return, from the last step backwards: G_t = r_t + gamma G_t+1.
+    """Computes each step's return backwards from the last: G_t = r_t + gamma G_t+1.
 
     Returns:
         float64, shape (len(rewards),).
@@ -148,13 +148,13 @@ def discounted_returns(rewards: list[float], gamma: float) -> np.ndarray:
 
 
 class TwoNetworks(ABC):
-    """A policy and a value network, each with an Adam, and a generator that draws actions.
+    """Base class: a policy and a value network, an Adam for each, and a generator for the actions.
 
     Args:
-        policy: observations (N, D) to probabilities (N, A).
-        value: observations (N, D) to estimated returns (N, 1).
-        rates: the learning rates of the two.
-        seed: of the generator.
+        policy: maps observations (N, D) to probabilities (N, A).
+        value: maps observations (N, D) to estimated returns (N, 1).
+        rates: learning rates of policy and value.
+        seed: seeds the generator.
     """
 
     def __init__(
@@ -179,14 +179,14 @@ class TwoNetworks(ABC):
         }
 
     def state_dict(self) -> dict[str, Any]:
-        """All that is needed to go on learning to the same bits: tensors, numbers, texts."""
+        """Returns all that a bit-identical continuation needs, as tensors, numbers and strings."""
         return {
             **{name: part.state_dict() for name, part in self._parts().items()},
             "generator": json.dumps(self.generator.bit_generator.state),
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Takes over what `state_dict` gave."""
+        """Loads what `state_dict` returned."""
         self.policy.load_state_dict(state["policy"])
         self.value.load_state_dict(state["value"])
         load_optimizer(self.policy_optimizer, state["policy_optimizer"])
@@ -198,14 +198,13 @@ class TwoNetworks(ABC):
 class PolicyGradientAgent(TwoNetworks):
     """Learns from whole episodes; acts from a NumPy copy of the linear policy.
 
-    Both output layers start at zero: a uniform policy, and a value of 0 everywhere. From random
-    ones, as in the existing script, several seeds in ten need more than 600 episodes: a weight
-    of the policy that starts with the wrong sign has to be unlearned, and a hidden unit that
-    starts with a negative weight to the value's output is soon dead, since returns are positive.
+    Both output layers start at zero: a uniform policy, and a value of 0 everywhere. With random output
+    layers, as in the existing script, several seeds in ten need more than 600 episodes: a policy weight
+    of the wrong sign has to be unlearned, and a hidden unit with a negative weight to the value's output
+    soon dies, since returns are positive.
 
     Args:
-        seed: makes the initial weights and the choice of actions repeatable, through
-            generators of its own.
+        seed: seeds the agent's own generators, for the initial weights and for the actions.
         settings: the algorithm's options.
     """
 
@@ -228,43 +227,44 @@ class PolicyGradientAgent(TwoNetworks):
         self._bias = self._output.bias.detach().numpy().copy()  # (2,)
 
     def probability_of_zero(self, observation: np.ndarray) -> float:
-        """The policy's probability of action 0 for an observation of shape (4,).
+        """Returns the policy's probability of action 0 for an observation (4,).
 
-        Eight times as fast as asking torch; equal to it within float32.
+        NumPy is eight times as fast as torch here, and equal within float32 rounding.
         """
         left, right = (self._weight @ observation + self._bias).tolist()
         return 1.0 / (1.0 + math.exp(min(right - left, 700.0)))
 
     def probabilities(self, observation: np.ndarray) -> np.ndarray:
-        """Of both actions, (2,)."""
+        """Returns the probabilities of both actions (2,) for an observation (4,)."""
         left = self.probability_of_zero(observation)
         return np.array([left, 1.0 - left])
 
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> int:
-        """Draws an action from the policy."""
+        """Draws an action from the policy with the given generator."""
         return 0 if generator.random() < self.probability_of_zero(observation) else 1
 
     def act(self, observation: np.ndarray) -> int:
-        """Draws one by the agent's own generator."""
+        """Draws an action from the policy with the agent's own generator."""
         return self.draw(observation, self.generator)
 
     def limited(self, action: int) -> int:
-        """An action that was drawn, as the environment takes it: the same."""
+        """Returns a drawn action in the form that the environment takes; here it is the same."""
         return action
 
     def act_greedily(self, observation: np.ndarray) -> int:
-        """The more probable action."""
+        """Returns the more probable action."""
         return 0 if self.probability_of_zero(observation) >= 0.5 else 1
 
     def greedy_network(self) -> SingleChoice:
-        """The same as a torch module: observations (N, 4) to actions (N,)."""
+        """Returns the greedy policy as a torch module: observations (N, 4) to actions (N,)."""
         return SingleChoice(self._output)
 
     def learn(self, episode: Episode) -> Losses:
         """Updates both networks once from one episode.
 
         Raises:
-            WorkbenchError: if a loss isn't finite; the weights are as before then.
+            WorkbenchError: if a loss or the policy's gradient isn't finite, before any weight changes; or if
+                the value's gradient isn't.
         """
         observations = torch.from_numpy(np.stack(episode.observations))  # (T, 4)
         actions = torch.tensor(episode.actions)  # (T,)
@@ -285,24 +285,24 @@ class PolicyGradientAgent(TwoNetworks):
 
 
 def check_finite(losses: Losses) -> None:
-    """Refuses losses that are no numbers with a WorkbenchError, before anything is changed."""
+    """Raises WorkbenchError if a loss isn't finite; call it before any weight changes."""
     for name, loss in losses._asdict().items():
         if not math.isfinite(loss):
             raise WorkbenchError(f"the {name} loss is {loss}; the networks were left unchanged")
 
 
 def start_at_zero(layer: nn.Linear) -> None:
-    """Has a layer begin with an output of 0 everywhere."""
+    """Sets a layer's weights and bias to 0, so that its output starts at 0."""
     nn.init.zeros_(layer.weight)
     nn.init.zeros_(layer.bias)
 
 
 def descend(optimizer: torch.optim.Optimizer, loss: torch.Tensor) -> None:
-    """One step of the optimizer down the loss.
+    """Takes one optimizer step down the loss.
 
     Raises:
-        WorkbenchError: if the gradient isn't finite, as it may be where the loss is; no weight was
-            changed then.
+        WorkbenchError: if the gradient isn't finite, which is possible even with a finite loss. The
+            weights are unchanged.
     """
     optimizer.zero_grad()
     loss.backward()

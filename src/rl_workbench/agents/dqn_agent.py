@@ -1,4 +1,4 @@
-"""The DQN agent: acts, remembers, learns; knows neither environments nor files."""
+"""The DQN agent: acts, stores transitions, learns. It knows neither environments nor files."""
 
 import json
 import math
@@ -18,24 +18,24 @@ from rl_workbench.states import load_optimizer, number, sequence, set_generator,
 
 
 class Learned(NamedTuple):
-    """Of the last gradient step of a round: the loss, and the mean of the Q-values."""
+    """Loss and mean Q-value of the last gradient step in a round."""
 
     td_loss: float
     q_values: float
 
 
 class DQNAgent:
-    """Learns a network of Q-values from single steps.
+    """Learns a Q-network from single steps.
 
-    Its generators, for exploring and for drawing batches, are its own; so is the one that makes
-    the first weights. The same seed and the same steps give the same bits.
+    It has its own generators for initial weights, exploration and batches: the same seed and the same
+    steps give bit-identical weights.
 
     Args:
-        settings: the options.
+        settings: the algorithm's options.
         observation_size: D; observations are float32 of shape (D,).
         actions: A; actions are 0 to A - 1.
-        seed: of weights, exploration and batches.
-        device: where the networks are.
+        seed: seeds weights, exploration and batches.
+        device: the networks' torch device.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class DQNAgent:
         self._epsilon = Epsilon(settings)
         self._explore, self._draw = (np.random.default_rng([seed, use]) for use in (0, 1))
         self._values = self._fast_values()
-        self.steps = 0  # of the environment
+        self.steps = 0  # environment steps
         self.gradient_steps = 0
 
     def _network(self, observation_size: int, seed: int) -> nn.Module:
@@ -77,30 +77,30 @@ class DQNAgent:
 
     @property
     def epsilon(self) -> float:
-        """The probability that the next action is a random one."""
+        """The probability that the next action is random."""
         return self._epsilon.value
 
     def act(self, observation: np.ndarray) -> int:
-        """A random action with probability epsilon, else the best."""
+        """Returns a random action with probability epsilon, else the greedy one."""
         if self._explore.random() < self._epsilon.value:
             return int(self._explore.integers(self.actions))
         return self.act_greedily(observation)
 
     def act_greedily(self, observation: np.ndarray) -> int:
-        """The action of the highest value."""
+        """Returns the action with the highest Q-value."""
         if self.normaliser is not None:
             observation = self.normaliser(observation)
         return int(self._values(observation).argmax())
 
     def greedy_network(self) -> SingleChoice:
-        """The same as a torch module: observations (N, D) to actions (N,)."""
+        """Returns the greedy policy as a torch module: observations (N, D) to actions (N,)."""
         if self.normaliser is None:
             return SingleChoice(self.q_net)
         return SingleChoice(nn.Sequential(self.normaliser.network(), self.q_net))
 
     @torch.no_grad()
     def q_values(self, observations: np.ndarray) -> np.ndarray:
-        """The value of each action, (N, A), for observations (N, D)."""
+        """Returns the Q-value of each action (N, A) for observations (N, D)."""
         values: np.ndarray = self.q_net(self._inputs(observations)).cpu().numpy()
         return values
 
@@ -116,7 +116,7 @@ class DQNAgent:
         terminated: bool,
         truncated: bool,
     ) -> None:
-        """Remembers one step: (observation, action, reward), and what followed."""
+        """Stores one step: (observation, action, reward), and what followed."""
         observation, action, reward = step
         if self.normaliser is not None:
             self.normaliser.add(observation)
@@ -129,13 +129,13 @@ class DQNAgent:
         self._epsilon.step_done(self.steps)
 
     def episode_done(self) -> None:
-        """Tells of an episode's end, or that an episode under way isn't continued."""
+        """Ends the current episode, whether it finished or is abandoned."""
         self._returns.clear()
         self._epsilon.episode_done()
 
     @property
     def is_due(self) -> bool:
-        """Whether a round of learning comes after this step."""
+        """Whether a round of learning is due after this step."""
         settings = self.settings
         return (
             self.steps >= settings.learning_starts
@@ -144,11 +144,11 @@ class DQNAgent:
         )
 
     def learn(self) -> Learned:
-        """One round: as many gradient steps as the settings say.
+        """Runs one round of `settings.gradient_steps` gradient steps.
 
         Raises:
-            WorkbenchError: if the loss or the gradient isn't finite; the weights are as they were
-                before that gradient step.
+            WorkbenchError: if the loss or the gradient isn't finite. That gradient step changes no
+                weight.
         """
         settings = self.settings
         self._optimizer.param_groups[0]["lr"] = learning_rate(settings, self.steps)
@@ -189,7 +189,7 @@ class DQNAgent:
         return rated.gather(1, best).squeeze(1)
 
     def _clip(self, loss: float) -> None:
-        """Scales the gradient down; refuses one that would spoil the weights."""
+        """Clips the gradient's norm; raises WorkbenchError if loss or gradient isn't finite."""
         norm = self._flat.gradient.norm().item()
         if not (math.isfinite(loss) and math.isfinite(norm)):
             raise WorkbenchError(
@@ -200,7 +200,7 @@ class DQNAgent:
             self._flat.gradient.mul_(self.settings.max_grad_norm / norm)
 
     def policy_state(self) -> dict[str, Any]:
-        """What acting needs: `q_net`, `target_net`, `epsilon`, and the normaliser if there is one."""
+        """Returns what acting needs: `q_net`, `target_net`, `epsilon`, and `normaliser` (or None)."""
         return {
             "q_net": _copied(self.q_net),
             "target_net": _copied(self.target_net),
@@ -209,7 +209,7 @@ class DQNAgent:
         }
 
     def load_policy_state(self, state: dict[str, Any]) -> None:
-        """Takes over what `policy_state` gave; a file of the DQN tutorial's has no normaliser."""
+        """Loads what `policy_state` returned; a file of the DQN tutorial's has no normaliser."""
         self.q_net.load_state_dict(state["q_net"])
         self.target_net.load_state_dict(state["target_net"])
         self._epsilon.value = number(state["epsilon"])
@@ -217,9 +217,9 @@ class DQNAgent:
             self.normaliser.load_state_dict(state["normaliser"])
 
     def state_dict(self) -> dict[str, Any]:
-        """Everything that the next step depends on; tensors, numbers and text only.
+        """Returns everything that the next step depends on, as tensors, numbers and strings.
 
-        Optimiser and replay share their memory: write or copy it before the next step.
+        Optimiser and replay buffer are not copied: write or copy the result before the next step.
         """
         return {
             **self.policy_state(),
@@ -232,7 +232,7 @@ class DQNAgent:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Takes over what `state_dict` gave."""
+        """Loads what `state_dict` returned."""
         self.load_policy_state(state)
         load_optimizer(self._optimizer, state["optimizer"])
         self.buffer.load_state_dict(state["replay"], self.actions)
@@ -245,7 +245,7 @@ class DQNAgent:
 
 
 def _copied(network: nn.Module) -> dict[str, torch.Tensor]:
-    """The state_dict in memory of its own: the parameters are parts of one vector."""
+    """Clones the state_dict, since the parameters are views of one vector."""
     return {name: tensor.detach().cpu().clone() for name, tensor in network.state_dict().items()}
 
 
@@ -261,7 +261,7 @@ def _hidden(sizes: Sequence[int]) -> list[nn.Module]:
 
 
 class QNetwork(nn.Module):
-    """Observations (N, D) to the value of each action (N, A)."""
+    """Maps observations (N, D) to the value of each action (N, A)."""
 
     def __init__(self, observation_size: int, actions: int, hidden: Sequence[int]) -> None:
         super().__init__()
@@ -274,7 +274,7 @@ class QNetwork(nn.Module):
 
 
 class DuelingQNetwork(nn.Module):
-    """As QNetwork, by the state's value and each action's advantage: Q = V + A - mean(A)."""
+    """A QNetwork of the state's value and each action's advantage: Q = V + A - mean(A)."""
 
     def __init__(self, observation_size: int, actions: int, hidden: Sequence[int]) -> None:
         super().__init__()
@@ -290,10 +290,10 @@ class DuelingQNetwork(nn.Module):
 
 
 def fast_values(network: nn.Module) -> Callable[[np.ndarray], np.ndarray]:
-    """The network as a function of one observation (D,), several times as fast as torch.
+    """Returns the network as a NumPy function of one observation (D,), several times as fast as torch.
 
-    It reads the network's own memory, so it follows every change of the weights. What it
-    returns, (A,), has the same order as the Q-values: a dueling network's lack V - mean(A).
+    It reads the network's own memory, so it follows every change of the weights. Its results (A,) rank
+    actions as the Q-values do; for a dueling network they lack V - mean(A).
     """
     body = network.feature if isinstance(network, DuelingQNetwork) else network.net
     head = [network.advantage] if isinstance(network, DuelingQNetwork) else []
@@ -318,11 +318,10 @@ def _layers(body: object) -> list[nn.Module]:
 
 
 class FlatParameters:
-    """A network's parameters moved into one vector, and their gradients into another.
+    """Moves a network's parameters into one vector, and their gradients into another.
 
-    The network works as before; but the optimiser, the clipping of gradients and the target
-    update handle one tensor instead of one for each layer, which halves the time of a gradient
-    step of a small network.
+    The network computes the same. But optimiser, gradient clipping and target update handle one tensor
+    instead of one per parameter, which halves the time of a small network's gradient step.
     """
 
     def __init__(self, network: nn.Module) -> None:
@@ -340,7 +339,7 @@ class FlatParameters:
 
     @torch.no_grad()
     def follow(self, other: "FlatParameters", share: float) -> None:
-        """Moves this network towards another one by a share of the way; 1 copies it."""
+        """Moves the weights towards another network's by a share of the distance; 1 copies them."""
         if share == 1.0:
             self.vector.copy_(other.vector)
         else:
@@ -361,19 +360,19 @@ class Epsilon:
         self.value = settings.start_e
 
     def step_done(self, steps: int) -> None:
-        """Tells how many steps of the environment there have been."""
+        """Updates the linear schedule to the number of environment steps so far."""
         if self._settings.epsilon_schedule == "linear":
             start, end = self._settings.start_e, self._settings.end_e
             share = min(1.0, steps / self._duration) if self._duration else 1.0
             self.value = start + (end - start) * share
 
     def learned(self) -> None:
-        """Tells of a round of learning."""
+        """Applies the decay of a round of learning."""
         if self._settings.epsilon_schedule == "step":
             self._decay()
 
     def episode_done(self) -> None:
-        """Tells of an episode's end."""
+        """Applies the decay of an episode."""
         if self._settings.epsilon_schedule == "episode":
             self._decay()
 
@@ -382,7 +381,7 @@ class Epsilon:
 
 
 def learning_rate(settings: DQNSettings, steps: int) -> float:
-    """The learning rate after that many steps of the environment."""
+    """Returns the learning rate after that many environment steps."""
     if settings.lr_schedule == "constant":
         return settings.learning_rate
     return settings.learning_rate * max(0.0, 1.0 - steps / settings.total_timesteps)

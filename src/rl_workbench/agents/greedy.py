@@ -1,6 +1,6 @@
-"""What a policy comes to without whoever learned it: torch modules from observations to greedy actions.
+"""Greedy policies as torch modules, from observations to actions, without the agent that learned them.
 
-All of it can be compiled by TorchScript. The agents act by quicker ways of their own, for one observation.
+TorchScript can compile all of them. For single observations the agents use faster NumPy code.
 """
 
 from abc import ABC, abstractmethod
@@ -11,12 +11,12 @@ from torch import nn
 
 
 class Scaling(nn.Module):
-    """Observations (N, D) as a network has learned to see them.
+    """Scales observations (N, D) as in the training: (x - offset) * factors, clipped to +-limit.
 
     Args:
-        offset: is subtracted first, (D,) float32.
-        factors: what is left is multiplied by, (D,) float32.
-        limit: what is beyond +-limit is clipped.
+        offset: (D,) float32.
+        factors: (D,) float32.
+        limit: the largest absolute result.
     """
 
     offset: torch.Tensor
@@ -35,7 +35,7 @@ class Scaling(nn.Module):
 
 
 class Spread(nn.Module):
-    """Actions (N, n), told in halves of their range from its middle on, in their own units.
+    """Converts actions (N, n), given in half-ranges from the middle of their range, to their own units.
 
     Args:
         middle: (n,) float32.
@@ -55,12 +55,12 @@ class Spread(nn.Module):
 
 
 class Continuous(nn.Module):
-    """Observations (N, D) to continuous actions, in their shape and type.
+    """Maps observations (N, D) to continuous actions, in the action space's shape and type.
 
     Args:
-        outputs: observations to numbers (N, n).
-        low: the smallest action, of its shape and type.
-        high: the largest one.
+        outputs: maps observations to numbers (N, n).
+        low: the smallest action, in the space's shape and type.
+        high: the largest action.
     """
 
     low: torch.Tensor
@@ -75,17 +75,17 @@ class Continuous(nn.Module):
 
 
 class ClippedAction(Continuous):
-    """The outputs, within the bounds."""
+    """Clips the outputs to the bounds."""
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         return torch.clamp(self.outputs(observations).reshape(self.shape), self.low, self.high)
 
 
 class Choice(nn.Module, ABC):
-    """Observations (N, D), float32, to what the highest of the scores choose.
+    """Maps observations (N, D), float32, to the actions that their scores choose.
 
     Args:
-        scores: observations to numbers of any kind, (N, A).
+        scores: maps observations to scores (N, A), on any scale.
     """
 
     def __init__(self, scores: nn.Module) -> None:
@@ -94,15 +94,15 @@ class Choice(nn.Module, ABC):
 
     @abstractmethod
     def margins(self, observations: torch.Tensor) -> torch.Tensor:
-        """How clear each choice is, (N,): by how much the score that wins is higher than the next one.
+        """Returns how far the winning score is above the next one, (N,).
 
-        It is a share of the larger of the two, or of 1; below what rounding makes, another order of the same
-        sums may choose otherwise.
+        The margin is relative to the larger absolute score, or to 1 if that is smaller. Within rounding
+        error, the same sums in another order may choose another action.
         """
 
 
 class SingleChoice(Choice):
-    """The action of the highest score, (N,)."""
+    """Chooses the action with the highest score, (N,)."""
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         return self.scores(observations).argmax(dim=1)
@@ -112,7 +112,7 @@ class SingleChoice(Choice):
 
 
 def lead(scores: torch.Tensor) -> torch.Tensor:
-    """By how much the highest of (N, A) is above the next one, see `Choice.margins`: (N,)."""
+    """Returns the margin of the highest of scores (N, A), see `Choice.margins`: (N,)."""
     if scores.shape[1] == 1:
         return torch.full((len(scores),), float("inf"))
     first, second = scores.topk(2, dim=1).values.unbind(dim=1)

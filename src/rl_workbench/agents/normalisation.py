@@ -1,4 +1,4 @@
-"""Observations brought to zero mean and unit deviation, as seen so far."""
+"""Normalises observations by their running mean and standard deviation."""
 
 from typing import Any
 
@@ -8,8 +8,8 @@ import torch
 from rl_workbench.agents.greedy import Scaling
 from rl_workbench.states import array, whole
 
-CLIP = 10.0  # [deviations]
-SMALLEST = 1e-8  # of the variance; a constant quantity stays 0
+CLIP = 10.0  # [standard deviations]
+SMALLEST = 1e-8  # added to the variance, so that a constant quantity gives 0
 
 
 class Normaliser:
@@ -26,7 +26,7 @@ class Normaliser:
         self._update_scale()
 
     def add(self, observation: np.ndarray) -> None:
-        """Counts one observation (D,)."""
+        """Updates mean and variance with one observation (D,)."""
         self._count += 1
         deviation = observation - self._mean
         self._mean += deviation / self._count
@@ -39,16 +39,16 @@ class Normaliser:
         self._scale = (1.0 / np.sqrt(variance + SMALLEST)).astype(np.float32)
 
     def __call__(self, observations: np.ndarray) -> np.ndarray:
-        """Observations (..., D) in deviations from the mean, float32, within +-10."""
+        """Returns observations (..., D) in standard deviations from the mean, float32, within +-10."""
         scaled: np.ndarray = (observations - self._offset) * self._scale
         return np.clip(scaled, -CLIP, CLIP)
 
     def network(self) -> Scaling:
-        """The same as a torch module, which doesn't follow what is counted from now on."""
+        """Returns the present scaling as a torch module; later updates don't change it."""
         return Scaling(self._offset, self._scale, CLIP)
 
     def state_dict(self) -> dict[str, Any]:
-        """Count, mean and squares."""
+        """Returns count, mean and sum of squares."""
         return {
             "count": self._count,
             "mean": torch.from_numpy(self._mean.copy()),
@@ -56,7 +56,7 @@ class Normaliser:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Takes over what `state_dict` gave."""
+        """Loads what `state_dict` returned."""
         size = self._mean.shape
         self._count = whole(state["count"])
         self._mean = array(state["mean"], torch.float64, size)

@@ -1,6 +1,6 @@
-"""Softmax policies over single actions: the network that learns, and its quick twins that act.
+"""Softmax and Gaussian policies: the torch networks that learn, and NumPy actors that act.
 
-For one observation NumPy is several times as fast as torch.
+For a single observation NumPy is several times as fast as torch.
 """
 
 import math
@@ -11,16 +11,16 @@ import numpy as np
 import torch
 from torch import nn
 
-SMALLEST_CHANCE = float(np.finfo(np.float32).tiny)  # of an action, that counts for the entropy
+SMALLEST_CHANCE = float(np.finfo(np.float32).tiny)  # lower bound of probabilities in the entropy
 
 
 class SoftmaxNetwork(nn.Module):
-    """Prepared observation (N, D) to the probabilities (N, A) of the actions.
+    """Maps prepared observations (N, D) to the probabilities of the actions (N, A).
 
     Args:
         observations: D.
         actions: A.
-        hidden: units in a layer of tanh between them; 0: none.
+        hidden: units of the hidden tanh layer; 0 for no such layer.
     """
 
     def __init__(self, observations: int, actions: int, hidden: int) -> None:
@@ -36,42 +36,42 @@ class SoftmaxNetwork(nn.Module):
         return torch.softmax(self.fc(observations), dim=1)
 
     def layers(self) -> list[nn.Module]:
-        """From prepared observations to the preferences, of which `forward` makes probabilities."""
+        """Returns the layers from prepared observations to the logits, before the softmax."""
         return [self.hidden, nn.Tanh(), self.fc] if self._has_hidden else [self.fc]
 
     @property
     def has_hidden(self) -> bool:
-        """Whether there is a layer between observation and action."""
+        """Whether there is a hidden layer."""
         return self._has_hidden
 
     def log_chances(self, probabilities: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
-        """Logarithms of the probabilities (N,) of actions (N,)."""
+        """Returns the log-probabilities (N,) of actions (N,)."""
         return torch.log(probabilities.gather(1, actions.unsqueeze(1)).squeeze(1))
 
     def entropy(self, probabilities: torch.Tensor) -> torch.Tensor:
-        """The mean one of the policy."""
-        # At a probability of 0 its slope is infinite.
+        """Returns the policy's entropy, averaged over the observations."""
+        # At a probability of 0 the entropy's slope is infinite.
         return torch.special.entr(probabilities.clamp_min(SMALLEST_CHANCE)).sum(1).mean()
 
 
 class Actor(Protocol):
-    """Acts by a copy of a network's weights; observations (D,) as the environment gives them."""
+    """Acts with a copy of a network's weights, for observations (D,) as the environment returns them."""
 
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> Any:
-        """An action as it is learned from."""
+        """Draws an action, in the form that the agent learns from."""
         ...
 
     def greedy(self, observation: np.ndarray) -> Any:
-        """The most probable action, as the environment takes it."""
+        """Returns the most probable action, in the form that the environment takes."""
         ...
 
 
 class PairActor:
-    """Two actions, no hidden layer: one dot product tells which.
+    """Acts by one dot product: for two actions and no hidden layer.
 
     Args:
-        network: without a hidden layer, for two actions.
-        factors: that observations are multiplied by, (D,).
+        network: has two actions and no hidden layer.
+        factors: (D,), multiply the observations.
     """
 
     def __init__(self, network: SoftmaxNetwork, factors: np.ndarray) -> None:
@@ -97,11 +97,11 @@ class PairActor:
 
 
 class SoftmaxActor:
-    """Any number of actions, with or without a hidden layer.
+    """Acts for any number of actions, with or without a hidden layer.
 
     Args:
-        network: the one whose weights are copied.
-        prepare: what an observation goes through before the network sees it.
+        network: its weights are copied.
+        prepare: scales an observation for the network.
     """
 
     def __init__(
@@ -135,48 +135,48 @@ class SoftmaxActor:
         return int(np.argmax(self._preferences(observation)))
 
 
-SMALLEST_LOG_STD = -4.0  # a policy that draws always the same learns nothing more
+SMALLEST_LOG_STD = -4.0  # a policy that always draws the same action stops learning
 HALF_LOG_2_PI = 0.5 * math.log(2.0 * math.pi)
 
 
 class Bounds(NamedTuple):
-    """The smallest and the largest action: two arrays of its shape and type."""
+    """The smallest and the largest action: two arrays of the action space's shape and type."""
 
     low: np.ndarray
     high: np.ndarray
 
     @property
     def middle(self) -> np.ndarray:
-        """Of the range, (n,), float32; 0 where it has no ends."""
+        """The middle of the range, (n,), float32; 0 where it is unbounded."""
         low, high = self._ends()
         return (0.5 * (low + high)).ravel().astype(np.float32)
 
     @property
     def half(self) -> np.ndarray:
-        """Half of the range, (n,), float32; 1 where it has no ends."""
+        """Half of the range, (n,), float32; 1 where it is unbounded."""
         low, high = self._ends()
         return np.where(high > low, 0.5 * (high - low), 1.0).ravel().astype(np.float32)
 
     def _ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """As float64; -1 and 1 where one is missing."""
+        """Returns both ends as float64; -1 and 1 where either is infinite."""
         has_both = np.isfinite(self.low) & np.isfinite(self.high)
         low, high = (np.where(has_both, end, 0.0).astype(np.float64) for end in self)
         return np.where(has_both, low, -1.0), np.where(has_both, high, 1.0)
 
     def limited(self, action: np.ndarray) -> np.ndarray:
-        """An action (n,) as the environment takes it: within the range, of its shape and type."""
+        """Clips an action (n,) to the range, and returns it in the space's shape and type."""
         shaped = action.reshape(self.low.shape).astype(self.low.dtype)
         return np.asarray(np.clip(shaped, self.low, self.high))
 
 
 class GaussianNetwork(nn.Module):
-    """Prepared observation (N, D) to the means (N, n) of the actions, in halves of their range.
+    """Maps prepared observations (N, D) to the actions' means (N, n), in half-ranges from the middle.
 
     Args:
         observations: D.
         bounds: of the actions.
-        hidden: units in a layer of tanh between them; 0: none.
-        log_std: logarithm of the deviation that it begins with.
+        hidden: units of the hidden tanh layer; 0 for no such layer.
+        log_std: logarithm of the initial standard deviation.
     """
 
     def __init__(self, observations: int, bounds: Bounds, hidden: int, log_std: float) -> None:
@@ -195,31 +195,31 @@ class GaussianNetwork(nn.Module):
         return self.fc(observations)
 
     def layers(self) -> list[nn.Module]:
-        """From prepared observations to the means."""
+        """Returns the layers from prepared observations to the means."""
         return [self.hidden, nn.Tanh(), self.fc] if self.has_hidden else [self.fc]
 
     def deviations(self) -> torch.Tensor:
-        """Logarithms of them, (n,)."""
+        """Returns the logarithms of the standard deviations, (n,)."""
         return self.log_std.clamp_min(SMALLEST_LOG_STD)
 
     def log_chances(self, means: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
-        """Logarithms of the densities (N,) of actions (N, n)."""
+        """Returns the log-densities (N,) of actions (N, n)."""
         log_std = self.deviations()
         distance = ((actions - self._middle) / self._half - means) * torch.exp(-log_std)
         return -(0.5 * distance**2 + log_std + HALF_LOG_2_PI).sum(1)
 
     def entropy(self, means: torch.Tensor) -> torch.Tensor:
-        """The mean one of the policy; the same in every state."""
+        """Returns the policy's entropy, which is the same in every state."""
         return (self.deviations() + HALF_LOG_2_PI + 0.5).sum()
 
 
 class GaussianActor:
-    """Acts by a copy of a network's weights; see `Actor`.
+    """Acts with a copy of a network's weights; see `Actor`.
 
     Args:
-        network: the one whose weights are copied.
+        network: its weights are copied.
         bounds: of the actions.
-        prepare: what an observation goes through before the network sees it.
+        prepare: scales an observation for the network.
     """
 
     def __init__(
@@ -245,10 +245,10 @@ class GaussianActor:
         return np.asarray(weight @ seen + bias)
 
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> np.ndarray:
-        """An action (n,), float32; it may lie beyond its range."""
+        """Draws an action (n,), float32, which may lie outside its range."""
         noise = generator.standard_normal(len(self._std), np.float32)
         return self._middle + self._half * (self._mean(observation) + self._std * noise)
 
     def greedy(self, observation: np.ndarray) -> np.ndarray:
-        """The mean action, within its range."""
+        """Returns the mean action, clipped to its range."""
         return self._bounds.limited(self._middle + self._half * self._mean(observation))

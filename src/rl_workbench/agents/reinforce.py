@@ -1,10 +1,10 @@
-"""REINFORCE with a learned baseline: generalised advantages, one step of the policy a batch of episodes.
+"""REINFORCE with a learned baseline: generalised advantages, one policy step per batch of episodes.
 
-Against the algorithm of the ROS policy-gradient document (document.py) it differs in four things, each
-of which takes variance out of the gradient: advantages are weighted sums of temporal differences (Schulman
-et al. 2016, λ = 0.95) instead of whole returns; they are normalised over the batch; the baseline is fitted
-to each batch, not nudged towards it once; and observations come scaled, so that one learning rate suits all
-weights. A truncated episode bootstraps from the baseline, a terminated one doesn't.
+It differs from the algorithm of the ROS policy-gradient document (document.py) in four ways, each of which
+reduces the gradient's variance. Advantages are weighted sums of temporal differences (Schulman et al. 2016,
+λ = 0.95) instead of whole returns; they are normalised over the batch; the baseline takes many steps per
+batch, not one; and observations are scaled, so that one learning rate suits all weights. A truncated episode
+bootstraps from the baseline, a terminated one doesn't.
 """
 
 from collections.abc import Sequence
@@ -37,11 +37,11 @@ from rl_workbench.agents.policy_networks import (
 from rl_workbench.agents.settings import ReinforceSettings
 from rl_workbench.states import sequence
 
-SMALLEST_SPREAD = 1e-8  # of advantages, below which they are not blown up
+SMALLEST_SPREAD = 1e-8  # added to the advantages' deviation, so that equal ones stay 0
 
 
 class BaselineNetwork(nn.Module):
-    """Prepared observation (N, D) to the estimated return (N, 1)."""
+    """Maps prepared observations (N, D) to the estimated return (N, 1)."""
 
     def __init__(self, observations: int, hidden: int) -> None:
         super().__init__()
@@ -56,15 +56,14 @@ class BaselineNetwork(nn.Module):
 
 
 class ReinforceAgent(TwoNetworks):
-    """Learns from batches of whole episodes; a softmax policy over single actions, or a Gaussian one.
+    """Learns from batches of whole episodes, with a softmax policy or, for continuous actions, a Gaussian.
 
     Args:
-        seed: makes initial weights and the choice of actions repeatable, through generators of
-            its own.
-        scale: what an observation is divided by, of shape (D,).
+        seed: seeds the agent's own generators, for the initial weights and for the actions.
+        scale: (D,), divides observations.
         settings: the algorithm's options.
-        actions: number of single actions, or the bounds of continuous ones.
-        environments: that episodes come from at the same time, each with its share of a batch.
+        actions: number of discrete actions, or the bounds of continuous ones.
+        environments: how many play at the same time; each contributes equally to a batch.
     """
 
     def __init__(
@@ -92,7 +91,7 @@ class ReinforceAgent(TwoNetworks):
         self.sync()
 
     def sync(self) -> None:
-        """Copies the policy's weights to where acting reads them."""
+        """Copies the policy's weights into the actor."""
         self._actor = self._make_actor()
 
     def _make_actor(self) -> Actor:
@@ -106,33 +105,33 @@ class ReinforceAgent(TwoNetworks):
         return SoftmaxActor(network, self._prepared)
 
     def _prepared(self, observations: np.ndarray) -> np.ndarray:
-        """Observations (..., D) as the networks see them, float32."""
+        """Scales and normalises observations (..., D) for the networks, float32."""
         scaled: np.ndarray = observations * self._factors
         return scaled if self._normaliser is None else self._normaliser(scaled)
 
     def probabilities(self, observation: np.ndarray) -> np.ndarray:
-        """The policy's probabilities of single actions, (A,), for an observation (D,)."""
+        """Returns the probabilities of discrete actions, (A,), for an observation (D,)."""
         assert isinstance(self._actor, PairActor | SoftmaxActor)
         return self._actor.probabilities(observation)
 
     def draw(self, observation: np.ndarray, generator: np.random.Generator) -> Any:
-        """Draws an action from the policy, to be learned from; `limited` is for the environment."""
+        """Draws an action to learn from; pass it through `limited` for the environment."""
         return self._actor.draw(observation, generator)
 
     def act(self, observation: np.ndarray) -> Any:
-        """Draws one by the agent's own generator."""
+        """Draws an action to learn from with the agent's own generator."""
         return self.draw(observation, self.generator)
 
     def limited(self, action: Any) -> Any:
-        """An action that was drawn, as the environment takes it."""
+        """Returns a drawn action in the form that the environment takes, within its bounds."""
         return self._actions.limited(action) if isinstance(self._actions, Bounds) else action
 
     def act_greedily(self, observation: np.ndarray) -> Any:
-        """The most probable action."""
+        """Returns the most probable action."""
         return self._actor.greedy(observation)
 
     def greedy_network(self) -> nn.Module:
-        """The same as a torch module: observations (N, D) to actions (N, ...)."""
+        """Returns the greedy policy as a torch module: observations (N, D) to actions (N, ...)."""
         scaling = Scaling(np.zeros_like(self._factors), self._factors)
         normaliser = [] if self._normaliser is None else [self._normaliser.network()]
         outputs = nn.Sequential(scaling, *normaliser, *self._network.layers())
@@ -143,10 +142,10 @@ class ReinforceAgent(TwoNetworks):
         return ClippedAction(nn.Sequential(outputs, spread), bounds.low, bounds.high)
 
     def learn(self, *episodes: Episode) -> Losses | None:
-        """Takes an episode, or one of each environment; the last ones of a batch update both networks.
+        """Adds an episode, or one per environment, to the batch; a full batch updates both networks.
 
         Returns:
-            The losses of the update, taken before it; None if the batch isn't full yet.
+            The losses before the update; None if the batch isn't full yet.
 
         Raises:
             WorkbenchError: if a loss or a gradient isn't finite; the agent is as before then.
@@ -162,7 +161,7 @@ class ReinforceAgent(TwoNetworks):
         return losses
 
     def _measure(self, batch: list[Episode]) -> None:
-        """Counts a batch's observations: after its update, so that this met the policy that acted."""
+        """Updates the normaliser, after the networks: their update must see observations as acting did."""
         if self._normaliser is not None:
             for episode in batch:
                 for observation in episode.observations:
@@ -193,7 +192,7 @@ class ReinforceAgent(TwoNetworks):
         return loss - self.settings.entropy_coefficient * self._network.entropy(output)
 
     def _advantages(self, batch: list[Episode]) -> tuple[torch.Tensor, torch.Tensor]:
-        """Advantages and the baseline's targets, each (T,) over all episodes' steps."""
+        """Returns advantages and the baseline's targets, each (T,) over all episodes' steps."""
         advantages, targets = [], []
         for episode in batch:
             values = self._values(episode)
@@ -208,7 +207,7 @@ class ReinforceAgent(TwoNetworks):
         )
 
     def _values(self, episode: Episode) -> np.ndarray:
-        """The baseline at each state, the final one included: (T + 1,); 0 where nothing follows."""
+        """Returns the baseline at each state, (T + 1,); 0 at the last one if the episode terminated."""
         with torch.no_grad():
             values = self.value(self._seen(episode.states())).squeeze(1).double().numpy()
         if episode.terminated:
@@ -222,7 +221,7 @@ class ReinforceAgent(TwoNetworks):
         return nn.functional.mse_loss(self.value(observations).squeeze(1), targets)
 
     def state_dict(self) -> dict[str, Any]:
-        """As every learner's, with the episodes that wait for their batch to fill."""
+        """Returns the base class's state with the normaliser and the episodes of an unfinished batch."""
         return {
             **super().state_dict(),
             "batch": [episode.state_dict() for episode in self._batch],
@@ -230,7 +229,7 @@ class ReinforceAgent(TwoNetworks):
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Takes over what `state_dict` gave."""
+        """Loads what `state_dict` returned."""
         size = len(self._factors)
         batch = sequence(state["batch"])
         bounds = self._actions
@@ -252,7 +251,7 @@ def _make_network(
 def generalised_advantages(
     rewards: Sequence[float], values: np.ndarray, gamma: float, gae_lambda: float
 ) -> np.ndarray:
-    """Â_t = Σ_k (γλ)^k δ_{t+k} with δ_t = r_t + γ V(s_{t+1}) - V(s_t) (Schulman et al. 2016, eq. 16).
+    """Computes Â_t = Σ_k (γλ)^k δ_{t+k}, δ_t = r_t + γ V(s_{t+1}) - V(s_t) (Schulman et al. 2016, eq. 16).
 
     Args:
         rewards: of T steps.

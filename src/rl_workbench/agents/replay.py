@@ -11,9 +11,9 @@ from rl_workbench.states import array, number, sequence, whole
 
 
 class Transition(NamedTuple):
-    """One step, or n of them in one: what Q(observation, action) is compared with.
+    """One step, or n steps in one, for the target of Q(observation, action).
 
-    `discount` multiplies the next observation's value: gamma^n, or 0 where the episode ended.
+    `discount` multiplies the next observation's value: gamma^n, or 0 after a termination.
     """
 
     observation: np.ndarray  # (D,) float32
@@ -24,7 +24,7 @@ class Transition(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """Transitions as arrays; K rounds of B transitions each."""
+    """Transitions as arrays, for K gradient steps of B transitions each."""
 
     observations: np.ndarray  # (K, B, D) float32
     actions: np.ndarray  # (K, B) int64
@@ -36,10 +36,10 @@ class Batch(NamedTuple):
 class ReplayBuffer:
     """Keeps the newest `capacity` transitions.
 
-    Memory is reserved, not touched, so that a large buffer costs nothing before it is filled.
+    Memory is reserved but not touched, so a large buffer takes no RAM until it fills.
 
     Raises:
-        WorkbenchError: if the memory isn't there.
+        WorkbenchError: if there isn't enough memory.
     """
 
     def __init__(self, capacity: int, observation_size: int) -> None:
@@ -62,7 +62,7 @@ class ReplayBuffer:
         return self._size
 
     def push(self, transition: Transition) -> None:
-        """Adds a transition, in the oldest one's place once the buffer is full."""
+        """Adds a transition; in a full buffer it replaces the oldest."""
         index = self._next
         self._observations[index] = transition.observation
         self._actions[index] = transition.action
@@ -73,9 +73,9 @@ class ReplayBuffer:
         self._size = max(self._size, index + 1)
 
     def sample(self, batch_size: int, rng: np.random.Generator, rounds: int = 1) -> Batch:
-        """Draws `rounds` batches; within a batch no transition comes twice.
+        """Draws `rounds` batches, each without replacement.
 
-        A buffer that holds fewer than `batch_size` gives all it has.
+        If the buffer holds fewer than `batch_size` transitions, each batch holds all of them.
         """
         count = min(batch_size, self._size)
         if count == self._size:
@@ -93,19 +93,20 @@ class ReplayBuffer:
         )
 
     def state_dict(self) -> dict[str, Any]:
-        """The filled part as tensors that share its memory, and where the next one goes."""
+        """Returns the filled part as tensors that share its memory, and the next position."""
         arrays = {name: torch.from_numpy(array[: self._size]) for name, array in self._columns()}
         return {**arrays, "next": self._next}
 
     def load_state_dict(self, state: dict[str, Any], actions: int) -> None:
-        """Takes over what `state_dict` gave.
+        """Loads what `state_dict` returned.
 
         Args:
-            actions: A, of which the transitions have some.
+            state: the return value of `state_dict`.
+            actions: A; the transitions' actions must be below it.
 
         Raises:
             WorkbenchError: if it doesn't fit into this buffer.
-            TypeError, ValueError, LookupError: if it is something else.
+            TypeError, ValueError, LookupError: if it is malformed.
         """
         size, following = len(state["actions"]), whole(state["next"])
         is_full = size == self.capacity
@@ -129,10 +130,10 @@ class ReplayBuffer:
 
 
 class NStepReturns:
-    """Turns an episode's steps into transitions over n steps, fewer at the episode's end.
+    """Combines an episode's steps into n-step transitions, shorter ones at the episode's end.
 
     Args:
-        steps: n; with 1 each step is a transition.
+        steps: n; with 1 each step is its own transition.
         gamma: the discount factor.
     """
 
@@ -144,13 +145,13 @@ class NStepReturns:
     def add(
         self, step: tuple[np.ndarray, int, float], following: np.ndarray, ended: bool, valued: bool
     ) -> list[Transition]:
-        """Takes one step; returns the transitions that are complete now.
+        """Adds one step; returns the transitions that it completes.
 
         Args:
             step: observation before the action, action, reward.
             following: the observation after it.
-            ended: the episode is over: terminated or truncated.
-            valued: the following observation's value counts; it doesn't after a termination.
+            ended: whether the episode is over, by termination or truncation.
+            valued: whether the following observation's value counts; false after a termination.
         """
         self._window.append(step)
         transitions = []
@@ -169,11 +170,11 @@ class NStepReturns:
         return Transition(observation, action, reward, following, discount if valued else 0.0)
 
     def clear(self) -> None:
-        """Forgets the steps of an episode that isn't continued."""
+        """Discards the pending steps of an abandoned episode."""
         self._window.clear()
 
     def state_dict(self) -> dict[str, Any]:
-        """The steps that wait for their successors."""
+        """Returns the pending steps, whose n rewards aren't known yet."""
         return {
             "observations": [torch.from_numpy(step[0].copy()) for step in self._window],
             "actions": [step[1] for step in self._window],
@@ -181,10 +182,11 @@ class NStepReturns:
         }
 
     def load_state_dict(self, state: dict[str, Any], size: int, actions: int) -> None:
-        """Takes over what `state_dict` gave.
+        """Loads what `state_dict` returned.
 
         Args:
-            size: D, of observations.
+            state: the return value of `state_dict`.
+            size: D of the observations.
             actions: A.
         """
         observations = [

@@ -1,4 +1,4 @@
-"""All that the algorithm can be told, each option with its default."""
+"""The options of this project's own algorithms, with defaults and limits."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -9,10 +9,10 @@ from rl_workbench.option import check_options, option
 
 @dataclass(frozen=True)
 class DQNSettings:
-    """The options of DQN. Steps are the environment's, unless it says gradient steps.
+    """The options of DQN. Steps are environment steps, unless called gradient steps.
 
     Raises:
-        WorkbenchError: if a value makes no sense; names the option and its limits.
+        WorkbenchError: if a value is outside its limits; the text names the option and the limits.
     """
 
     total_timesteps: int = option(
@@ -62,16 +62,16 @@ class DQNSettings:
             raise WorkbenchError(f"hidden_sizes are positive, one or more: {self.hidden_sizes}")
 
     def changed(self, **values: object) -> "DQNSettings":
-        """A copy with other values."""
+        """Returns a copy with some values changed."""
         return dataclasses.replace(self, **values)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
 class ReinforceSettings:
-    """The options of the algorithm.
+    """The options of REINFORCE.
 
     Raises:
-        WorkbenchError: if a value is beyond its limits; names the option and these.
+        WorkbenchError: if a value is outside its limits; the text names the option and the limits.
     """
 
     gamma: float = option(0.99, "discount of rewards, for each step that they come later", 0, 1)
@@ -112,10 +112,10 @@ class ReinforceSettings:
 
 @dataclass(frozen=True)
 class DocumentSettings:
-    """The options of the ROS policy-gradient document's algorithm; its script has them as constants.
+    """The options of the ROS policy-gradient document's algorithm, which are constants in its script.
 
     Raises:
-        WorkbenchError: if a value is beyond its limits; names the option and these.
+        WorkbenchError: if a value is outside its limits; the text names the option and the limits.
     """
 
     gamma: float = option(0.99, "discount of rewards, for each step that they come later", 0, 1)

@@ -32,14 +32,14 @@ RECORD = "suite.json"
 CONFIG = "benchmark.yaml"
 NAME = re.compile(r"\w[\w.+-]*")  # of a variant, and so of a folder
 MAX_SEEDS = 10_000
-OWN = ("seed", "run_dir", "exp_name")  # options that the benchmark sets
-SEEDS = 5  # unless the suite or the user says otherwise
+OWN = ("seed", "run_dir", "exp_name")  # options that the benchmark itself sets
+SEEDS = 5  # default
 KEYS = ("about", "seeds", "common", "variants")
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to train; every seed of it is a run."""
+    """One configuration of a training; each of its seeds is a run."""
 
     name: str
     algorithm: str
@@ -48,11 +48,11 @@ class Variant:
 
 @dataclass(frozen=True)
 class Suite:
-    """What is trained and compared."""
+    """The variants that a benchmark trains and compares."""
 
     name: str
     about: str
-    seeds: int  # unless the user says otherwise
+    seeds: int  # default number per variant
     variants: tuple[Variant, ...]
 
 
@@ -65,7 +65,7 @@ class _Planned(NamedTuple):
 
 
 class _Hint(argparse.Action):
-    """A flag of `train` and `sweep`, which users may expect here."""
+    """Explains a flag of `train` and `sweep` that users may expect here."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
         parser.error(f"{self.option_strings[0]} is an option of the training: {self.metavar}")
@@ -94,7 +94,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Trains what isn't trained yet, then writes results.md, costs.md, results.json and two pictures."""
+    """Trains the incomplete runs, then writes results.md, costs.md, results.json and two pictures."""
     suite = _suite(arguments)
     for variant in suite.variants:
         check_package(variant)
@@ -122,7 +122,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         if interrupt.requested():
             tell("interrupted; the same command goes on")
             return
-        interrupt.at_once()  # what follows takes minutes, and can be repeated
+        interrupt.at_once()  # the report takes minutes and can be repeated
         _report(folder, suite, planned, arguments.episodes, pool.where)
 
 
@@ -147,7 +147,7 @@ def _suite(arguments: argparse.Namespace) -> Suite:
 
 
 def read_suite(name: str, path: Path | None = None) -> Suite:
-    """Reads a suite of a file, by default of config/benchmark.yaml.
+    """Reads a suite from a file, by default config/benchmark.yaml.
 
     Raises:
         WorkbenchError: if the file has no such suite, or it makes no sense.
@@ -178,15 +178,15 @@ def _options(value: Any, origin: str) -> dict[str, Any]:
 
 
 def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
-    """Makes a variant; names and types of our own algorithms' options are checked.
+    """Makes a variant, and checks names and types of its options if the algorithm is our own.
 
     Args:
-        origin: where the variant stands, for errors.
+        origin: the file and suite, for errors.
         name: of the variant.
-        options: with the algorithm as `algo`.
+        options: of the training, with the algorithm as `algo`.
 
     Raises:
-        WorkbenchError: if there is no such algorithm or option, or no folder can have the name.
+        WorkbenchError: if there is no such algorithm or option, or the name can't be a folder's.
     """
     if not NAME.fullmatch(name):
         raise WorkbenchError(
@@ -205,7 +205,7 @@ def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
 
 
 def check_package(variant: Variant) -> None:
-    """Checks that the package of the variant's algorithm is installed and takes the options.
+    """Checks that the package of the variant's algorithm is installed and knows the options.
 
     Raises:
         WorkbenchError: if not.
@@ -222,10 +222,10 @@ def _without_special(name: str, options: dict[str, Any]) -> dict[str, Any]:
 
 
 def training_flags(variant: Variant, seed: int) -> list[str]:
-    """Returns the flags of `train` for one run, but for its folder."""
+    """Returns the flags of `train` for one run, except --run-dir."""
     rest = _without_special(variant.algorithm, variant.options)
     special = {key: value for key, value in variant.options.items() if key not in rest}
-    if "config" in special:  # a node may have another current folder
+    if "config" in special:  # a cluster node may have another current folder
         special["config"] = Path(special["config"]).resolve()
     own = {"exp_name": variant.name, "seed": seed, **special}
     flags = [f"--{key.replace('_', '-')}={value}" for key, value in own.items()]
@@ -234,7 +234,7 @@ def training_flags(variant: Variant, seed: int) -> list[str]:
 
 
 def _text(value: Any) -> str:
-    """As `train` reads it."""
+    """Formats a value so that `train` reads the same value back."""
     if isinstance(value, list | tuple):
         return f"[{','.join(map(str, value))}]"
     if isinstance(value, dict):
@@ -243,7 +243,7 @@ def _text(value: Any) -> str:
 
 
 def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, where: str) -> None:
-    """Writes all files. results.md is the same whatever happened on the way, wherever the folder lies."""
+    """Writes all files. results.md depends neither on interruptions nor on the folder's place."""
     from rl_workbench.tools import results as figures
 
     runs, results = _examine(planned, episodes)
@@ -283,7 +283,7 @@ def _report(folder: Path, suite: Suite, planned: list[_Planned], episodes: int, 
 
 
 def _draw(folder: Path, runs: list[Run]) -> None:
-    """Draws the pictures; one that can't be drawn must not cost the others."""
+    """Draws the pictures, the others too if one can't be drawn."""
     from rl_workbench.plotting import evaluation_curves, seed_curves
     from rl_workbench.tools.plot import seed_panels, variant_panels
 
@@ -300,7 +300,7 @@ def _draw(folder: Path, runs: list[Run]) -> None:
 
 
 def _examine(planned: list[_Planned], episodes: int) -> "tuple[list[Run], list[RunResult]]":
-    """The runs whose record can be read, and a row of figures for every one that was planned."""
+    """Returns the runs whose record is readable, and a row of results for every planned run."""
     from rl_workbench.tools.results import RunResult, examine
 
     runs, results = [], []
@@ -308,7 +308,7 @@ def _examine(planned: list[_Planned], episodes: int) -> "tuple[list[Run], list[R
         try:
             runs.append(open_run(job.folder))
         except WorkbenchError as error:
-            fault = last_words(job.log) or str(error)  # a training that couldn't begin says why
+            fault = last_words(job.log) or str(error)  # the log says why a training couldn't begin
             results.append(RunResult(name, seed, job.folder.name, fault=fault))
         else:
             results.append(examine(runs[-1], name, episodes, warn, also_last=True))
@@ -316,7 +316,7 @@ def _examine(planned: list[_Planned], episodes: int) -> "tuple[list[Run], list[R
 
 
 def _measured(episodes: int, thresholds: Iterable[float | None]) -> str:
-    """How the figures were measured."""
+    """Returns a text on how the figures were measured."""
     lines = sorted(line for line in thresholds if line is not None)
     solved = "".join(
         f" Solved: the first confirmed evaluation of at least {line:g}." for line in lines

@@ -21,7 +21,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Prints two tables, and writes the files that were asked for."""
+    """Prints two tables, and writes the requested files."""
     from rl_workbench.plotting import seed_curves
     from rl_workbench.storage import as_json, check_writable, write_file
     from rl_workbench.tools import results

@@ -1,4 +1,4 @@
-"""`export`: a run's policy as a file that torch runs alone."""
+"""`export`: a run's policy as a file that needs only torch."""
 
 import argparse
 from pathlib import Path
@@ -16,7 +16,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
-    """Exports the policy, and compares the file with it."""
+    """Exports the policy, and checks the file against it."""
     from rl_workbench.storage import check_writable, write_file
     from rl_workbench.tools.policies import load_learned
     from rl_workbench.tools.runs import open_run
@@ -30,7 +30,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     finally:
         policy.env.close()
     write_file(arguments.out, lambda stream: stream.write(content))
-    open_exported(arguments.out)  # what is on the disk now
+    open_exported(arguments.out)  # checks that the file on disk is readable
     rest = ""
     if agreement.equal < agreement.observations:
         rest = ", as good as tied in the others"

@@ -26,15 +26,15 @@ from rl_workbench.training import folder as run_folder
 from rl_workbench.training.scalar_log import NAME as SCALARS
 
 POLL = 0.2  # [s]
-TIME_TO_SAVE = 60.0  # [s] for a training that is stopped because nobody needs its rest
-MAX_ATTEMPTS = 8  # in a row that were lost without a new checkpoint
+TIME_TO_SAVE = 60.0  # [s] for a training that is stopped early because it is no longer needed
+MAX_ATTEMPTS = 8  # lost in a row without a new checkpoint
 MAX_PAUSE = 30.0  # [s] between two attempts
-TAIL = 4096  # [bytes] of a file that hold its last line
-# Below the kernel's own range, so that nobody else is given the port before it is used.
+TAIL = 4096  # [bytes] at the end of a file, enough for its last line
+# Below the kernel's ephemeral range, so that no other process gets the port before it is used.
 MASTER_PORTS = range(30000, 32768)
-# The networks are too small to gain by more cores.
+# The networks are too small to gain from more cores.
 ONE_CORE = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-# Somebody else ended the process, as the kernel does when memory is short: the training is tried again.
+# The process was killed from outside, as by the kernel when memory is short: the training is retried.
 KILLED = {-signal.SIGKILL, -signal.SIGTERM, 128 + signal.SIGTERM}
 
 StopWithin = Callable[[], float | None]
@@ -43,7 +43,7 @@ StopWithin = Callable[[], float | None]
 
 @dataclass(frozen=True)
 class Job:
-    """One training. If it is complete it is skipped; if it isn't, it is resumed, bit-identically."""
+    """One training. A complete one is skipped; an incomplete one is resumed, bit-identical."""
 
     name: str  # for the user
     folder: Path  # of the run
@@ -51,11 +51,11 @@ class Job:
 
     @property
     def log(self) -> Path:
-        """The output of the training."""
+        """The file with the training's output."""
         return self.folder.with_name(f"{self.folder.name}.log")
 
     def summary(self) -> dict[str, Any]:
-        """What the training wrote at its end; empty until then."""
+        """Returns the training's summary; empty until its end."""
         return read_leniently(self.folder / SUMMARY)
 
     def is_done(self) -> bool:
@@ -64,7 +64,7 @@ class Job:
 
 
 class Program(NamedTuple):
-    """How trainings are started."""
+    """The command that starts trainings."""
 
     words: tuple[str, ...]  # the command line, without `train`
     modules: str  # PYTHONPATH
@@ -74,7 +74,7 @@ class Ending(NamedTuple):
     """How an attempt at a training ended."""
 
     code: int | None = None  # exit code, or minus the number of the signal
-    lost: str = ""  # why the attempt failed through no fault of the training; it is tried again
+    lost: str = ""  # why the attempt failed through no fault of the training, so that it is retried
 
 
 def run_attempt(
@@ -85,9 +85,9 @@ def run_attempt(
     Args:
         job: the training; it is resumed if it has a checkpoint.
         program: how it is started.
-        stop_within: asked several times a second. A KeyboardInterrupt stops the training, too.
+        stop_within: called several times a second. A KeyboardInterrupt stops the training, too.
         since: when the command began [s since 1970]; earlier attempts don't count as lost.
-        death_signal: for the training if this process is killed.
+        death_signal: sent to the training if this process is killed.
 
     Raises:
         WorkbenchError: if its folder can't be written to.
@@ -127,7 +127,7 @@ def run_here(
 
 
 def is_hopeless(job: Job, since: float) -> bool:
-    """Returns whether so many attempts were lost in a row that another one is no use."""
+    """Returns whether MAX_ATTEMPTS attempts in a row were lost, so that another one is useless."""
     spans = cost_of(job.folder).get("spans", [])
     return _attempts_without_checkpoint(job, spans, since) >= MAX_ATTEMPTS
 
@@ -143,7 +143,7 @@ def _attempts_without_checkpoint(job: Job, spans: list[list[float]], since: floa
 def _note(
     job: Job, spans: list[list[float]], began: float, ended: float | None = None, cpu: float = 0.0
 ) -> None:
-    """Adds an attempt to the cost of a training; one that is lost with its machine has no end."""
+    """Adds an attempt to a training's cost file; one lost with its machine has no end."""
     cost = cost_of(job.folder)
     if ended is not None:
         for name, seconds in (("command_seconds", ended - began), ("cpu_seconds", cpu)):
@@ -153,14 +153,14 @@ def _note(
 
 
 def command(job: Job, program: Sequence[str]) -> list[str]:
-    """Returns the command of a new training, or of one that is resumed.
+    """Returns the command that starts or resumes a training.
 
     Args:
         job: the training.
         program: the command line, without `train`.
 
     Raises:
-        WorkbenchError: if a training of an earlier command still runs there.
+        WorkbenchError: if a training of an earlier command still runs in the folder.
     """
     from rl_workbench.training.checkpoints import LAST
 
@@ -174,9 +174,9 @@ def command(job: Job, program: Sequence[str]) -> list[str]:
 
 def _start(words: list[str], log: Path, modules: str, death_signal: str) -> subprocess.Popen[bytes]:
     prefix = ["setpriv", "--pdeathsig", death_signal, "--"] if shutil.which("setpriv") else []
-    # Environments over a network may need a port of their own, which is passed as ROS does.
+    # Environments over ROS may start a master, so each training gets a port of its own.
     address = {"ROS_MASTER_URI": f"http://127.0.0.1:{_free_port()}"}
-    # Workers of Ray block Ctrl-C, and what they start would inherit that.
+    # Ray's workers block SIGINT, and child processes would inherit that.
     before = signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     try:
         with log.open("ab") as output:
@@ -186,7 +186,7 @@ def _start(words: list[str], log: Path, modules: str, death_signal: str) -> subp
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
-                start_new_session=True,  # Ctrl-C in the terminal is for this process alone
+                start_new_session=True,  # Ctrl-C in the terminal must reach this process alone
             )
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -221,11 +221,13 @@ def _finish(process: subprocess.Popen[bytes], stop_within: StopWithin) -> tuple[
             if time.monotonic() > deadline:
                 os.killpg(process.pid, signal.SIGKILL)
     except BaseException:
-        os.killpg(process.pid, signal.SIGKILL)  # not waited for yet, so the number is its own
+        os.killpg(
+            process.pid, signal.SIGKILL
+        )  # not waited for yet, so the id can't be another process's
         raise
     finally:
         os.close(descriptor)
-        # wait4 counts this one process; getrusage knows only the sum over all children.
+        # wait4 reports this one process; getrusage only the sum over all children.
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
     return process.returncode, usage.ru_utime + usage.ru_stime, was_stopped
@@ -244,14 +246,14 @@ def last_words(log: Path) -> str:
 
 
 def steps_of(folder: Path) -> tuple[int, int]:
-    """Returns the last step of a run and the steps of the whole training; 0 if not known."""
+    """Returns the last step of a run and the steps of the whole training; 0 for unknown ones."""
     run = read_leniently(folder / CONFIG_RECORD).get("run")
     length = run.get("total_timesteps") if isinstance(run, dict) else 0
     return next(_last_steps(folder / SCALARS), 0), length if isinstance(length, int) else 0
 
 
 def _last_steps(path: Path) -> Iterator[int]:
-    """The steps of the last whole rows of a table, the last one first."""
+    """Yields the steps of a table's last complete rows, the last one first."""
     try:
         with path.open("rb") as file:
             file.seek(max(0, file.seek(0, 2) - TAIL))
@@ -260,12 +262,12 @@ def _last_steps(path: Path) -> Iterator[int]:
         return
     for row in reversed(rows):
         step, tag, *_ = *row.split(b","), b""
-        if step.isdigit() and b"/" in tag:  # without a slash, it is a curve over episodes
+        if step.isdigit() and b"/" in tag:  # tags without a slash count episodes
             yield int(step)
 
 
 def outcome(summary: dict[str, Any]) -> str:
-    """Returns what a training came to, in half a line."""
+    """Returns a training's result in half a line."""
     best = summary.get("best")
     found = f"best evaluation {best[1]:.1f} at step {best[0]}" if best else "no evaluation"
     return f"in {summary['seconds']:.1f} s, {found}"

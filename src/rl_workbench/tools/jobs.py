@@ -41,7 +41,7 @@ from rl_workbench.training.progress import tell, writable
 
 NAME = "jobs.json"
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
-STOPPED = "stopped"  # not complete, and nobody runs it now
+STOPPED = "stopped"  # neither complete nor running
 TIME_TO_END = 4.0  # [s] for all trainings after Ctrl-C
 
 
@@ -49,13 +49,13 @@ TIME_TO_END = 4.0  # [s] for all trainings after Ctrl-C
 def job_pool(
     arguments: argparse.Namespace, folder: Path, interrupt: Interrupt, jobs: Sequence[Job] = ()
 ) -> Iterator["JobPool"]:
-    """Makes the pool that a command's flags ask for, on this machine or on a Ray cluster.
+    """Makes the pool that a command's flags choose, on this machine or on a Ray cluster.
 
     Args:
-        arguments: with the flags of `add_job_flags`, and the program.
-        folder: in which all run folders lie.
+        arguments: the flags of `add_job_flags`, and the program.
+        folder: contains all run folders.
         interrupt: ends all jobs.
-        jobs: that are known from the beginning.
+        jobs: those known from the beginning.
 
     Raises:
         WorkbenchError: if there is no such cluster.
@@ -67,7 +67,7 @@ def job_pool(
             at_once = arguments.jobs or 1
             where = f"{at_once} at a time"
         else:
-            with interrupt.reading():  # a start of Ray that is interrupted leaves processes behind
+            with interrupt.reading():  # an interrupted start of Ray leaves processes behind
                 from rl_workbench.tools.ray_tasks import RayJobs, joined
 
                 cluster = RayJobs(stack.enter_context(joined(arguments.ray)), folder, program)
@@ -81,16 +81,16 @@ def job_pool(
 
 
 def claim(folder: Path, name: str, wanted: Any, refusal: str) -> None:
-    """Notes in a folder's file what its runs are, or checks that it is the same.
+    """Writes the settings of a folder's runs to a file, or checks that the file has the same.
 
     Args:
         folder: of a benchmark or a sweep.
         name: of the file.
-        wanted: plain values.
-        refusal: the error if the folder holds something else, after its name.
+        wanted: the settings as plain values.
+        refusal: the error's text, after the folder's name, if the file has other settings.
 
-    Raises:
-        WorkbenchError: if it does, or the file can't be read or written.
+        Raises:
+            WorkbenchError: if it has, or it can't be read or written.
     """
     path = folder / name
     try:
@@ -114,20 +114,20 @@ class JobEntry:
     """A job in jobs.json."""
 
     name: str
-    folder: str  # of the run, relative to that of jobs.json
+    folder: str  # run folder, relative to that of jobs.json
     state: str = WAITING
-    note: str = ""  # why it has failed, or was lost
+    note: str = ""  # why it failed or was lost
 
 
 class JobPool:
-    """Runs jobs in threads, shows how they get on, and keeps jobs.json.
+    """Runs jobs in threads, shows their progress, and keeps jobs.json.
 
     Args:
-        folder: of jobs.json; those of the jobs lie in it.
+        folder: contains jobs.json and all run folders.
         run: runs a job, here or on a cluster.
         at_once: the number of jobs at a time.
         interrupt: ends all jobs.
-        jobs: that are known from the beginning; others are added as they are run.
+        jobs: those known from the beginning; `run` adds others.
     """
 
     def __init__(
@@ -139,7 +139,7 @@ class JobPool:
         jobs: Sequence[Job] = (),
     ) -> None:
         self.at_once, self.where = at_once, ""  # `where` describes the machines
-        self.failure: BaseException | None = None  # for which all jobs end
+        self.failure: BaseException | None = None  # it ends all jobs
         self._folder, self._run, self._interrupt = folder, run, interrupt
         self._lock = threading.Lock()
         self._total = len(jobs)
@@ -160,7 +160,7 @@ class JobPool:
             self._bar.close()
 
     def run_all(self, jobs: Sequence[Job]) -> None:
-        """Runs jobs that are independent of each other.
+        """Runs independent jobs.
 
         Raises:
             WorkbenchError: if a folder can't be written to.
@@ -169,13 +169,13 @@ class JobPool:
             list(threads.map(self.run, jobs))
 
     def run(self, job: Job, is_needed: Callable[[], bool] = lambda: True) -> str:
-        """Runs a job in the calling thread; returns why it has failed, empty if it hasn't.
+        """Runs a job in the calling thread; returns why it failed, or "" if it didn't.
 
         A job that is stopped, by the user or because it is not needed, has not failed.
 
         Args:
-            job: the job; one that is done is skipped.
-            is_needed: asked several times a second; the training is stopped if not.
+            job: the job; skipped if it is complete.
+            is_needed: called several times a second; the training is stopped once it returns False.
 
         Raises:
             WorkbenchError: if a folder can't be written to.
@@ -248,7 +248,7 @@ class JobPool:
 
     @contextlib.contextmanager
     def _progress(self, job: Job, stop_within: StopWithin) -> Iterator[StopWithin]:
-        """Shows a bar for a job on a terminal, which moves whenever `stop_within` is asked."""
+        """Shows a job's bar on a terminal; the yielded function updates it at each call."""
         if self._bar is None:
             yield stop_within
             return
@@ -281,7 +281,7 @@ def _failure(job: Job, ending: Ending) -> str:
 
 
 def _written(folder: Path) -> list[JobEntry]:
-    """The jobs of earlier commands; none if they can't be read."""
+    """Returns the jobs of earlier commands; none if jobs.json can't be read."""
     try:
         return [JobEntry(**each) for each in read_leniently(folder / NAME).get("jobs", [])]
     except TypeError:
@@ -290,17 +290,17 @@ def _written(folder: Path) -> list[JobEntry]:
 
 @dataclass(frozen=True)
 class JobStatus:
-    """How a job is getting on."""
+    """The progress of a job."""
 
     name: str
     folder: str
     state: str  # done, running, failed, waiting or stopped
-    step: int  # of the environment
-    steps: int  # of the whole training; 0: its length isn't counted in steps
+    step: int  # environment steps so far
+    steps: int  # of the whole training; 0 if its length isn't counted in steps
     node: str  # the machine of the last attempt
     attempts: int
     seconds: float  # since the running attempt began; else 0
-    line: str  # why it has failed; else the last line that it printed
+    line: str  # why it failed; else the last line of its output
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -329,7 +329,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
 
 
 def read_jobs(folder: Path) -> list[JobStatus]:
-    """Returns how the jobs of a folder are getting on.
+    """Returns the progress of a folder's jobs.
 
     Raises:
         WorkbenchError: if the folder has no jobs.

@@ -1,4 +1,4 @@
-"""`plot`: the training curves of runs as PNG; and the panels of such pictures for other commands."""
+"""`plot`: training curves of runs as PNG. Other commands use its panels."""
 
 import argparse
 from collections import Counter

@@ -1,4 +1,4 @@
-"""What a training learned, ready to act in an environment of its kind, and episodes of it."""
+"""Loads learned policies with an environment to act in, and plays their episodes."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -23,7 +23,7 @@ from rl_workbench.training.evaluator import Evaluation, run_greedily
 from rl_workbench.training.options import recorded_options
 from rl_workbench.training.progress import warn
 
-TEST_SEED = 5_000_000  # keeps these episodes apart from those of trainings and their evaluations
+TEST_SEED = 5_000_000  # other episodes than those of trainings and their evaluations
 Act = Callable[[Any], Any]  # an observation to an action
 
 
@@ -37,9 +37,9 @@ class RandomPolicy(NamedTuple):
 class LearnedPolicy(NamedTuple):
     """A learned policy and an environment of the kind it learned in, which the caller closes."""
 
-    act: Act  # greedily, for one observation: (D,), or a dict as it learned from
-    preference: Callable[[np.ndarray], np.ndarray]  # of (N, D): (N,), see meaning
-    meaning: str  # of the preference: positive is the last action, or a push to the right
+    act: Act  # greedily, for one observation: (D,), or a dict as in the training
+    preference: Callable[[np.ndarray], np.ndarray]  # (N, D) to (N,), see `meaning`
+    meaning: str  # of the preference; positive is the last action, or a push to the right
     network: nn.Module  # acts for many observations at once
     env: gymnasium.Env[Any, Any]
     checkpoint: Path
@@ -47,7 +47,7 @@ class LearnedPolicy(NamedTuple):
 
 
 def environment_of(run: Run, options: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
-    """Makes an environment as the policies of a run observe it.
+    """Makes an environment with the observations that a run's policies expect.
 
     Args:
         run: the run.
@@ -63,7 +63,7 @@ def environment_of(run: Run, options: Mapping[str, Any]) -> gymnasium.Env[Any, A
 def load_any(
     run: Run, which: str, env_options: Mapping[str, Any], seed: int
 ) -> LearnedPolicy | RandomPolicy:
-    """Loads the policy of a checkpoint, see `load_learned`, or makes a random one of that seed."""
+    """Loads the policy of a checkpoint, see `load_learned`, or makes a random policy with that seed."""
     if which != RANDOM:
         return load_learned(run, which, env_options)
     env = environment_of(run, env_options)
@@ -78,14 +78,14 @@ def load_learned(
     say: Callable[[str], None] = warn,
     env: gymnasium.Env[Any, Any] | None = None,
 ) -> LearnedPolicy:
-    """Loads the policy of a checkpoint; if that is damaged, the one of the checkpoint before it.
+    """Loads the policy of a checkpoint, or of an earlier one if that is damaged.
 
     Args:
         run: the run.
-        which: of its checkpoints, "best" or "last".
-        env_options: of the environment, on top of the training's own, such as `render_mode`.
-        say: receives a line for each checkpoint that is skipped.
-        env: to act in, of this run's kind; by default one is made.
+        which: the checkpoint, "best" or "last".
+        env_options: options of the environment on top of the training's, such as `render_mode`.
+        say: receives a line for each skipped checkpoint.
+        env: the environment to act in; by default a new one of the run's kind.
 
     Raises:
         WorkbenchError: if no checkpoint can be read, it belongs to another run, or the environment
@@ -125,7 +125,7 @@ def _learned(
 
 
 def play(policy: LearnedPolicy | RandomPolicy, episodes: int, seed: int) -> Evaluation:
-    """Plays episodes of a policy, seeded once.
+    """Plays episodes of a policy in its environment, seeded once.
 
     Raises:
         WorkbenchError: if the environment fails.
@@ -134,7 +134,7 @@ def play(policy: LearnedPolicy | RandomPolicy, episodes: int, seed: int) -> Eval
         result = run_greedily(policy.env, policy.act, TEST_SEED + seed, episodes)
     except (ValueError, AssertionError) as error:
         raise WorkbenchError(f"the policy doesn't fit the environment: {error}") from error
-    assert result is not None  # nothing can stop it
+    assert result is not None  # None would mean it was stopped
     return result
 
 
@@ -151,13 +151,13 @@ class Step(NamedTuple):
 def episode_steps(
     env: gymnasium.Env[Any, Any], act: Act, seed: int, max_steps: int = 0
 ) -> Iterator[Step]:
-    """Plays one episode, from the reset on.
+    """Plays one episode; yields the reset and each step.
 
     Args:
         env: the environment.
         act: chooses the action for an observation.
         seed: of the episode.
-        max_steps: number of steps after which the episode is cut off; 0 for never.
+        max_steps: steps after which the episode is cut off; 0 for never.
     """
     observation, _ = env.reset(seed=seed)
     yield Step(observation, None, 0.0, False, None)

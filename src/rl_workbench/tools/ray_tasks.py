@@ -1,7 +1,7 @@
-"""Trainings on a Ray cluster: one task for each, over a folder that all nodes see.
+"""Trainings on a Ray cluster: one task for each, in a folder that all nodes share.
 
-Ray retries a task whose worker or node dies, and the training is resumed from its own checkpoints, so
-nothing but the folder has to survive. Commands that are killed go on the same way.
+Ray retries a task whose worker or node dies, and the training resumes from its own checkpoints, so only
+the folder has to survive. A killed command is continued in the same way.
 """
 
 import contextlib
@@ -55,20 +55,20 @@ REASONS = {
 
 
 class TrainingLost(Exception):
-    """The training has ended through no fault of its own: Ray runs the task again."""
+    """The training ended through no fault of its own, so Ray runs the task again."""
 
 
 class NodeUnusable(Exception):
-    """Nothing can be trained on a node; the text says why."""
+    """A node can't train; the text says why."""
 
 
 def train(
     job: Job, program: Program, folder: Path, token: str, wanted: dict[str, str], since: float
 ) -> Ending:
-    """The task: one attempt at a training, in a process of its own.
+    """Ray's task: one attempt at a training, in a process of its own.
 
     Raises:
-        NodeUnusable: if this node doesn't see the folder, or has other libraries.
+        NodeUnusable: if this node doesn't see the folder, or has other versions of the libraries.
         TrainingLost: if the process was killed.
     """
     node = socket.gethostname()
@@ -100,17 +100,17 @@ def train(
 
 
 def library_versions() -> dict[str, str]:
-    """Returns the versions on which the bits of a training depend."""
+    """Returns the library versions on which a training's exact results depend."""
     return {name: each for name, each in versions().items() if name in LIBRARIES}
 
 
 class RayJobs:
-    """Runs jobs on a cluster that was joined.
+    """Runs jobs on a joined cluster.
 
     Args:
-        ray: the module, initialised.
-        folder: in which all run folders lie.
-        program: how trainings are started.
+        ray: the initialised module.
+        folder: contains all run folders.
+        program: the command that starts trainings.
     """
 
     def __init__(self, ray: Any, folder: Path, program: Program) -> None:
@@ -122,7 +122,7 @@ class RayJobs:
 
     @property
     def cpus(self) -> int:
-        """The cores of all nodes."""
+        """The number of cores of all nodes."""
         return int(self._ray.cluster_resources().get("CPU", 1))
 
     def about(self) -> str:
@@ -146,7 +146,7 @@ class RayJobs:
             if grace is not None:
                 deadline = min(deadline, time.monotonic() + grace)
                 if not was_stopped:
-                    self._ray.cancel(task)  # a KeyboardInterrupt in the task, which saves
+                    self._ray.cancel(task)  # raises KeyboardInterrupt in the task, which saves
                     was_stopped = True
             if time.monotonic() > deadline:
                 self._ray.cancel(task, force=True)
@@ -213,8 +213,8 @@ def joined(address: str) -> Iterator[Any]:
 
 
 def _local_cluster(stack: contextlib.ExitStack) -> dict[str, Any]:
-    """Options for a cluster on this machine, which nobody else can use; its files go with the stack."""
-    if "ray" not in sys.modules:  # which reads these when it is imported
+    """Returns options for a private cluster on this machine; the stack removes its files."""
+    if "ray" not in sys.modules:  # Ray reads these when it is imported
         os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
     where = None if len(tempfile.gettempdir()) < SOCKET_PATH else "/tmp"
     folder = tempfile.TemporaryDirectory(prefix="ray_", dir=where, ignore_cleanup_errors=True)

@@ -1,7 +1,7 @@
-"""What the frame of a training (training.py) asks of an algorithm, and what it offers to it.
+"""The interfaces between a training's frame (training.py) and its algorithm.
 
-The frame opens and resumes, evaluates, saves and reports. An algorithm says what it is made of, what its
-loop does, and what a checkpoint holds.
+The frame opens and resumes, evaluates, saves and reports. An algorithm provides its environments, its
+learning loop, and the content of a checkpoint.
 """
 
 from abc import ABC, abstractmethod
@@ -71,7 +71,7 @@ class Frame(Protocol):
 class Algorithm(ABC):
     """One algorithm at work in its environments."""
 
-    env: gymnasium.Env[Any, Any]  # learned in, and evaluated in where there is no other
+    env: gymnasium.Env[Any, Any]  # for learning, and for evaluations if there is no other
 
     @property
     @abstractmethod
@@ -105,7 +105,7 @@ class Algorithm(ABC):
         """Returns the best action for an observation (D,)."""
 
     def check_weights(self) -> None:
-        """Refuses NaN in the weights, where learning doesn't check for it.
+        """Checks the weights for NaN, if learning doesn't.
 
         Raises:
             WorkbenchError: If a weight isn't finite.

@@ -1,4 +1,4 @@
-"""Callbacks: what happens at the events of a training. The log and the picture of curves are such, too."""
+"""Callbacks for the events of a training, among them the scalar log and the learning curve's picture."""
 
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,7 +23,7 @@ class EpisodeResult(NamedTuple):
     success: bool | None  # None if the environment doesn't say
     speed: float  # of the training [steps/s]
     scalars: Mapping[str, float]  # the algorithm's own figures
-    note: str  # what the algorithm says of itself, for people
+    note: str  # the algorithm's own remark, for the progress line
 
 
 class EvaluationResult(NamedTuple):
@@ -32,8 +32,8 @@ class EvaluationResult(NamedTuple):
     step: int  # of the training
     evaluation: Any  # an evaluator.Evaluation: lengths, returns and successes of its episodes
     confirmed: float  # the mean return by which policies are compared
-    is_best: bool  # no policy before was as good
-    was_confirmed: bool  # over more episodes than those of the evaluation
+    is_best: bool  # better than any policy before
+    was_confirmed: bool  # `confirmed` is over more episodes than the evaluation's
 
 
 class Callback:
@@ -150,7 +150,7 @@ class CallbackList:
 
     def __init__(self, own: Sequence[Callback], users: Sequence[Callback]) -> None:
         self._own, self._users = list(own), list(users)
-        # Of the few that have it, since it is called at every step.
+        # Only callbacks that override on_step, since it is called at every step.
         self._steppers = [
             each for each in [*own, *users] if type(each).on_step is not Callback.on_step
         ]

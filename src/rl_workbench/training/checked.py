@@ -1,4 +1,4 @@
-"""Checks what an environment returns, before it spoils what is learned from it."""
+"""Checks what an environment returns, before it spoils the weights."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,7 +16,7 @@ BEGIN_STEP = "begin_step"  # method of an environment whose step takes time in a
 
 
 class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Ends a training with one line where NaN, a wrong shape or an exception would spoil it.
+    """Turns NaN, wrong shapes and exceptions of an environment into one-line errors.
 
     All methods raise WorkbenchError if the environment fails; `reset` and `step` also if an observation or
     a reward isn't finite in float32.
@@ -51,13 +51,13 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             size = abs(float(reward))
         except (TypeError, ValueError) as error:
             raise WorkbenchError(f"the reward of {self._id} isn't a number: {reward!r}") from error
-        if not size <= LARGEST:  # so that NaN is refused too
+        if not size <= LARGEST:  # true for NaN, too
             raise self._not_finite("reward", reward)
         return observation, reward, terminated, truncated, info
 
     @property
     def can_compute_reward(self) -> bool:
-        """Whether it can compute rewards for any goals."""
+        """Whether it can compute rewards for arbitrary goals."""
         return self.env.has_wrapper_attr(COMPUTE_REWARD)
 
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> np.ndarray:

@@ -3,7 +3,7 @@
     RUN_DIR/checkpoints/step_000005000.pt   the newest few
     RUN_DIR/last.pt, RUN_DIR/best.pt        the newest, and that of the best evaluation
 
-Each holds everything; the two are further names of numbered ones.
+Each holds everything. last.pt and best.pt are further names of numbered files.
 """
 
 import contextlib
@@ -25,7 +25,7 @@ from rl_workbench.storage import save_tensors
 
 LAST, BEST, FAILURE = "last.pt", "best.pt", "failure.pt"
 FOLDER = "checkpoints"
-LEFTOVERS = (".*.pt.*", ".*.pt.new", ".*.pth.*", ".*.json.*", ".*.png.*")  # of a kill while writing
+LEFTOVERS = (".*.pt.*", ".*.pt.new", ".*.pth.*", ".*.json.*", ".*.png.*")  # of a killed write
 FORMAT = "rl_workbench 2"  # changes when older files can't be read any more
 _DAMAGED = (RuntimeError, pickle.UnpicklingError, EOFError, ValueError, KeyError, TypeError,
             AttributeError, IndexError, zipfile.BadZipFile, zlib.error)  # fmt: skip
@@ -72,7 +72,7 @@ class Checkpoints:
         path = self._run / FOLDER / f"step_{step:09d}.pt"
         path.parent.mkdir(exist_ok=True)
         save_tensors(path, {"format": FORMAT, **content})
-        # The last one last: killed in between, a training goes on from before its best step.
+        # LAST comes last: if killed in between, a training resumes from before its best step.
         for name in (BEST, LAST) if best else (LAST,):
             give_name(path, self._run / name)
         if self._keep:
@@ -149,7 +149,7 @@ def fitting(what: str) -> Iterator[None]:
     """Turns errors into one line while something is loaded from a checkpoint.
 
     Args:
-        what: Is loaded, for the error.
+        what: What is loaded, for the error.
 
     Raises:
         WorkbenchError: If it doesn't fit.

@@ -1,4 +1,4 @@
-"""DQN in our frame: one step of the environment at a time, and what follows from it."""
+"""DQN in our frame: steps the environment, and learns after each step that is due."""
 
 from typing import Any
 

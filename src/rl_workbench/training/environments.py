@@ -20,7 +20,7 @@ from rl_workbench.training.checked import CheckedEnvironment
 from rl_workbench.training.options import TrainingOptions
 
 FLAT = (spaces.Box, spaces.Discrete, spaces.MultiBinary, spaces.MultiDiscrete)
-# What constructors raise about options that make no sense to them.
+# What constructors raise for options that they reject.
 _REFUSED = (gymnasium.error.Error, ImportError, TypeError, ValueError, LookupError, AssertionError)
 Made = TypeVar("Made")
 

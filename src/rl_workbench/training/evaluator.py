@@ -46,7 +46,7 @@ def run_greedily(
     episodes: int,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Evaluation | None:
-    """Plays episodes in an environment that is seeded once; None if `should_stop()` became true."""
+    """Plays episodes in an environment, seeded once; returns None if `should_stop()` became true."""
     found = Evaluation([], [])
     for index in range(episodes):
         observation, _ = env.reset(seed=seed if index == 0 else None)
@@ -112,7 +112,7 @@ class Evaluator:
                 )
 
     def evaluate(self, best: float, say: Say, is_last: bool = False) -> Score | None:
-        """Plays greedy episodes; None if interrupted.
+        """Plays greedy episodes; returns None if interrupted.
 
         A policy that is perfect in ten episodes may well fail in the next ninety. So one that seems to be the
         best so far is confirmed over `confirm_episodes`.
@@ -137,7 +137,7 @@ class Evaluator:
 
     @contextmanager
     def _undisturbed(self, say: Say, is_last: bool) -> Iterator[None]:
-        """Undoes what happens inside, also in the generators of the process."""
+        """Restores the environment and the process's random generators after the block."""
         must_return = self._is_guest and not is_last
         place = self._algorithm.leave_environment() if must_return else None
         states = random_states()

@@ -1,4 +1,4 @@
-"""What a training has seen so far, and what it reports of that at its end."""
+"""A training's history of episodes and evaluations, and its report at the end."""
 
 import contextlib
 import math

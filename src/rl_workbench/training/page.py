@@ -1,4 +1,4 @@
-"""The page beside a training, in a process of its own: the training never waits for it, nor needs it."""
+"""Serves the page beside a training from its own process. The training neither waits for it nor needs it."""
 
 import contextlib
 import os
@@ -10,7 +10,7 @@ from typing import IO
 
 from rl_workbench.starting import search_path
 
-END = 15.0  # [s] for it to end
+END = 15.0  # [s] for the page's process to end
 POLICIES = ("last", "best", "random")
 
 
@@ -18,16 +18,17 @@ POLICIES = ("last", "best", "random")
 def page_beside(
     folder: Path, program: tuple[str, ...], say: Callable[[str], None]
 ) -> Iterator[None]:
-    """Shows a run folder for as long as the block lasts, also while it is still empty.
+    """Serves a page for a run folder, possibly still empty, until the block ends.
 
     Args:
-        folder: of the training, which begins in the block.
-        program: how rl_workbench's command line is started.
-        say: is told where the page is, or that there is none, by a thread that the training doesn't wait for.
+        folder: The run folder of the training that runs in the block.
+        program: The command that starts rl_workbench's command line.
+        say: Called from another thread with the page's address, or with a line that there is no page.
     """
     command = [*program, "view", str(folder), "--beside-training", "--checkpoint", *POLICIES]
     try:
-        # Ctrl-C is the training's; the page ends when its standard input does, however the training ends.
+        # Ctrl-C must reach only the training. The page ends when its standard input closes, which the
+        # kernel sees to even if the training is killed.
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
             env={**os.environ, "PYTHONPATH": search_path()},
@@ -42,7 +43,7 @@ def page_beside(
     try:
         yield
     finally:
-        if not telling.has_told.is_set():  # it is still starting, and nobody needs it any more
+        if not telling.has_told.is_set():  # still starting, so there is nothing to end gracefully
             telling.is_needless.set()
             process.kill()
         with contextlib.suppress(OSError):
@@ -58,21 +59,21 @@ def page_beside(
 
 
 class _Telling(threading.Thread):
-    """Tells what the page says of where it is; it closes its output after that.
+    """Passes on the page's output, which ends once the page has printed its address.
 
     Args:
-        output: of the page.
-        say: is told each line, and that there was none.
+        output: The page's standard output.
+        say: Called with each line, or with an error if the page printed none.
     """
 
     def __init__(self, output: IO[bytes], say: Callable[[str], None]) -> None:
         super().__init__(name="page", daemon=True)
         self._output, self._say = output, say
         self.has_told = threading.Event()
-        self.is_needless = threading.Event()  # the training was over first
+        self.is_needless = threading.Event()  # the training ended before the page opened
 
     def run(self) -> None:
-        """Reads until there is nothing more to be told."""
+        """Reads lines until the output ends."""
         for line in self._output:
             self._say(line.decode(errors="replace").rstrip())
             self.has_told.set()

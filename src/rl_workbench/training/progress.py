@@ -15,13 +15,13 @@ WIDTH = 100  # [columns] of the bar on a terminal that doesn't report its size
 
 
 def tell(text: str, stream: TextIO | None = None) -> None:
-    """Prints a line at once. A stream that is closed doesn't matter, nor does its encoding."""
+    """Prints a line and flushes it. A closed stream or its encoding can't make this fail."""
     with contextlib.suppress(OSError):
         print(writable(text, stream or sys.stdout), file=stream, flush=True)
 
 
 def writable(text: str, stream: TextIO | None) -> str:
-    """Returns a text with backslashes for what the stream can't encode, as a path may hold."""
+    """Returns a text, such as a path, with backslash escapes for what the stream can't encode."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
 
@@ -94,7 +94,7 @@ class Progress(Callback):
             tell(text, self._stream)
 
     def close(self) -> None:
-        """Ends the bar where the training is."""
+        """Closes the bar at its present position."""
         if self._bar is not None:
             self._move()
             self._bar.close()

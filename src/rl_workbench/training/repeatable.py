@@ -1,7 +1,7 @@
 """The environment of a training, with what brings back the episode under way.
 
-No environment can be saved in the middle of an episode. But the same start and the same actions lead there
-again: these are saved.
+No environment can be saved in the middle of an episode. But the same start and the same actions lead to the
+same place, so those are saved.
 """
 
 import json
@@ -23,7 +23,7 @@ class EpisodeMark(NamedTuple):
     start: str
     seed: int | None
     actions: list[Any]  # later ones are appended to the same list
-    length: int  # [steps] of it count
+    length: int  # [steps], how many of `actions` count
     last: np.ndarray
     generator: Any
 

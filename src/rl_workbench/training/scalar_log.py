@@ -1,7 +1,7 @@
 """The figures of a training: every row in a CSV file, and the same in TensorBoard.
 
 The CSV is the record. When a training is resumed, the CSV is truncated to where the checkpoint was written,
-and TensorBoard's file is written anew from it. So neither has a row twice.
+and TensorBoard's file is rewritten from it. So neither has duplicate rows.
 """
 
 import contextlib
@@ -22,8 +22,8 @@ SUCCESS, EVAL_SUCCESS = "rollout/success_rate", "eval/success_rate"  # from 0 to
 HEADER = "step,tag,value,wall_time\n"
 EVENTS = "events.out.tfevents."
 VERSION = "brain.Event:2"  # of TensorBoard's format, in the first record of its files
-SHOWN_AFTER = 10.0  # [s] at most until TensorBoard can see a point
-READ_AFTER = 1.0  # [s] at most until a reader of the CSV can see a row, if others come
+SHOWN_AFTER = 10.0  # [s], longest time until TensorBoard can see a point
+READ_AFTER = 1.0  # [s], longest time until a reader of the CSV can see a row, if others follow
 METRICS = (EVALUATION, RETURN)  # beside the settings, under HPARAMS
 
 Point = tuple[str, float, int, float]  # tag, value, step, wall time [s]
@@ -190,5 +190,5 @@ def _point(row: bytes) -> Point | None:
 
 
 def _utf8(text: str) -> str:
-    """Returns a text with backslashes for what UTF-8 can't encode, as the bytes of an odd path."""
+    """Returns a text with backslash escapes for what UTF-8 can't encode, such as a path's odd bytes."""
     return text.encode("utf-8", "backslashreplace").decode()

@@ -71,7 +71,7 @@ class Training:
                 self._load(self._resumed)
             making.pop_all()
         self._saved_at = -1  # [steps]
-        self._is_written = True  # nothing has failed to be written
+        self._is_written = True  # no write has failed so far
         self._evaluation: Evaluation | None = None  # the last one
         self._began, self._first_step = time.monotonic(), self._algorithm.steps
         self._seconds_before = self.history.seconds
@@ -324,8 +324,8 @@ class Training:
             failure = failure or error
             outcome.write_summary(str(failure))
         outcome.report()
-        # The same Ctrl-C may have ended what the environment needs. What couldn't be written is reported
-        # all the same.
+        # After Ctrl-C the failure may be its effect, as it may have ended what the environment needs. A
+        # failed write is reported all the same.
         if failure and not (self._interrupt.requested() and self._is_written):
             raise WorkbenchError(outcome.failure_text(failure, self._is_written)) from failure
 

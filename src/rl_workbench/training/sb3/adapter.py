@@ -32,7 +32,7 @@ from rl_workbench.training.sb3.positions import (
 
 __all__ = ["load_policy", "make"]
 
-# What the library raises while it learns: weights or options that are no good.
+# What the library raises while it learns, for unusable weights or options.
 _LEARNING = (ArithmeticError, AssertionError, LookupError, RuntimeError, TypeError, ValueError)
 MODEL = "model.zip"  # for Stable-Baselines3's own load()
 COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_n_calls", "stride")
@@ -93,7 +93,7 @@ class SB3Training(Algorithm):
         except WorkbenchError:
             raise
         except _LEARNING as error:
-            self.check_weights()  # torch's own text about NaN helps nobody
+            self.check_weights()  # raises a clearer error than torch's text about NaN
             text = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise WorkbenchError(f"{self._name} failed: {text}") from error
 
@@ -215,7 +215,7 @@ class FrameCallback(BaseCallback):
         self._episodes = 0
         self._held: int | None = None  # learning_starts, while hindsight has no whole episode
         self._mark: ModelMark | None = None
-        self._can_go_back = False  # everything since the mark can be taken back
+        self._can_go_back = False  # whether everything since the mark can be taken back
 
     def _on_training_start(self) -> None:
         model: Any = self.model
@@ -257,7 +257,7 @@ class FrameCallback(BaseCallback):
         steps, frequency = self._arrived, self._log_frequency
         if found and steps // frequency > (steps - model.stride) // frequency:
             self._frame.log.add(steps, found)
-            model.logger.dump(steps)  # it has no outputs: it forgets them
+            model.logger.dump(steps)  # the logger has no outputs, so this only clears it
 
     def _on_step(self) -> bool:
         for info in self.locals["infos"]:

@@ -1,7 +1,7 @@
 """The options of Stable-Baselines3's algorithms, with the library's own defaults.
 
-They are written out here, and held against the library's signatures by a test: importing the library to
-ask for them would take seconds of every `--help`.
+The defaults are written out here, because importing the library would add seconds to every `--help`. A test
+compares them with the library's signatures.
 """
 
 from dataclasses import dataclass, fields
@@ -16,7 +16,7 @@ ON_POLICY = ("ppo", "a2c")
 
 @dataclass(frozen=True, kw_only=True)
 class SB3Options:
-    """What all of the algorithms have.
+    """Options that all of the algorithms have.
 
     Raises:
         WorkbenchError: If a value is outside its limits, or JSON can't hold it.

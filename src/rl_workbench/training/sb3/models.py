@@ -45,7 +45,7 @@ FITS = {
 class StoppableOnPolicy(OnPolicyAlgorithm):
     """Mix-in for algorithms that learn from a rollout and forget it: the callback may end the training.
 
-    Only between two rollouts can everything be saved: a rollout under way has no state that could.
+    A training can only be saved between two rollouts, since an unfinished rollout has no state to save.
     """
 
     stride = 0  # steps of the last rollout, in all environments

@@ -1,7 +1,7 @@
-"""Where a model of Stable-Baselines3 is between two rollouts, beside what it has learned; its replay buffer.
+"""The state of a Stable-Baselines3 model between two rollouts besides its weights; its replay buffer.
 
-The library's own doors don't fit here: its files of replay buffers are pickles, so a foreign one could run
-code, and it has none for the episodes under way.
+The library's own functions don't fit here: it pickles replay buffers, so a foreign file could run code, and
+it can't save the episodes under way.
 """
 
 from collections.abc import Callable
@@ -63,7 +63,10 @@ class Positions:
         )
 
     def take_back(self, mark: ModelMark) -> None:
-        """Forgets what was done since `mark`, to save that place. The environments aren't moved."""
+        """Discards what was done since `mark`, so that `state_dict` describes that place.
+
+        The environments aren't moved.
+        """
         model = self._model
         model.num_timesteps = mark.steps
         model._last_obs, model._last_episode_starts = mark.observations, mark.begins
@@ -104,7 +107,7 @@ class Positions:
         return [each[0] for each in list(left) if not self.bring_back(each)]
 
     def leave(self, index: int) -> tuple[int, Any, str]:
-        """Returns what `bring_back` needs once somebody else has moved an environment."""
+        """Returns what `bring_back` needs after an evaluation has moved an environment."""
         env = self._envs[index]
         return index, env.state_dict(), env.generator
 
