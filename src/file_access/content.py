@@ -38,7 +38,7 @@ def one_line(text: str) -> str:
 def open_file(path: Path) -> BinaryIO:
     """Opens a regular file for reading.
 
-    Opening a pipe or a device could block for ever, so they are refused before.
+    Opening a pipe or a device could block for ever, so they are refused first.
 
     Raises:
         NotAFile: if it isn't a regular file.

@@ -97,9 +97,9 @@ def answer(data: bytes) -> bytes:
         raise ImportError(f"{fault}: is it installed?") from fault
 
     def parse(given: Any, name: str | None = None) -> Any:
-        """xacro itself takes UTF-8, and nothing before the declaration."""
+        """Parses any encoding; xacro itself takes only UTF-8, and nothing before the declaration."""
         if given is None and name is not None:
-            with suppress(OSError):  # xacro has its own way with files that are missing
+            with suppress(OSError):  # xacro itself reports missing files
                 given = without_declaration(decode(Path(name).read_bytes()))
         return xacro_parse(given, name)
 
@@ -159,16 +159,16 @@ def _run_program() -> NoReturn:
 
 @contextmanager
 def _in_one_line(xacro: Any, path: str) -> Iterator[None]:
-    """Turns whatever is raised inside into CannotExpand."""
+    """Turns any exception inside the block into CannotExpand."""
     try:
         yield
     except Exception as fault:
-        # xacro evaluates the file's own Python expressions: anything may come out.
+        # xacro evaluates the file's own Python expressions, which may raise anything.
         raise CannotExpand(_what_went_wrong(xacro, path, fault)) from fault
 
 
 def _what_went_wrong(xacro: Any, path: str, fault: Exception) -> str:
-    """One line: the file that xacro was reading, the files and macros that led there, the reason."""
+    """Returns one line: the file that xacro was reading, the files and macros that led there, the reason."""
     files = [str(file) for file in reversed(xacro.filestack or [path]) if file]
     macros = [macro.body.getAttribute("name") for macro in reversed(xacro.macrostack or [])]
     through = [f"included from {file}" for file in files[1:]] + [f"in macro {m}" for m in macros]

@@ -56,8 +56,7 @@ class LimitedProcess:
     def __init__(self, program: str, limits: Limits) -> None:
         """
         Args:
-            program: "module:function" of what answers a request: bytes to bytes. What it raises
-                refuses the request.
+            program: "module:function" that answers a request, bytes to bytes; what it raises refuses it.
             limits: of each request.
         """
         self._program = program
@@ -191,7 +190,7 @@ def limit_memory(memory: int) -> None:
 def limit_time(processor_time: int, wall_time: float) -> None:
     """Has the kernel end this process after some more processor time and wall time [s].
 
-    SIGXCPU or SIGALRM ends it, and SIGINT as well, without a trace.
+    SIGXCPU or SIGALRM ends it, and SIGINT as well, without a traceback.
     """
     signals = {signal.SIGINT, signal.SIGXCPU, signal.SIGALRM}
     for each in signals:

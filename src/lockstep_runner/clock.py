@@ -1,8 +1,8 @@
-"""Simulated time for the threads of a script: it passes while the main thread waits and all others rest.
+"""Simulated time for a script's threads: it passes while the main thread waits and all others rest.
 
-The main thread drives: while it waits, it asks the simulator for time, hands out messages, and wakes other
-threads (timers, callbacks, threads with a rospy.Rate) when their time has come, one after the other. While
-one of them computes, no time passes. So the order of events doesn't depend on the machine.
+The main thread drives. While it waits, it asks the simulator for time, delivers messages, and wakes other
+threads (timers, callbacks, threads with a rospy.Rate) one at a time when they are due. No time passes while
+one of them computes, so the order of events doesn't depend on the machine's speed.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from lockstep_runner.topics import Callbacks
 from lockstep_runner.world import ScriptWorld
 
 NANOSECONDS = 1_000_000_000
-LOOK = 0.002  # [s of wall time] between two looks whether a thread that computes has ended
-PATIENCE = 10.0  # [s of wall time] with a thread that computes, or waits for what isn't time
-OWN_QUIET = 30  # looks in a row at a thread of the script's that does nothing; 1 s
-PAUSED_LOOKS = 0.001, 0.05  # [s of wall time] between two looks at a paused world: first, most
+LOOK = 0.002  # [s of wall time] between two checks whether a busy thread has ended
+PATIENCE = 10.0  # [s of wall time] for a thread that computes or waits for anything but time
+OWN_QUIET = 30  # idle checks in a row after which a thread of the script counts as waiting; 1 s
+PAUSED_LOOKS = 0.001, 0.05  # [s of wall time] between two checks of a paused world: first, longest
 Condition = Callable[[], bool]
 
 
@@ -37,7 +37,7 @@ class Sleeper:
     """A thread other than the main one that waits for simulated time."""
 
     thread: int
-    wake: float  # [ns] of time passed
+    wake: float  # [ns] on the scale of Clock.passed
     until: Condition | None
     order: int
     came: bool = False
@@ -51,50 +51,50 @@ class Sleeper:
 
 
 class Others:
-    """Other processes under the same clock; here there are none."""
+    """Other processes under the same clock; this base class has none."""
 
     def settle(self) -> None:
         """Waits until all of them rest."""
 
     def next_wake(self) -> float:
-        """Returns when the first of them is to go on [ns of time passed]."""
+        """Returns the earliest wake-up time [ns of time passed]; infinity if none is due."""
         return math.inf
 
     def wake_due(self, passed: int) -> None:
-        """Lets those go on whose time has come, one after the other, until they rest again."""
+        """Wakes the processes that are due, one at a time, and waits until they rest again."""
 
     def wake(self, node: str) -> None:
-        """Lets a node go on that has a message, until it rests again."""
+        """Wakes a node that has a message, and waits until it rests again."""
 
 
 class Clock:
-    """Lets threads wait in simulated time."""
+    """Makes threads wait in simulated time."""
 
     def __init__(self, world: ScriptWorld, notices: Notices) -> None:
         self.world = world
-        self.passed = 0  # [ns] simulated, in all; a reset of the simulation doesn't take it back
-        self.waits = 0  # counts waits of the main thread in which time has passed
+        self.passed = 0  # [ns] simulated in total; a reset of the simulation doesn't set it back
+        self.waits = 0  # number of the main thread's waits in which time has passed
         self.driving = False  # whether the main thread waits
         self.others = Others()
         self._notices = notices
         self._guard = originals.Condition()
         self._sleepers: list[Sleeper] = []
         self._running: dict[int, threading.Thread] = {}
-        # Threads that the script has started by itself, and what was seen of them
+        # Threads that the script itself has started, and their observed activity
         self._own: WeakKeyDictionary[threading.Thread, Seen] = WeakKeyDictionary()
         self._order = 0
-        self._now = 0  # [ns] the simulator's time, as of its last answer
-        self.behind = False  # the simulator's time: a call was left in the middle
-        self._released = False  # all threads, for the node is shut down
+        self._now = 0  # [ns] simulator time in its last answer
+        self.behind = False  # a call was interrupted, so the simulator may be ahead
+        self._released = False  # the node is shut down: nobody rests any more
         self.callbacks = Callbacks(self.began, self.ended)
 
     def covers_this_thread(self) -> bool:
-        """Whether this is the main thread, or one that computes while the main one waits for it."""
+        """Returns whether this is the main thread, or one that the main thread is waiting for."""
         ident = threading.get_ident()
         return ident == threading.main_thread().ident or ident in self._running
 
     def covers(self, ident: int) -> bool:
-        """The same of any thread, also of one that rests."""
+        """Returns whether the clock controls the thread with this id; resting threads count, too."""
         if ident == threading.main_thread().ident or ident in self._running:
             return True
         with self._guard:
@@ -103,17 +103,17 @@ class Clock:
     def wait(
         self, seconds: float, until: Condition | None = None, topics: Collection[str] = ()
     ) -> bool:
-        """Waits, in the thread that calls.
+        """Blocks the calling thread in simulated time.
 
         Args:
-            seconds: at most, of simulated time; may be infinity.
-            until: ends the wait, once it is true; asked after messages, callbacks and other threads' turns.
-            topics: whose messages may make it true.
+            seconds: longest wait [s of simulated time]; may be infinity.
+            until: ends the wait once true; checked after messages, callbacks and other threads' turns.
+            topics: topics whose messages may make it true.
 
         Returns:
-            Whether `until` has become true.
+            Whether `until` became true.
         """
-        # Whole: of a fraction that no tick reaches nobody would wake.
+        # Whole nanoseconds: no tick would reach a fraction, and the thread would never wake.
         span = seconds if seconds == math.inf else round(max(0.0, seconds) * NANOSECONDS)
         if threading.current_thread() is not threading.main_thread():
             return self._rest(span, until)
@@ -124,46 +124,46 @@ class Clock:
             self.driving = False
 
     def step(self, ticks: int) -> None:
-        """Lets some physics steps pass; for the main thread."""
+        """Lets `ticks` physics steps pass; only for the main thread."""
         self.wait(ticks * self.world.step / NANOSECONDS)
 
     def exchange(self) -> None:
-        """Sends what the script has published, and hands out what has come; no time passes."""
+        """Sends the script's messages and delivers those received; no time passes."""
         self._advance(0, ())
 
     def began(self, thread: threading.Thread) -> None:
-        """A thread computes: no time passes until it has `ended`, or waits."""
+        """Marks a thread as computing: no time passes until it `ended` or waits."""
         with self._guard:
             ident = thread.ident
             if ident is not None and all(each.thread != ident for each in self._sleepers):
                 self._running[ident] = thread
 
     def began_own(self, thread: threading.Thread) -> None:
-        """The script has started a thread: as `began`, but it may wait for something that isn't time."""
+        """As `began`, for a thread that the script started: it may also wait for anything but time."""
         place = Path("/proc/self/task", str(thread.native_id))
         self._own[thread] = Seen(place, OWN_QUIET)
         self.began(thread)
 
     def is_own(self, thread: threading.Thread) -> bool:
-        """Whether the script has started a thread by itself."""
+        """Returns whether the script itself started the thread."""
         return thread in self._own
 
     def ended(self, thread: threading.Thread) -> None:
-        """A thread has done what there was to do."""
+        """Marks a thread as done: time no longer waits for it."""
         with self._guard:
             self._running.pop(thread.ident or 0, None)
             self._guard.notify_all()
 
     def release_all(self) -> None:
-        """Wakes everybody, at the shutdown of the node."""
+        """Wakes all threads when the node shuts down."""
         with self._guard:
-            self._released = True  # also those that are about to rest
+            self._released = True  # stops threads that are about to rest
             sleepers, self._sleepers = self._sleepers, []
         for sleeper in sleepers:
             sleeper.resting.release()
 
     def _rest(self, span: float, until: Condition | None) -> bool:
-        """Waits in a thread that the main one will wake."""
+        """Blocks a thread until the main one wakes it; returns whether `until` became true."""
         with self._guard:
             if self._released:
                 return False
@@ -179,7 +179,7 @@ class Clock:
     def _drive(self, span: float, until: Condition | None, topics: Collection[str]) -> bool:
         end = self.passed + span
         self._let_others_finish()
-        self._wake_the_due()  # those who waited for what this thread has just done
+        self._wake_the_due()  # threads that waited for what this one has just done
         if until is not None:
             self.exchange()
             if until():
@@ -199,14 +199,15 @@ class Clock:
         return False
 
     def _advance(self, ticks: int, topics: Collection[str]) -> bool:
-        """Returns whether time has passed, or none was asked for."""
+        """Returns False if time should have passed and the world is paused, else True."""
         stops: Sequence[str] = ()
         if ticks and any(each.until is not None for each in self._sleepers):
             stops = self.callbacks.heard()
         elif ticks:
             stops = self.callbacks.stops(topics)
         before, caught_up, self.behind = self._now, not self.behind, True
-        response = self.world.advance(ticks, stops)  # which a signal's handler may leave by raising
+        # A signal handler may raise in the call and leave `behind` set.
+        response = self.world.advance(ticks, stops)
         self.behind = False
         self._now = self.world.now
         self.take_over_time()
@@ -224,7 +225,7 @@ class Clock:
         return not response.paused or not ticks
 
     def take_over_time(self) -> None:
-        """Tells rospy the time, instead of /clock."""
+        """Sets rospy's time directly, in place of its subscription to /clock."""
         hears = getattr(rospy.impl.simtime, "_clock_sub", None)
         if hears is not None:
             hears.unregister()
@@ -233,7 +234,7 @@ class Clock:
         rospy.rostime._set_rostime(genpy.Time(0, self.world.now))
 
     def _wait_paused(self, end: float, until: Condition | None) -> bool:
-        """A sleep in a paused world ends at once; what others may do is waited for, in wall time."""
+        """Ends a plain sleep in a paused world at once; other waits go on in wall time, as others may act."""
         if until is None and end < math.inf:
             return False
         look, longest = PAUSED_LOOKS

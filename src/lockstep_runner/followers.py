@@ -1,7 +1,7 @@
 """Other processes under the script's clock.
 
-Nodes that follow the clock rest while the script computes, and go on when their time has come. No simulated
-time passes until processes that the script has started have come to rest.
+Nodes that follow the clock rest while the script computes and wake when they are due. No simulated time
+passes until the processes that the script has started are at rest.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ STARTING_PATIENCE = 30.0  # [s of wall time]
 
 
 class StartedProcesses:
-    """Notices that processes are started, and when they work no more."""
+    """Detects when the script starts processes, and when they stop working."""
 
     def __init__(self, notices: Notices) -> None:
         self.is_going_on = False
         self._notices = notices
-        self._known: set[int] = set()  # processes that were told of: they compute for themselves
+        self._known: set[int] = set()  # already reported: these compute on their own
         paths = [str(SITE), *filter(None, [os.environ.get("PYTHONPATH")])]
         os.environ["PYTHONPATH"] = os.pathsep.join(paths)
         begin, system = subprocess.Popen.__init__, os.system
@@ -51,7 +51,7 @@ class StartedProcesses:
         os.system = run
 
     def settle(self, resting: Callable[[], set[int]]) -> None:
-        """Waits until none of the processes below this one works, but for those that rest by the clock."""
+        """Waits until no descendant of this process works; `resting` ones may, as the clock holds them."""
         self.is_going_on = False
         deadline = originals.monotonic() + STARTING_PATIENCE
         quiet, before = 0, _below()
@@ -77,7 +77,7 @@ class StartedProcesses:
 
 
 def _below() -> dict[int, tuple[str, int]]:
-    """Returns state and processor time [ticks] of the processes that come of this one."""
+    """Returns state and processor time [ticks] of each living descendant, by process id."""
     parents: dict[int, tuple[int, str, int]] = {}
     for entry in os.listdir("/proc"):
         look = look_at(Path("/proc", entry)) if entry.isdigit() else None
@@ -99,37 +99,33 @@ def _name(pid: int) -> str:
     return "ended"
 
 
-PATIENCE = (
-    10.0  # [s of wall time] with a node that computes, or waits for something that isn't time
-)
+PATIENCE = 10.0  # [s of wall time] for a node that computes or waits for something other than time
 
 
 @dataclass
 class _Node:
-    """One node."""
-
     name: str
     pid: int
     line: Line
     rests: bool = False
-    began: float = 0.0  # [ns of time passed] to rest
+    began: float = 0.0  # [ns of time passed] when its rest began
     wake: float = math.inf  # [ns of time passed]
-    covered: bool = True  # waited for; not while it waits for something that isn't simulated time
+    covered: bool = True  # time waits for it; False while it waits for something other than time
     seen: Seen = field(init=False)
 
     def __post_init__(self) -> None:
         self.look_anew()
 
     def look_anew(self) -> None:
-        """From now on."""
+        """Starts counting idle checks anew."""
         self.seen = Seen(Path("/proc", str(self.pid)))
 
 
 class Followers(Others):
-    """All nodes that follow ."""
+    """All nodes that follow the clock."""
 
     def __init__(self, notices: Notices) -> None:
-        self.passed = lambda: 0  # [ns], the clock's
+        self.passed = lambda: 0  # [ns] Clock.passed
         self.forget_mail = lambda node: None
         self.starting = StartedProcesses(notices)
         self._notices = notices
@@ -145,22 +141,22 @@ class Followers(Others):
         originals.start(thread)
 
     def has(self, node: str) -> bool:
-        """Whether a node of that name follows."""
+        """Returns whether a node of that name follows the clock."""
         return node in self._nodes
 
     def settle(self) -> None:
-        """Waits until all that was started is up, and rests."""
+        """Waits until all started processes are up and at rest."""
         if self.starting.is_going_on:
             self.starting.settle(self._resting_pids)
         if self._nodes:
             self._until_all_rest()
 
     def next_wake(self) -> float:
-        """When the first of them is to go on [ns of time passed]."""
+        """Returns the earliest wake-up time [ns of time passed]; infinity if none is due."""
         return min((node.wake for node in self._nodes.values()), default=math.inf)
 
     def wake_due(self, passed: int) -> None:
-        """Lets those go on whose time has come, one after the other, until they rest again."""
+        """Wakes the nodes that are due, one at a time, and waits until they rest again."""
         while True:
             with self._guard:
                 due = [n for n in self._nodes.values() if n.rests and n.wake <= passed]
@@ -169,11 +165,11 @@ class Followers(Others):
             self._go_on(min(due, key=lambda node: (node.wake, node.name)))
 
     def wake(self, node: str) -> None:
-        """Lets a node go on that has a message, until it rests again."""
+        """Wakes a node that has a message, and waits until it rests again."""
         with self._guard:
             found = self._nodes.get(node)
         if found is None:
-            self.forget_mail(node)  # it has ended
+            self.forget_mail(node)  # the node has ended
         elif found.rests:
             self._go_on(found)
 
@@ -195,7 +191,7 @@ class Followers(Others):
                     if node.rests or not node.covered:
                         continue
                     if node.seen.is_quiet():
-                        node.covered = False  # it waits for something that isn't simulated time
+                        node.covered = False  # it waits for something other than time
                     elif originals.monotonic() > deadline:
                         node.covered = False
                         self._notices.once(

@@ -13,14 +13,14 @@ from typing import Any
 from lockstep_runner.line import ADDRESS, Line, LineEnded
 from lockstep_runner.script import AfterImport
 
-# They are the simulation and the graph themselves.
+# These make up the simulation and the ROS graph.
 NOT_FOLLOWING = frozenset(
     ["gazebo", "gzserver", "gzclient", "rosmaster", "roscore", "roslaunch", "rosout", "rosbag"]
 )
 
 
 def watch_for_rospy() -> None:
-    """Has this process follow the clock, should it become a node."""
+    """Makes this process follow the clock if it becomes a node."""
     if (
         ADDRESS not in os.environ
         or os.path.basename(sys.argv[0] if sys.argv else "") in NOT_FOLLOWING
@@ -55,7 +55,7 @@ def _follow(name: str) -> None:
     from lockstep_runner.world import ScriptWorld, WorldFailed
 
     class FollowedWorld(ScriptWorld):
-        """The simulator; for time it asks the script's process."""
+        """The simulator, except that time comes from the script's process."""
 
         def __init__(self) -> None:
             super().__init__()
@@ -67,12 +67,12 @@ def _follow(name: str) -> None:
             until: Sequence[str] = (),
             connect: tuple[Sequence[str], Sequence[str]] | None = None,
         ) -> Any:
-            """As ScriptWorld.advance; time passes when the script's process says so."""
+            """As ScriptWorld.advance, but time passes only when the script's process says so."""
             if not ticks:
                 return super().advance(0, (), connect)
             response = super().advance(0, until)
-            response.paused = False  # to a node that only waits, no time passes then
-            if response.messages:  # they have come before the rest
+            response.paused = False  # a follower simply waits while no time passes
+            if response.messages:  # they arrived before the rest began
                 return response
             passed = _rest(line, math.inf if ticks == sys.maxsize else ticks * self.step)
             if rospy.core.is_shutdown():  # the simulator may have ended, too
@@ -91,6 +91,6 @@ def _follow(name: str) -> None:
                 return 0.0
             raise WorldFailed("the script that it followed has ended") from fault
 
-    rospy.core.add_shutdown_hook(lambda reason: line.close())  # Ctrl-C, while it rests
+    rospy.core.add_shutdown_hook(lambda reason: line.close())  # ends a rest at Ctrl-C
     options = argparse.Namespace(seed=None, dt=0.001, step_on=["none"], virtual_wall_clock=False)
     install(options, FollowedWorld())

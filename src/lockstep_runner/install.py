@@ -1,4 +1,4 @@
-"""Replaces what docs/lockstep.md lists, for this process."""
+"""Replaces the functions that docs/lockstep.md lists, in this process."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from lockstep_runner.world import ScriptWorld
 
 
 def install(args: argparse.Namespace, world: ScriptWorld | None = None) -> ScriptRunner:
-    """Replaces what docs/lockstep.md lists.
+    """Replaces the functions that docs/lockstep.md lists.
 
     Args:
-        args: the launcher's options.
-        world: for a node that follows the script's clock; None for the script's own process.
+        args: the launcher's parsed options.
+        world: the world of a node that follows the script's clock; None in the script's own process.
 
     Returns:
-        What the replacements share.
+        The runner that the replacements share.
     """
     triggers = None
     if args.step_on is not None:

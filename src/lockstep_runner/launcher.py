@@ -14,16 +14,16 @@ from lockstep_runner import script
 from lockstep_runner.notices import tell
 
 USAGE = 2
-SERVER_ARGUMENTS = "GZSERVER_ARGS"  # read by every simulator that is started below us
+SERVER_ARGUMENTS = "GZSERVER_ARGS"  # every simulator that a descendant starts reads it
 STEP_ON = "--step-on"
 HASHES = "PYTHONHASHSEED"
 MOST_SEED = 2**32 - 1
-LONGEST = 3600.0  # [s] that may pass at a trigger
+LONGEST = 3600.0  # [s] longest period at a trigger
 NO_TRIGGERS = "none"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the script that the command line names; returns the exit code, unless it leaves by itself."""
+    """Runs the script named on the command line; returns the exit code unless the script exits itself."""
     args = _parse(sys.argv[1:] if argv is None else argv)
     try:
         code = script.compiled(args.script)
@@ -31,10 +31,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         tell(str(fault))
         return USAGE
     if args.seed is not None and os.environ.get(HASHES) != str(args.seed % MOST_SEED):
-        # The order of sets is drawn when Python starts.
+        # Python chooses its hash seed, and so the order of sets, at its start: run it again.
         os.environ[HASHES] = str(args.seed % MOST_SEED)
         os.execv(sys.executable, [sys.executable, *sys.argv])
-    # Here: what it imports takes as long as Python's start, and would be imported twice
+    # Imported late: it takes as long as Python's start, and execv would make it happen twice
     from lockstep_runner.world import RunsByItself, is_running
 
     try:
@@ -79,12 +79,12 @@ Hook = Callable[[type[BaseException], BaseException, types.TracebackType | None]
 
 
 def _hide_ourselves(show: Hook, path: str) -> Hook:
-    """Tracebacks begin with the script."""
+    """Returns an excepthook whose tracebacks begin with the script."""
 
     def shown(
         kind: type[BaseException], fault: BaseException, trace: types.TracebackType | None
     ) -> None:
-        fault.__traceback__ = script.own_part(trace, path)  # which is what is shown
+        fault.__traceback__ = script.own_part(trace, path)  # the default hook prints this
         show(kind, fault, fault.__traceback__)
         if hint := script.hint(fault):
             tell(hint)
@@ -126,14 +126,14 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def _one_by_one(argv: Sequence[str]) -> list[str]:
-    """Gives each of the names behind --step-on an option of its own: else the script would be one more."""
+    """Repeats --step-on for each name behind it: otherwise argparse would take the script for a name."""
     left, given = list(argv), []
     while left:
         argument = left.pop(0)
         if argument != STEP_ON:
             given.append(argument)
             if not argument.startswith("-") and given[-2:-1] not in (["--seed"], ["--dt"]):
-                return given + left  # the script, and what it gets
+                return given + left  # the script and its arguments
             continue
         names = []
         while left and not (left[0].startswith("-") or _is_a_script(left[0])):

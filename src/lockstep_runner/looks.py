@@ -1,4 +1,4 @@
-"""Looks at processes and threads from outside: whether they compute, or wait for something."""
+"""Observes processes and threads through /proc: whether they compute or wait."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ from pathlib import Path
 
 from lockstep_runner import originals
 
-LOOK = 0.03  # [s of wall time]
-QUIET = 5  # looks in a row
+LOOK = 0.03  # [s of wall time] between two checks
+QUIET = 5  # idle checks in a row
 WORKING = "RD"  # states of a process: running, waiting for a disk
 
 
 class Seen:
-    """What was seen of one process, or one thread."""
+    """The observed activity of one process or thread."""
 
     def __init__(self, place: Path, quiet: int = QUIET) -> None:
-        """`place` is its folder in /proc; it is quiet after as many looks in a row."""
+        """`place` is its folder in /proc; it counts as quiet after `quiet` idle checks in a row."""
         self._place = place
         self._looks = quiet
         self._used = -1  # [ticks] of processor time
-        self._quiet = 0  # looks in a row
+        self._quiet = 0  # idle checks in a row
         self._next = 0.0
 
     def is_quiet(self) -> bool:
-        """Looks, not too often, whether it has done nothing in the last few looks."""
+        """Returns whether the last few checks found it idle; checks at most once per LOOK."""
         if originals.monotonic() >= self._next:
             self._next = originals.monotonic() + LOOK
             look = look_at(self._place)
@@ -34,7 +34,7 @@ class Seen:
 
 
 def look_at(place: Path) -> tuple[int, str, int] | None:
-    """Returns parent, state and processor time [ticks] of a process or thread, if it is there."""
+    """Returns parent id, state and processor time [ticks] of a process or thread, None if it has ended."""
     try:
         fields = Path(place, "stat").read_text().rpartition(") ")[2].split()
     except OSError:

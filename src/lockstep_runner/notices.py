@@ -1,4 +1,4 @@
-"""What the user has to know, each thing once, on stderr."""
+"""Notices to the user on stderr, each one once."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import sys
 
 
 def tell(text: str) -> None:
-    """Prints a line."""
+    """Prints a line on stderr."""
     print(f"lockstep: {text}", file=sys.stderr, flush=True)
 
 
 class Notices:
-    """Remembers what has been told."""
+    """Remembers which notices were printed."""
 
     def __init__(self) -> None:
         self._told: set[str] = set()
 
     def once(self, what: str, text: str) -> None:
-        """Prints a line, unless something was told about `what` before."""
+        """Prints a line, unless there was one about `what` before."""
         if what not in self._told:
             self._told.add(what)
             tell(text)

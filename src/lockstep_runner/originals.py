@@ -1,4 +1,4 @@
-"""The functions of Python that are replaced for the script, as they were; ours use these."""
+"""Python's own versions of the functions that are replaced for the script; this package calls these."""
 
 import threading
 import time

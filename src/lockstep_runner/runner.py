@@ -1,4 +1,4 @@
-"""What the replaced functions share: the world, the clock, and when time passes without a wait."""
+"""The state that the replaced functions share: world, clock, and when time passes without a wait."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from lockstep_runner.triggers import Triggers
 from lockstep_runner.world import NODE, RunsByItself, ScriptWorld, WorldFailed, WorldGone
 
 USAGE, FAILED = 2, 1  # exit codes
-OTHERS = 2.0  # [s of wall time] in which another node may come up without time passing
+OTHERS = 2.0  # [s of wall time] for another node to come up before time passes
 LOOK = 0.05  # [s of wall time]
 PAUSE = f"{NODE}/pause_physics"
 SWITCHES = (PAUSE, f"{NODE}/unpause_physics")
-POLLED = 10  # equal questions to a service in a row
-POLLED_TIME = 1000  # readings of the time in a row, with nothing in between
+POLLED = 10  # equal calls of a service in a row
+POLLED_TIME = 1000  # time readings in a row, with nothing in between
 QUIET = ("get_", "list_", "pause_physics", "unpause_physics")  # services that publish nothing
 
 
 class BadPeriod(Exception):
-    """What passes at a trigger can't be done in whole physics steps; the text says both."""
+    """The period at a trigger is no whole number of physics steps; the text gives both."""
 
 
 Answer = TypeVar("Answer")
@@ -41,7 +41,7 @@ Options = ParamSpec("Options")
 def _ends_with_the_world(
     instead: Answer,
 ) -> Callable[[Callable[Concatenate[ScriptRunner, Options], Answer]], Callable[..., Answer]]:
-    """Has a method return something else when the simulator is ended, and end the script when it failed."""
+    """Makes a method return `instead` once the simulator has ended, and end the script if it failed."""
 
     def decorate(
         method: Callable[Concatenate[ScriptRunner, Options], Answer],
@@ -68,10 +68,12 @@ class ScriptRunner:
     """One script in lock-step."""
 
     def __init__(self, period: float, triggers: Collection[str] | None, world: ScriptWorld) -> None:
-        """Args:
-        period: what passes at a trigger [s].
-        triggers: topics and services; None for the commands to controllers.
-        world: the simulator, and whoever gives time.
+        """Sets the runner up; nothing is replaced yet.
+
+        Args:
+            period: simulated time that passes at a trigger [s].
+            triggers: topics and services; None for the commands to controllers.
+            world: the simulator, and the source of time.
         """
         self.notices = Notices()
         self.world = world
@@ -85,7 +87,7 @@ class ScriptRunner:
 
     @_ends_with_the_world(False)
     def is_connected(self) -> bool:
-        """Looks for a simulator where there is none yet; whether there is one."""
+        """Returns whether there is a simulator; looks for one if none is connected."""
         if self.world.there:
             return True
         found = self.world.look()
@@ -96,8 +98,8 @@ class ScriptRunner:
         return found
 
     def fail(self, fault: Exception, code: int = FAILED) -> NoReturn:
-        """Ends the script: with one line, whatever it catches."""
-        if self._failed:  # and the script has caught it, as scripts do
+        """Ends the script with one line on stderr, even if it catches SystemExit."""
+        if self._failed:  # the script has caught the SystemExit below
             sys.stdout.flush()
             os._exit(code)
         self._failed = True
@@ -105,9 +107,7 @@ class ScriptRunner:
         raise SystemExit(code)
 
     def _check_period(self) -> None:
-        """Raises:
-        BadPeriod: no whole number of physics steps passes at a trigger.
-        """
+        """Raises BadPeriod unless the period is a whole number of physics steps."""
         step = self.world.step / NANOSECONDS
         ticks = self._period / step
         if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-6:
@@ -127,12 +127,12 @@ class ScriptRunner:
                 self.triggers.waited()
 
     def wait_for_event(self, seconds: float, until: Condition) -> bool:
-        """As `wait`, for what any callback may make come true."""
+        """As `wait`, for a condition that any callback may make true."""
         return self.wait(seconds, until, self.clock.callbacks.heard())
 
     @_ends_with_the_world(True)
     def waits_for_others(self, seconds: float) -> bool:
-        """A library looks again and again for another node: messages come, but time doesn't pass at first."""
+        """Returns True while a library polls for another node: messages arrive, but no time passes yet."""
         if not (self.clock.covers_this_thread() and self.is_connected()):
             return True
         passed = self.clock.passed
@@ -143,13 +143,13 @@ class ScriptRunner:
         return self._looks * seconds < OTHERS
 
     def post(self, topic: str, data: bytes) -> bool:
-        """Takes a message for the simulator."""
+        """Keeps a message for the simulator until the next call."""
         self.world.post(topic, data)
         return True
 
     @_ends_with_the_world(None)
     def before_publishing(self, topic: str) -> None:
-        """A message is about to be published."""
+        """Lets time pass before a message is published, if its topic triggers that."""
         if self.is_connected():
             self._settle()
             if self._may_step() and self.triggers.before(topic, topic in self.topics.commands):
@@ -157,7 +157,7 @@ class ScriptRunner:
 
     @_ends_with_the_world(None)
     def published(self, topic: str) -> None:
-        """A message has been published."""
+        """Lets time pass after a message was published, if its topic triggers that."""
         self.clock.callbacks.acted()
         may = self.world.there and self._may_step()
         if may and self.triggers.after(topic, topic in self.topics.commands):
@@ -165,7 +165,7 @@ class ScriptRunner:
 
     @_ends_with_the_world(False)
     def switches(self, service: str) -> bool:
-        """Whether a service pauses or unpauses physics; then it is seen to, and needn't be called."""
+        """Pauses or unpauses physics in place of such a service call; returns whether it did."""
         if service not in SWITCHES or not self.is_connected():
             return False
         self.clock.callbacks.acted()
@@ -178,7 +178,7 @@ class ScriptRunner:
 
     @_ends_with_the_world(None)
     def before_call(self, service: str) -> None:
-        """A service is about to be called: what was published before it, comes before it."""
+        """Delivers what was published before a service call, so that it arrives before the call."""
         self.clock.callbacks.acted()
         if self._may_step():
             self.clock.others.settle()
@@ -189,7 +189,7 @@ class ScriptRunner:
 
     @_ends_with_the_world(None)
     def called(self, service: str, request: Callable[[], bytes]) -> None:
-        """A service has answered."""
+        """Exchanges messages after a service call, and lets time pass if the call triggers that."""
         if not self.is_connected():
             return
         if not _is_quiet(service):
@@ -202,30 +202,30 @@ class ScriptRunner:
 
     @_ends_with_the_world(None)
     def reads_time(self) -> None:
-        """The script reads the time."""
+        """Catches up after an interrupted call, and counts a reading of the time."""
         if self.clock.behind and self.world.there and self._may_step():
             self.clock.exchange()
         self.polls("the time", POLLED_TIME)
 
     @_ends_with_the_world(None)
     def polls(self, what: str, often: int, detail: bytes = b"") -> None:
-        """Something was looked at; done often enough, with nothing in between, it is waited for."""
+        """Counts a look at something; `often` looks in a row count as a wait, and time passes."""
         if self._may_step() and self.world.there and self.triggers.polled(what, often, detail):
             self._pass_period()
 
     @property
     def is_over(self) -> bool:
-        """Whether the node is shut down: no time passes any more, and waits are the wall's."""
+        """Whether the node is shut down: no time passes any more, and waits take wall time."""
         return bool(rospy.core.is_shutdown())
 
     def hand_over(self) -> None:
-        """Gives the simulator what it hasn't got yet, at the script's end."""
+        """Sends the simulator all pending messages at the script's end."""
         if self.world.there and self.world.has_post:
             with contextlib.suppress(WorldGone, WorldFailed):
                 self.world.advance(0)
 
     def finish(self, threads: Sequence[threading.Thread]) -> None:
-        """Lets time pass, at the end of the script, until its other threads have ended."""
+        """Lets time pass after the script's end until its other threads have ended."""
         while any(each.is_alive() for each in threads):
             if not self.is_over and self.is_connected():
                 self.wait(math.inf, lambda: not any(each.is_alive() for each in threads))
@@ -233,7 +233,7 @@ class ScriptRunner:
                 originals.sleep(LOOK)
 
     def _may_step(self) -> bool:
-        """While the main thread waits, time passes anyway."""
+        """Returns whether a trigger may let time pass here; while the main thread waits, it passes anyway."""
         return threading.current_thread() is threading.main_thread() and not self.clock.driving
 
     def _pass_period(self) -> None:
@@ -251,12 +251,12 @@ def _is_quiet(service: str) -> bool:
     return service.rpartition("/")[2].startswith(QUIET)
 
 
-SILENCE = 30.0  # [s of wall time] without simulated time, after which the user is told
+SILENCE = 30.0  # [s of wall time] without simulated time before the watchdog reports it
 WATCH_LOOK = 1.0  # [s]
 
 
 def watch(runner: ScriptRunner, silence: float = SILENCE) -> threading.Thread:
-    """Watches, in a thread of its own, until it has told or the node is shut down."""
+    """Starts a thread that reports once if no simulated time passes for `silence` [s of wall time]."""
     thread = threading.Thread(
         target=_watch, args=(runner, silence), name="lock-step's watchdog", daemon=True
     )

@@ -1,4 +1,4 @@
-"""The script: compiled and run as if it had been started by itself, seeded, and told apart from libraries."""
+"""Compiles and runs the script as if started directly, seeds it, and tells its code from libraries'."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class NoScript(Exception):
 
 
 def compiled(path: str) -> types.CodeType:
-    """Reads and compiles a script.
+    """Returns a script's code.
 
     Raises:
-        NoScript: it can't be read, or isn't Python 3.
+        NoScript: the file can't be read, or isn't Python 3.
     """
     try:
         with tokenize.open(path) as file:
@@ -66,7 +66,7 @@ def _is_for_python_2(fault: str, line: str) -> bool:
 
 
 def hint(fault: BaseException) -> str:
-    """What a script that reads as Python 3 means by a name of Python 2; empty for other faults."""
+    """Returns a hint if the fault is a missing name of Python 2, else an empty string."""
     missing = fault.name if isinstance(fault, ImportError | NameError) else None
     if missing in MODULES_OF_PYTHON_2 | NAMES_OF_PYTHON_2:
         return f"{missing} is Python 2's: the script is for Python 2, this is Python 3; 2to3 mends most of it"
@@ -74,9 +74,9 @@ def hint(fault: BaseException) -> str:
 
 
 def run(path: str, arguments: Sequence[str], code: types.CodeType) -> None:
-    """Runs a script as `__main__`, with its arguments, from the folder where we are.
+    """Runs a script as `__main__` with its arguments, in the current folder.
 
-    What it raises goes up; `own_part` takes ours out of the traceback.
+    Its exceptions pass through; `own_part` removes this package's frames from their tracebacks.
     """
     main = types.ModuleType("__main__")
     main.__dict__.update(__file__=path, __builtins__=builtins, __cached__=None)
@@ -87,7 +87,7 @@ def run(path: str, arguments: Sequence[str], code: types.CodeType) -> None:
 
 
 def own_part(trace: types.TracebackType | None, path: str) -> types.TracebackType | None:
-    """A traceback from the script's first frame on, without those that are replaced functions'."""
+    """Returns a traceback from the script's first frame on, without the frames of replaced functions."""
     part = trace
     while part is not None and part.tb_frame.f_code.co_filename != path:
         part = part.tb_next
@@ -109,7 +109,7 @@ def seed_everything(seed: int) -> None:
 
     random.seed(seed)
     numpy.random.seed(seed)
-    # What generators begin with that nobody seeds, as Gymnasium's of an environment
+    # The entropy of generators without a seed, such as those of Gymnasium environments
     vars(numpy.random.bit_generator)["randbits"] = random.Random(seed).getrandbits
     if "torch" in sys.modules:
         sys.modules["torch"].manual_seed(seed)
@@ -118,7 +118,7 @@ def seed_everything(seed: int) -> None:
 
 
 class AfterImport(importlib.abc.MetaPathFinder):
-    """Calls a function with a module when it has been imported."""
+    """Calls a function with a module once it has been imported."""
 
     def __init__(self, name: str, call: Callable[[types.ModuleType], object]) -> None:
         self._name = name
@@ -147,7 +147,7 @@ class AfterImport(importlib.abc.MetaPathFinder):
 
 
 STANDARD = sysconfig.get_path("stdlib") + "/"
-# Their waits are for processes, sockets, files and threads of their own.
+# They wait for their own processes, sockets, files and threads: such waits stay wall time.
 LIBRARIES = frozenset(
     # fmt: off
     [
@@ -190,17 +190,17 @@ LIBRARIES = frozenset(
 )
 
 
-# Of these the waits are their callers'.
+# A wait in these counts as their caller's.
 GO_BETWEENS = frozenset(
     ["threading", "queue", "concurrent.futures._base", "concurrent.futures.thread"]
 )
 
 
 def is_the_script(depth: int) -> bool:
-    """Whether the function `depth` frames above the caller belongs to the script, or a module of its own.
+    """Returns whether the function `depth` frames above the caller is the script's or its modules'.
 
-    A wait in Python's own `queue`, `threading` and `concurrent.futures` counts as that of who called
-    them, and one in a `threading.Timer` as the script's.
+    A wait in Python's own `queue`, `threading` and `concurrent.futures` counts as their caller's, one in
+    a `threading.Timer` as the script's.
     """
     frame: types.FrameType | None = sys._getframe(depth + 1)
     while frame is not None and _module(frame) in GO_BETWEENS:
@@ -218,7 +218,7 @@ def is_the_script(depth: int) -> bool:
 
 
 def caller(depth: int) -> str:
-    """The package or module, by its first name, of the function `depth` frames above the caller."""
+    """Returns the top-level package or module of the function `depth` frames above the caller."""
     return _package(sys._getframe(depth + 1))
 
 

@@ -1,6 +1,6 @@
-"""The script's topics: connected to the simulator before anything goes over them, closed to others.
+"""The script's topics: connected to the simulator before their first message, closed to other publishers.
 
-Messages of the simulator go to the script's callbacks in order, in a thread as with rospy.
+The simulator's messages reach the script's callbacks in order, in a worker thread as with rospy.
 """
 
 from __future__ import annotations
@@ -18,22 +18,21 @@ from lockstep_runner import originals
 from lockstep_runner.notices import Notices
 from lockstep_runner.world import NODE, ScriptWorld
 
-QUIET_CALLBACKS = (
-    20  # callbacks in a row that did nothing towards the simulator: time needn't stop for the topic
-)
+# Callbacks in a row that didn't act on the simulator; then time no longer stops for the topic.
+QUIET_CALLBACKS = 20
 
 Told = Callable[[threading.Thread], None]
 
 
 class Callbacks:
-    """Runs callbacks one after the other.
+    """Runs callbacks one at a time.
 
-    A callback may wait for simulated time. Then other topics' messages go on in another thread, while those
-    of its own topic wait for it, as they do with rospy.
+    While a callback waits for simulated time, another worker handles the messages of other topics; those of
+    its own topic wait for it, as with rospy.
     """
 
     def __init__(self, began: Told, ended: Told) -> None:
-        """`began` and `ended` are told of a thread that runs callbacks."""
+        """`began` and `ended` get each worker when it starts and stops running callbacks."""
         self._began = began
         self._ended = ended
         self._guard = threading.Lock()
@@ -42,19 +41,19 @@ class Callbacks:
         self._busy: set[str] = set()  # topics with a callback that hasn't returned
         self._idle: list[_Worker] = []
         self._quiet: dict[str, int] = defaultdict(int)
-        self._current: dict[int, str] = {}  # the topic that a thread runs a callback of
+        self._current: dict[int, str] = {}  # topic whose callback a thread runs, by thread id
 
     def acted(self) -> None:
-        """The callback in this thread, if it is one, has done something towards the simulator."""
+        """Notes that the callback in this thread, if one runs here, has acted on the simulator."""
         topic = self._current.get(threading.get_ident())
         if topic is not None:
             self._quiet[topic] = 0
 
     def stops(self, topics: Collection[str]) -> list[str]:
-        """Topics after whose messages time stops: those asked for, and those whose callbacks act.
+        """Returns the topics whose messages stop time: `topics`, and those whose callbacks act.
 
-        A callback that commands the robot has to have done so before the next tick; for one that only
-        keeps what it was told, stopping would cost time for nothing.
+        A callback that commands the robot must do so before the next tick; stopping for one that only
+        stores its message would cost speed for nothing.
         """
         acting = [
             name
@@ -64,11 +63,11 @@ class Callbacks:
         return [*{*acting, *topics}]
 
     def heard(self) -> list[str]:
-        """Topics with callbacks, any of which may make come true what somebody waits for."""
+        """Returns the topics with callbacks, as any of them may end a wait."""
         return [name for name, topic in list(_topics().subs.items()) if topic.callbacks]
 
     def hand_out(self, messages: Iterable[TopicMessage]) -> None:
-        """Has the callbacks called; returns before they have been."""
+        """Queues messages for their callbacks and returns at once."""
         with self._guard:
             self._waiting.extend(messages)
             worker = self._idle.pop() if self._idle else None
@@ -115,7 +114,7 @@ class Callbacks:
 
 
 class _Worker(threading.Thread):
-    """A thread that runs callbacks when it is told to go."""
+    """A thread that runs callbacks each time `go` is released."""
 
     def __init__(self, work: Callable[[_Worker], None]) -> None:
         super().__init__(name="callbacks", daemon=True)
@@ -136,28 +135,26 @@ def _topics() -> Any:
 
 CONNECTING = 2.0  # [s of wall time]
 CONNECTING_LOOK = 0.001  # [s]
-SILENT = ("/rosout", "/rosout_agg", "/clock", "/statistics")  # nothing that the simulator acts on
-NOT_COMMANDS = ("/goal", "/cancel")  # of an action: it is waited for by other means
+SILENT = ("/rosout", "/rosout_agg", "/clock", "/statistics")  # the simulator acts on none of these
+NOT_COMMANDS = ("/goal", "/cancel")  # of an action, whose client waits in other ways
 
 
 class Topics:
-    """Connects what the script publishes and hears."""
+    """Connects the script's publishers and subscribers to the simulator."""
 
     def __init__(self, world: ScriptWorld, notices: Notices) -> None:
-        self.commands: frozenset[str] = (
-            frozenset()
-        )  # that the script publishes and the simulator hears
+        # Topics that the script publishes and the simulator subscribes to
+        self.commands: frozenset[str] = frozenset()
         self.follows: Callable[[str], bool] = lambda node: True
         self._world = world
         self._notices = notices
         self._changed = True
-        self._seen = -1  # the simulator's count of changes
-        self._heard: frozenset[str] = (
-            frozenset()
-        )  # that the script hears and the simulator publishes
+        self._seen = -1  # the simulator's count of topic changes at the last `settle`
+        # Topics that the script subscribes to and the simulator publishes
+        self._heard: frozenset[str] = frozenset()
 
     def changed(self) -> None:
-        """The script has a publisher or a subscriber more."""
+        """Notes that the script has a new publisher or subscriber."""
         self._changed = True
 
     @property
@@ -166,10 +163,10 @@ class Topics:
         return not self._changed and self._seen == self._world.topics_changed
 
     def settle(self) -> Sequence[TopicMessage]:
-        """Waits until the script's topics are connected to the simulator, if there are new ones.
+        """Waits until new topics of the script are connected to the simulator.
 
         Returns:
-            Messages that have come meanwhile.
+            Messages that arrived meanwhile.
         """
         if self.are_settled:
             return ()
@@ -196,7 +193,7 @@ class Topics:
         return messages
 
     def lets_in(self, topic: Any, connection: Any) -> bool:
-        """Whether messages over a connection go to the script's callbacks."""
+        """Returns whether messages of a connection go to the script's callbacks."""
         name, node = topic.resolved_name, connection.callerid_pub
         if node == NODE or name in SILENT or getattr(connection, "socket", None) is None:
             return True

@@ -1,47 +1,45 @@
-"""When time passes although the script doesn't wait: once for each round of commands, or as the user says."""
+"""Decides when time passes without a wait: once per round of commands, or at topics the user names."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection
 
-SELF_PACED = (
-    2  # rounds in a row in which the script has waited by itself: no triggers until it doesn't
-)
+SELF_PACED = 2  # rounds in a row with a wait of the script's own: no triggers until a round without
 
 
 class Triggers:
     """Decides at each publish and each call.
 
-    Without names given, a round of commands to the simulator is one: a script for several joints publishes
-    several in a row. A topic that comes again begins the next round. If no time has passed by then, the
+    Without names, each round of commands to the simulator triggers once: a script for several joints
+    publishes several in a row. A repeated topic begins the next round. If no time has passed by then, the
     script doesn't wait by itself: time passes at once, and from then on after the last topic of each round.
-    A script that waits after its commands needs no triggers, and gets none.
+    A script that waits after its commands gets no triggers.
     """
 
     def __init__(self, names: Collection[str] | None) -> None:
-        """Topics and services; none for no triggers, None for all commands."""
+        """`names` are topics and services; empty for no triggers, None for all commands."""
         self._names = None if names is None else frozenset(names)
-        self.seen: dict[str, None] = {}  # names of topics and services, in order
+        self.seen: dict[str, None] = {}  # topics and services in order of first use
         self._round: list[str] = []  # topics published since the round began
         self._last: str | None = None  # the topic that ended the round before
         self._stepped = False  # in this round
         self._waited = False  # in this round
         self._self_paced = 0  # rounds in a row
-        self._looks: Counter[tuple[str, bytes]] = Counter()  # since time has passed
-        self._polled: set[tuple[str, bytes]] = set()  # what the script has waited for in this way
+        self._looks: Counter[tuple[str, bytes]] = Counter()  # since time last passed
+        self._polled: set[tuple[str, bytes]] = set()  # looks that count as waits
 
     def waited(self) -> None:
-        """Time has passed because the script waited."""
+        """Notes that time has passed because the script waited."""
         self._waited = True
         self.passed()
 
     def passed(self) -> None:
-        """Time has passed."""
+        """Notes that time has passed: looks are counted anew."""
         self._looks.clear()
 
     def before(self, topic: str, is_command: bool) -> bool:
-        """Whether time passes before a message is published: a round ended earlier than the one before."""
+        """Returns whether time passes before a message: its topic begins a new round, and none has passed."""
         self._looks.clear()
         if self._names is not None or not is_command or topic not in self._round:
             return False
@@ -53,7 +51,7 @@ class Triggers:
         return missed
 
     def after(self, topic: str, is_command: bool) -> bool:
-        """Whether time passes after a message was published."""
+        """Returns whether time passes after a message."""
         self.seen.setdefault(topic)
         if self._names is not None:
             return topic in self._names
@@ -66,16 +64,16 @@ class Triggers:
         return True
 
     def called(self, service: str) -> bool:
-        """Whether time passes after a service was called."""
+        """Returns whether time passes after a service call."""
         self.seen.setdefault(service)
         return self._names is not None and service in self._names
 
     def unused(self) -> list[str]:
-        """Names that were given, and that the script never published on nor called."""
+        """Returns the given names that the script has neither published on nor called."""
         return sorted((self._names or frozenset()) - self.seen.keys())
 
     def polled(self, what: str, often: int, detail: bytes) -> bool:
-        """Whether time passes because the script looks at the same thing again and again."""
+        """Returns whether time passes because the script keeps looking at the same thing."""
         if self._names is not None:
             return False
         look = (what, detail)

@@ -1,4 +1,4 @@
-"""The simulator as a script in lock-step sees it: time that it asks for, and messages that come with it."""
+"""The simulator of a script in lock-step: time on request, and the messages that come with it."""
 
 from __future__ import annotations
 
@@ -15,25 +15,19 @@ from ros_calls.service import ServiceClient, ServiceGone, ServiceHangs
 
 NODE = "/gazebo"
 SERVICE = f"{NODE}/advance_world"
-TIMEOUT = 30.0  # [s of wall time] for an answer; a call is at most `ScriptWorld.longest` ticks
+TIMEOUT = 30.0  # [s of wall time] for an answer; a call covers at most `ScriptWorld.longest` ticks
 LOOK = 0.2  # [s of wall time] between two looks for a simulator
 NANOSECONDS = 1_000_000_000
-CALLING = (
-    "ros_calls",
-    "rosgraph",
-    "rospy",
-    "socket",
-    "http",
-    "xmlrpc",
-)  # packages that a call runs
+# Packages whose code runs during a call
+CALLING = ("ros_calls", "rosgraph", "rospy", "socket", "http", "xmlrpc")
 
 
 class RunsByItself(Exception):
-    """A simulator is there whose time runs by itself; the text says what to do."""
+    """The simulator found isn't in lock-step; the text says what to do."""
 
 
 class WorldGone(Exception):
-    """The simulator has been ended; there may be another one later."""
+    """The simulator was ended; another one may come later."""
 
 
 class WorldFailed(Exception):
@@ -41,14 +35,14 @@ class WorldFailed(Exception):
 
 
 class ScriptWorld:
-    """One simulator at a time, found by itself; thread-safe."""
+    """Finds a simulator and talks to it, one at a time; thread-safe."""
 
     def __init__(self, seed: int | None = None) -> None:
-        """`seed` is for the random numbers of each simulator that is found."""
+        """`seed` seeds the random numbers of each simulator found; None leaves them."""
         self.now = 0  # [ns] simulated
         self.step = 1_000_000  # [ns]
         self.paused = False
-        self.topics_changed = 0  # counts, as the simulator says
+        self.topics_changed = 0  # the simulator's count of topic changes
         self.longest = 500  # ticks in one call
         self._guard = threading.RLock()
         self._call: ServiceClient | None = None
@@ -61,14 +55,14 @@ class ScriptWorld:
 
     @property
     def there(self) -> bool:
-        """Whether a simulator has been found, and hasn't ended since."""
+        """Whether a simulator was found and hasn't ended since."""
         return self._call is not None
 
     def look(self, at_once: bool = False) -> bool:
-        """Looks for a simulator, now and then, or `at_once`; returns whether there is one.
+        """Looks for a simulator, at most once per LOOK unless `at_once`; returns whether there is one.
 
         Raises:
-            RunsByItself: there is one that runs by itself.
+            RunsByItself: the simulator found isn't in lock-step.
         """
         if self._call is not None:
             return True
@@ -87,12 +81,12 @@ class ScriptWorld:
         return True
 
     def post(self, topic: str, data: bytes) -> None:
-        """Keeps a message for the simulator; it goes with the next call."""
+        """Keeps a message for the simulator until the next call."""
         with self._guard:
             self._pending.append(TopicMessage(topic, data))
 
     def switch(self, paused: bool) -> None:
-        """Pauses or unpauses; it goes with the next call, which is soon enough: no time passes before."""
+        """Pauses or unpauses physics with the next call; no time passes before that."""
         with self._guard:
             pause, unpause = AdvanceWorldRequest.PAUSE_PHYSICS, AdvanceWorldRequest.UNPAUSE_PHYSICS
             self._physics = pause if paused else unpause
@@ -100,7 +94,7 @@ class ScriptWorld:
 
     @property
     def has_post(self) -> bool:
-        """Whether anything for the simulator waits for the next call."""
+        """Whether a message or a switch waits for the next call."""
         return bool(self._pending) or self._physics != AdvanceWorldRequest.AS_IT_IS
 
     def advance(
@@ -112,13 +106,13 @@ class ScriptWorld:
         """Lets time pass, and exchanges messages.
 
         Args:
-            ticks: at most; no more than `longest` in one call.
-            until: topics; ends after the tick in which there was a message on one of them.
-            connect: topics that the script hears and that it publishes, to be connected first.
+            ticks: most physics steps to pass; one call does no more than `longest`.
+            until: topics; the call ends after the first tick with a message on one of them.
+            connect: topics that the script subscribes to, and that it publishes; connected first.
 
         Raises:
-            WorldGone: the simulator has been ended; then there is none until `look` finds one.
-            WorldFailed: it has died, or hangs.
+            WorldGone: the simulator was ended; there is none until `look` finds another.
+            WorldFailed: the simulator has died, or hangs.
         """
         request = AdvanceWorldRequest(
             node=rospy.get_name(), ticks=min(ticks, self.longest), until=list(until)
@@ -153,27 +147,27 @@ class ScriptWorld:
         return response
 
     def forget_mail(self, node: str) -> None:
-        """Has the simulator drop what it keeps for a node that has ended."""
+        """Makes the simulator drop the messages that it keeps for a node that has ended."""
         if self._call is not None:
             self._call(AdvanceWorldRequest(node=node))
 
     def forget(self) -> None:
-        """Gives the simulator up."""
+        """Closes the connection to the simulator."""
         with self._guard:
             if self._call is not None:
                 self._call.close()
             self._call = None
 
     def leave(self) -> None:
-        """Has a process that was forked from the script's live by the wall; the connection isn't its."""
+        """Detaches a forked child: it lives in wall time, and the connection stays the script's."""
         self._left = True
         self._call = None
-        self._guard = threading.RLock()  # which another thread may have held
+        self._guard = threading.RLock()  # another thread may have held the old one
         self._pending = []
 
 
 def _raised_elsewhere(fault: BaseException) -> BaseException | None:
-    """What a signal's handler raised in the middle of a call: a TimeoutError is a connection's, too."""
+    """Returns the OSError that a signal handler raised during a call; None if it is the connection's own."""
     cause: BaseException | None = fault
     while cause is not None:
         if isinstance(cause, OSError) and _raised_in(cause) not in CALLING:
@@ -183,7 +177,7 @@ def _raised_elsewhere(fault: BaseException) -> BaseException | None:
 
 
 def _raised_in(fault: BaseException) -> str:
-    """The name of the package in which something was raised."""
+    """Returns the name of the top-level package that raised an exception."""
     place = fault.__traceback__
     while place is not None and place.tb_next is not None:
         place = place.tb_next
@@ -192,10 +186,10 @@ def _raised_in(fault: BaseException) -> str:
 
 
 def is_running() -> bool:
-    """Whether a simulator in lock-step answers under the master.
+    """Returns whether a simulator in lock-step answers under the master.
 
     Raises:
-        RunsByItself: there is one that runs by itself.
+        RunsByItself: a simulator answers, but isn't in lock-step.
     """
     try:
         master.call("lookupService", SERVICE)
@@ -218,7 +212,7 @@ def is_running() -> bool:
 
 
 def _is_registered() -> bool:
-    """Whether the master knows of the service: of what ended by itself, or was ended, it doesn't."""
+    """Returns whether the service is still registered; a simulator that ended properly isn't."""
     try:
         master.call("lookupService", SERVICE)
     except (master.Refused, master.NoAnswer):
@@ -227,7 +221,7 @@ def _is_registered() -> bool:
 
 
 def _lives() -> bool:
-    """Whether the simulator's node answers: a killed one stays registered."""
+    """Returns whether the simulator's node answers; a killed one stays registered."""
     try:
         master.call_node(master.call("lookupNode", NODE), "getPid")
     except (master.Refused, master.NoAnswer):

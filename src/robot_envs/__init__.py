@@ -3,7 +3,7 @@
     from robot_envs import InitialState, Robot, RobotEnv, Task, register
 
 A `Robot` (robot.py) describes what it is made of, a `Task` (task.py) what is to be learned, a backend
-(backends/) moves it, and `RobotEnv` (environment.py) combines them. `register` gives that a Gymnasium id.
+(backends/) moves it, and `RobotEnv` (environment.py) combines them. `register` gives these a Gymnasium id.
 
 Importing this is cheap; a name's module is imported when the name is first used.
 """

@@ -41,7 +41,7 @@ def _discrete_reader(space: gymnasium.spaces.Discrete) -> Callable[[Any], int]:
         try:
             if first <= (index := operator.index(action)) < end:
                 return index
-        except TypeError:  # no whole number
+        except TypeError:  # not a whole number
             pass
         raise ValueError(f"an action is {expected}, not {action!r}")
 
@@ -107,7 +107,7 @@ def _array_reader(space: gymnasium.spaces.Box, task: str) -> Callable[[Any], np.
 
 
 def check_task(task: Any) -> None:
-    """Raises TaskError if something is no task, or if its objects or its query can't be used."""
+    """Raises TaskError if `task` is no `Task`, or if its objects or its query can't be used."""
     if isinstance(task, type) and issubclass(task, Task):
         raise TaskError(f"a task is an object, {task.__name__}(...), and not the class")
     if not isinstance(task, Task):
@@ -141,7 +141,7 @@ def made_space(task: Task, method: str) -> gymnasium.Space[Any]:
 
 
 def checked_number(task: Task, method: str, given: Any) -> float:
-    """A finite number that a method has returned; raises TaskError for anything else."""
+    """Returns the finite number that a method has returned; raises TaskError for anything else."""
     try:
         found = float(given)
     except (TypeError, ValueError):
@@ -152,21 +152,21 @@ def checked_number(task: Task, method: str, given: Any) -> float:
 
 
 def checked_flag(task: Task, method: str, given: Any) -> bool:
-    """True or False, as a method has returned it; raises TaskError for anything else."""
+    """Returns the bool that a method has returned; raises TaskError for anything else."""
     if not isinstance(given, (bool, np.bool_)):
         raise _wrong(task, method, given, "True or False")
     return bool(given)
 
 
 def checked_info(task: Task, given: Any) -> dict[str, Any]:
-    """The dict that `info` has returned; raises TaskError for anything else."""
+    """Returns the dict that `info` has returned; raises TaskError for anything else."""
     if not isinstance(given, dict):
         raise _wrong(task, "info", given, "a dict")
     return given
 
 
 def short(given: Any) -> str:
-    """Python's representation in a line or two."""
+    """Returns Python's representation, cut to a line or two."""
     return textwrap.shorten(repr(given), 160, placeholder=" ...")
 
 
@@ -177,7 +177,7 @@ def _wrong(task: Task, method: str, given: Any, wanted: str) -> TaskError:
 
 
 def goal_space(task: GoalTask, observations: gymnasium.Space[Any]) -> gymnasium.spaces.Dict:
-    """The observation space of a goal environment; raises TaskError unless the goals are a Box."""
+    """Returns the observation space of a goal environment; raises TaskError unless the goals are a Box."""
     achieved, desired = made_space(task, "goals"), made_space(task, "goals")
     if not isinstance(achieved, gymnasium.spaces.Box):
         raise _wrong(task, "goals", achieved, "a gymnasium.spaces.Box")
@@ -193,7 +193,7 @@ def set_goal(task: GoalTask, state: WorldState, rng: np.random.Generator, goal: 
         task: the task.
         state: in which the episode begins.
         rng: of the environment. A goal is always drawn, so that later draws don't depend on `goal`.
-        goal: replaces the one that the task draws; None: doesn't.
+        goal: replaces the one that the task draws; None: keeps that one.
 
     Raises:
         TaskError: if the goal isn't in the task's space of goals.
@@ -203,7 +203,7 @@ def set_goal(task: GoalTask, state: WorldState, rng: np.random.Generator, goal: 
 
 
 def checked_goal(task: GoalTask, given: Any) -> np.ndarray:
-    """A goal in the form of the task's space of goals; raises TaskError if it isn't in it."""
+    """Returns a goal in the form of the task's space of goals; raises TaskError if it isn't in it."""
     space = task.goals()
     try:
         goal = np.asarray(given, space.dtype)
@@ -215,7 +215,7 @@ def checked_goal(task: GoalTask, given: Any) -> np.ndarray:
 
 
 def with_goals(task: GoalTask, observation: Any, state: WorldState) -> dict[str, Any]:
-    """The observation of a goal environment.
+    """Returns the observation of a goal environment.
 
     Args:
         task: with the episode's goal.

@@ -36,7 +36,7 @@ class CommandPort(NamedTuple):
         return self.quantity == QUANTITIES[0]
 
     def at_start(self, positions: Mapping[str, float]) -> float | tuple[float, ...]:
-        """What it holds when an episode starts: the joints' positions, or zeros."""
+        """Returns what it holds when an episode starts: the joints' positions, or zeros."""
         values = tuple(positions[joint] if self.holds else 0.0 for joint in self.joints)
         return values[0] if self.single else values
 
@@ -70,7 +70,7 @@ def _load_one(manager: ControllerManager, name: str, parameters: Mapping[str, An
 def ports(
     commanded: Sequence[str] | None, parameters: Mapping[str, Any], loaded: Loaded
 ) -> list[CommandPort]:
-    """The ports of the controllers that a task commands.
+    """Returns the ports of the controllers that a task commands.
 
     Args:
         commanded: their names, in order; None: all that take numbers.
@@ -150,7 +150,7 @@ def faults(
 def _unknown_joints(
     name: str, described: Any, hardware: RobotHardware, movable: Sequence[str]
 ) -> Iterator[str]:
-    """A line for each joint of a controller that it can't have."""
+    """Yields a line for each joint of a controller that it can't have."""
     if not isinstance(described, Mapping):
         return
     listed = described.get("joints", described.get("joint", []))

@@ -282,7 +282,7 @@ class RobotEnv(DrawnEnv):
         return _Step(self._steps + 1, action, self._actuator(sent), sent)
 
     def _taken(self, action: Any) -> _Step:
-        """The step that was begun with this action, or else a new one."""
+        """Returns the step that was begun with this action, or else a new one."""
         begun = self._begun
         if begun is None:
             return self._prepared(action)

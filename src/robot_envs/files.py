@@ -61,12 +61,12 @@ def resources() -> Resources:
 
 
 def is_text(source: Source) -> bool:
-    """Whether a source is a text."""
+    """Returns whether a source is a text."""
     return isinstance(source, str) and source.lstrip().startswith("<")
 
 
 def locate(source: Source) -> Path:
-    """The path of a file, which need not exist.
+    """Returns the path of a file, which need not exist.
 
     Raises:
         RobotEnvError: if its package isn't found, or it names no file.
@@ -91,7 +91,7 @@ def locate(source: Source) -> Path:
 
 
 def read_text(source: Source) -> str:
-    """The text of a file, or the text itself; raises RobotEnvError if it can't be read."""
+    """Returns the text of a file, or the text itself; raises RobotEnvError if it can't be read."""
     if is_text(source):
         return str(source)
     return _read(locate(source)).decode(errors="surrogateescape")
@@ -119,7 +119,7 @@ def need_file(path: Path) -> None:
 
 
 def read_urdf(source: Source, arguments: Mapping[str, str]) -> str:
-    """The URDF in a file, which is expanded if it is xacro, or the text itself.
+    """Returns the URDF in a file, which is expanded if it is xacro, or the text itself.
 
     Args:
         source: the file or the text, which isn't expanded.
@@ -144,7 +144,7 @@ def _expanded(path: Path, arguments: tuple[tuple[str, str], ...]) -> str:
 
 
 def read_parameters(source: Source) -> dict[str, Any]:
-    """The parameters in a YAML file, or in a text of several lines; raises RobotEnvError if that fails."""
+    """Returns the parameters in a YAML file or a text of several lines; raises RobotEnvError otherwise."""
     if isinstance(source, str) and "\n" in source:
         return _parameters(source.encode(), "the controllers' text")
     return _parameters_of(locate(source))
@@ -167,7 +167,7 @@ def _parameters(data: bytes, name: str) -> dict[str, Any]:
 
 
 def _rospkg_path(package: str) -> Path | None:
-    """A package's folder as rospkg finds it; None if it doesn't, or rospkg isn't installed."""
+    """Returns a package's folder as rospkg finds it, or None without rospkg or the package."""
     if not importlib.util.find_spec("rospkg"):
         return None
     import rospkg

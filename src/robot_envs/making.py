@@ -65,7 +65,7 @@ def _robots(name: str) -> Any:
 
 
 def _takes_nothing(found: Any) -> bool:
-    """Whether it is a function that can be called without arguments."""
+    """Returns whether it is a function that can be called without arguments."""
     if not callable(found):
         return False
     try:
@@ -93,7 +93,7 @@ def check_options(given: Iterable[str], known: Iterable[str] = ()) -> None:
 
 
 def option_names(make: Callable[..., Any]) -> list[str]:
-    """Names of the keyword arguments of a class or function, without a robot and a task."""
+    """Returns the names of the keyword arguments of a class or function, without a robot and a task."""
     parameters = inspect.signature(make).parameters.values()
     return [
         each.name for each in parameters if each.kind != each.VAR_KEYWORD and each.name not in NAMED

@@ -170,7 +170,7 @@ class Robot:
             )
 
     def _world_faults(self) -> Iterator[str]:
-        """What is wrong with control period, world and namespace."""
+        """Yields what is wrong with control period, world and namespace."""
         if not 0.0 < self.control_period < math.inf:
             yield f"control_period must be a time above 0 [s], not {self.control_period}"
         if self.world is not None and self.world != EMPTY and not files.is_text(self.world):
@@ -218,7 +218,7 @@ class Robot:
 
 
 def unfit_pose(pose: Any) -> str:
-    """Why a model can't be at a pose; empty if it can."""
+    """Returns why a model can't be at a pose; empty if it can."""
     if not isinstance(pose, Pose):
         return f"is a Pose((x, y, z)), not {pose!r}"
     numbers = (*pose.position, *pose.orientation)

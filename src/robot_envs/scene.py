@@ -47,11 +47,11 @@ class Scene:
         self.several = len(self.robots) > 1
 
     def joint(self, robot: Robot, name: str) -> str:
-        """The name of a joint in a state."""
+        """Returns the name of a joint in a state."""
         return f"{robot.model}::{name}" if self.several else name
 
     def controller(self, robot: Robot, name: str) -> str:
-        """The name of a controller in commands."""
+        """Returns the name of a controller in commands."""
         return f"/{robot.namespace.strip('/')}/{name}" if self.several else name
 
     @cached_property
@@ -78,7 +78,7 @@ class Scene:
         }
 
     def starting_commands(self, joints: Mapping[str, JointState]) -> dict[str, Any]:
-        """What the controllers hold when an episode starts with these joints."""
+        """Returns what the controllers hold when an episode starts with these joints."""
         positions = {name: state.position for name, state in joints.items()}
         found = {}
         for name, (robot, port) in self.ports.items():
@@ -121,7 +121,7 @@ class Scene:
         return found[1]
 
     def placed_joints(self, initial: InitialState) -> Placed:
-        """Position and velocity of all movable joints; raises TaskError for an unknown or wrong one."""
+        """Returns all movable joints' position and velocity; raises TaskError for an unknown or wrong one."""
         if not isinstance(initial, InitialState):
             raise TaskError(f"an episode begins with an InitialState(...), not {initial!r}")
         found: Placed = dict.fromkeys(self.moved, (0.0, 0.0))
@@ -133,7 +133,7 @@ class Scene:
         return found
 
     def placed_models(self, initial: InitialState) -> dict[str, Motion]:
-        """The models to place; raises TaskError for an impossible pose."""
+        """Returns the models to place; raises TaskError for an impossible pose."""
         found = {}
         for name, at in initial.models.items():
             placed = found[name] = at if isinstance(at, Motion) else Motion(at)
@@ -143,7 +143,7 @@ class Scene:
         return found
 
     def stand(self, initial: InitialState, robot: Robot) -> Pose:
-        """The pose of a robot's model when an episode begins."""
+        """Returns the pose of a robot's model when an episode begins."""
         return self.placed_models(initial).get(robot.model, Motion(robot.pose)).pose
 
 

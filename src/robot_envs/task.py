@@ -76,18 +76,18 @@ class Task(ABC):
 
     @abstractmethod
     def observe(self, state: WorldState) -> Any:
-        """The observation of a state, in the observation space's shape."""
+        """Returns the observation of a state, in the observation space's shape."""
 
     @abstractmethod
     def reward(self, state: WorldState, action: Any) -> float:
-        """The reward for reaching a state by an action."""
+        """Returns the reward for reaching a state by an action."""
 
     def is_terminal(self, state: WorldState) -> bool:
-        """Whether the state terminates the episode; by default none does."""
+        """Returns whether the state terminates the episode; by default none does."""
         return False
 
     def info(self, state: WorldState) -> dict[str, Any]:
-        """The info dict of a state."""
+        """Returns the info dict of a state."""
         return {}
 
 
@@ -111,14 +111,14 @@ class GoalTask(Task):
 
     @abstractmethod
     def achieved(self, state: WorldState) -> np.ndarray:
-        """The goal that a state achieves."""
+        """Returns the goal that a state achieves."""
 
     @abstractmethod
     def is_success(self, achieved: np.ndarray, desired: np.ndarray) -> Any:
-        """Whether goals are reached: bool of shape (...) from goals of shape (..., n)."""
+        """Returns whether goals are reached: bool of shape (...) from goals of shape (..., n)."""
 
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> Any:
-        """The reward for achieving one goal when another one is desired: shape (...) from goals (..., n).
+        """Returns the rewards, of shape (...), for achieving one goal when another is desired (..., n).
 
         By default 0 for a success, and -1 otherwise.
         """
@@ -133,5 +133,5 @@ class GoalTask(Task):
         return {"is_success": bool(self.is_success(self._reached(state), self.desired))}
 
     def _reached(self, state: WorldState) -> np.ndarray:
-        # In the observation's type, so that a reward that is computed from it is the same.
+        # In the observation's type, so that a reward computed from either is the same.
         return np.asarray(self.achieved(state), self.desired.dtype)

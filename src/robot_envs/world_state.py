@@ -45,7 +45,7 @@ class Motion(NamedTuple):
     twist: Twist = AT_REST
 
     def seen_from(self, frame: "Motion") -> "Motion":
-        """The same, seen from the frame of another motion, both given in one frame.
+        """Returns the same, seen from the frame of another motion, both given in one frame.
 
         Velocities are differences in the other's axes; its rotation adds nothing.
         """
@@ -131,7 +131,7 @@ class InitialState:
 
 
 def link_keys(query: StateQuery) -> list[str]:
-    """The names of a query's links in `WorldState.links`; raises ValueError for one that is there twice."""
+    """Returns a query's names in `WorldState.links`; raises ValueError for one that is there twice."""
     names = [each.link for each in query.links]
     for name in names:
         if names.count(name) > 1:

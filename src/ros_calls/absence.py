@@ -1,4 +1,4 @@
-"""Why nobody offers a service, in words that say what to start."""
+"""Explains why nobody offers a service, and names what to start."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ OF_A_WORLD = (
 
 
 def is_offered(service: str) -> bool:
-    """Whether the master knows somebody who offers the service of that full name, be it a dead node.
+    """Returns whether a node, dead or alive, is registered for the service of that full name.
 
     Raises:
-        NoAnswer: the master doesn't.
+        NoAnswer: the master doesn't answer.
     """
     try:
         master.call("lookupService", service)
@@ -37,13 +37,13 @@ def is_offered(service: str) -> bool:
 
 
 def why_absent(service: str) -> str:
-    """What is missing, and the command that mends it.
+    """Returns what is missing, and the command that fixes it.
 
     Args:
         service: the full name of a service that nobody offers.
 
     Raises:
-        NoAnswer: from the master.
+        NoAnswer: the master doesn't answer.
     """
     parent, _, name = service.rpartition("/")
     above, _, last = parent.rpartition("/")
@@ -62,7 +62,7 @@ def why_absent(service: str) -> str:
 
 
 def why_not_up(service: str) -> str:
-    """The same of a service that was waited for: its node may be there and not answer."""
+    """As `why_absent`, for a service that didn't come up: its node may be registered but not answer."""
     try:
         return "its node doesn't answer" if is_offered(service) else why_absent(service)
     except NoAnswer as fault:

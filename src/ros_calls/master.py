@@ -1,7 +1,7 @@
 """Calls of the ROS master and of nodes, with a time limit.
 
-rospy's own XML-RPC proxies have none: behind a dead network they hang their callers for minutes. rospy knows
-one master for each process; here each thread may turn to another one for a while.
+rospy's own XML-RPC proxies have none: on a dead network they block for minutes. rospy also knows one master
+per process; here each thread can switch to another one for a while.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from xml.parsers.expat import ExpatError
 
 import rosgraph
 
-CALLER = "/ros_calls"  # whom a master or node notes; nothing depends on it
-TIMEOUT = 2.0  # [s] for one question to a master or node; a live one answers in milliseconds
+CALLER = "/ros_calls"  # caller name for the other side's records; nothing depends on it
+TIMEOUT = 2.0  # [s] for one call of a master or node; a live one answers in milliseconds
 
 _chosen: ContextVar[str | None] = ContextVar("ros_master", default=None)
 
@@ -33,11 +33,11 @@ class NobodyListens(NoAnswer):
 
 
 class BadAnswer(NoAnswer):
-    """Somebody answers, but not in ROS's way, or doesn't know the method."""
+    """The answer doesn't follow ROS's protocol, or the method is unknown."""
 
 
 class Refused(Exception):
-    """The other side answered, and its answer is no."""
+    """The other side answered with an error."""
 
 
 class _Transport(xmlrpc.client.Transport):
@@ -54,21 +54,18 @@ class _Transport(xmlrpc.client.Transport):
 
 
 def call_node(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> Any:
-    """Calls a method of a master or node, which want the caller's name as first argument.
-
-    See `call_plain`.
-    """
+    """As `call_plain`, with the caller's name in front, which masters and nodes expect."""
     return call_plain(uri, method, CALLER, *args, timeout=timeout)
 
 
 def call_plain(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> Any:
-    """Calls a method of something that answers in ROS's way, ``[code, text, value]``.
+    """Calls an XML-RPC method that answers in ROS's form, ``[code, text, value]``.
 
     Args:
         uri: its ``http://`` address.
         method: the method's name.
         args: all of its arguments.
-        timeout: wall time [s] that connecting, sending and each part of the answer may take.
+        timeout: limit for connecting, for sending and for each part of the answer [s of wall time].
 
     Returns:
         The value.
@@ -100,19 +97,18 @@ def call_plain(uri: str, method: str, *args: Any, timeout: float = TIMEOUT) -> A
 
 
 class MasterDown(Exception):
-    """No ROS master can be used; the text says where it was looked for and what to do."""
+    """No ROS master can be used; the text gives its address and what to do."""
 
     port_is_free = False  # nobody listens there, so a master could be started
 
 
 def uri() -> str:
-    """The master's address: the block's, or ``__master:=`` of the command line, or
-    ROS_MASTER_URI."""
+    """Returns the master's address: from `using`, else ``__master:=``, else ROS_MASTER_URI."""
     return _chosen.get() or str(rosgraph.get_master_uri())
 
 
 class _Chosen:
-    """A block; a class, because each step over ROS has one, and a generator takes three times as long."""
+    """The block of `using`; a class because a generator takes three times as long, and each step has one."""
 
     __slots__ = ("_token", "_uri")
 
@@ -127,15 +123,15 @@ class _Chosen:
 
 
 def using(master_uri: str | None) -> contextlib.AbstractContextManager[None]:
-    """Within the block, in this thread, calls go to another master; None changes nothing.
+    """Returns a block in which this thread's calls go to another master; None changes nothing.
 
-    The environment stays as it is, so nothing else in the process notices.
+    The environment stays unchanged, so the rest of the process is unaffected.
     """
     return contextlib.nullcontext() if master_uri is None else _Chosen(master_uri)
 
 
 def call(method: str, *args: Any, timeout: float = TIMEOUT) -> Any:
-    """Calls a method of the master. See `call_plain` for what it raises."""
+    """Calls a method of the master; raises as `call_plain`."""
     return call_node(uri(), method, *args, timeout=timeout)
 
 
@@ -143,7 +139,7 @@ def require(timeout: float = TIMEOUT) -> None:
     """Returns if the master answers within `timeout` [s].
 
     Raises:
-        MasterDown: it doesn't, with the reason.
+        MasterDown: the master doesn't answer; the text says why.
     """
     host_and_port()
     try:
@@ -158,11 +154,11 @@ def require(timeout: float = TIMEOUT) -> None:
 
 
 def is_up_or_startable() -> bool:
-    """True if the master answers, False if there is none but one can be started at its address.
+    """Returns True if the master answers, False if none does but one can be started there.
 
     Raises:
-        MasterDown: the address is on another machine that doesn't answer, or something else holds
-            the port. (roslaunch itself would wait for minutes.)
+        MasterDown: another machine doesn't answer, or another program holds the port. (roslaunch
+            itself would wait for minutes.)
     """
     try:
         require()
@@ -179,7 +175,7 @@ def is_up_or_startable() -> bool:
 
 
 def is_up() -> bool:
-    """True if the master answers."""
+    """Returns True if the master answers."""
     try:
         require()
     except MasterDown:
@@ -188,10 +184,10 @@ def is_up() -> bool:
 
 
 def host_and_port() -> tuple[str, int]:
-    """Host and port of the master.
+    """Returns host and port of the master.
 
     Raises:
-        MasterDown: ROS_MASTER_URI is no address.
+        MasterDown: ROS_MASTER_URI isn't an address.
     """
     try:
         parts = urlsplit(uri())
@@ -206,13 +202,13 @@ def host_and_port() -> tuple[str, int]:
 
 
 def is_local() -> bool:
-    """True if the master's host is this machine."""
+    """Returns True if the master's host is this machine."""
     return host_is_local(host_and_port()[0])
 
 
-@functools.cache  # may ask a name server
+@functools.cache  # the look-up may ask a name server
 def host_is_local(host: str) -> bool:
-    """True if the host is this machine, by whatever name."""
+    """Returns True if any name of this machine matches the host."""
     return (
         host == "localhost"
         or host.startswith("127.")
@@ -221,7 +217,7 @@ def host_is_local(host: str) -> bool:
 
 
 def is_at(address: str) -> bool:
-    """True if an address of a master means the present one, whatever name of its host is used."""
+    """Returns True if an address is the current master's, under any name of its host."""
     host, port = host_and_port()
     try:
         parts = urlsplit(address)
@@ -242,14 +238,14 @@ def _same_machine(one: str, other: str) -> bool:
 
 
 def living_address(name: str, timeout: float = TIMEOUT) -> str | None:
-    """The XML-RPC address of the node of that full name; None if there is none that answers.
+    """Returns the XML-RPC address of a node, or None if no such node answers.
 
     Args:
-        name: the node's.
-        timeout: bound of each question [s]. Where a node was killed, nobody listens, which takes no time.
+        name: the node's full name.
+        timeout: limit for each call [s]. A killed node's port refuses at once.
 
     Raises:
-        NoAnswer: the master doesn't.
+        NoAnswer: the master doesn't answer.
     """
     try:
         address = str(call("lookupNode", name))
@@ -257,7 +253,7 @@ def living_address(name: str, timeout: float = TIMEOUT) -> str | None:
         return None
     if _answer(address, "getPid", timeout) is None:
         return None
-    # A dead node's port may have been given to another one, even to one of that name at another master.
+    # Another node may have a dead node's port by now, even one of the same name at another master.
     theirs = _answer(address, "getMasterUri", timeout)
     if _answer(address, "getName", timeout) not in (None, name):
         return None
@@ -265,7 +261,7 @@ def living_address(name: str, timeout: float = TIMEOUT) -> str | None:
 
 
 def _answer(address: str, question: str, timeout: float) -> Any:
-    """A node's answer; None if it has none, as roscpp's have for all but getPid."""
+    """Returns a node's answer, or None; roscpp nodes answer only getPid."""
     try:
         return call_node(address, question, timeout=timeout)
     except (NoAnswer, Refused):

@@ -1,7 +1,7 @@
-"""The packages of requirements/base.txt that a program needs, and the command that installs them.
+"""Checks for the packages of requirements/base.txt, and names the command that installs missing ones.
 
-Programs call it before they import anything else: in a user's own catkin workspace, rosdep and `catkin_make`
-don't install what only pip has.
+Programs call it before any other import: in a user's own catkin workspace, rosdep and `catkin_make` don't
+install packages that only pip has.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 FILE = "requirements/base.txt"
 PAGE = "docs/catkin.md"
 
-# What the simulator runs on, PyBullet's engine with meshes of all kinds; its window; and all programs.
+# For the simulator (PyBullet, meshes of all kinds), for its window, and for all programs.
 SIMULATOR = ("collada", "numpy", "pybullet", "scipy", "trimesh", "xacro", "yaml")
 WINDOW = (*SIMULATOR, "PIL", "viser", "websockets")
 ALL = (
@@ -32,10 +32,10 @@ ALL = (
 
 
 def require(modules: tuple[str, ...]) -> None:
-    """Ends the program, with one line that says how to install what is missing.
+    """Ends the program if modules are missing, with one line that says how to install them.
 
     Raises:
-        SystemExit: if one of the modules is missing.
+        SystemExit: a module is missing.
     """
     text = lack(modules)
     if text:
@@ -43,7 +43,7 @@ def require(modules: tuple[str, ...]) -> None:
 
 
 def lack(modules: tuple[str, ...]) -> str:
-    """Returns one line that names the missing modules and what installs them; empty if none is missing."""
+    """Returns a line with the missing modules and the install command; empty if none is missing."""
     missing = [name for name in modules if importlib.util.find_spec(name) is None]
     if not missing:
         return ""
@@ -60,7 +60,7 @@ def lack(modules: tuple[str, ...]) -> str:
 
 
 def _is_managed() -> bool:
-    """Returns whether pip refuses to install beside the system's packages (PEP 668)."""
+    """Returns whether pip refuses to install into the system's Python (PEP 668)."""
     return (
         sys.prefix == sys.base_prefix
         and Path(sysconfig.get_path("stdlib"), "EXTERNALLY-MANAGED").exists()
@@ -68,7 +68,7 @@ def _is_managed() -> bool:
 
 
 def _file() -> Path:
-    """Returns the list of packages: in the source tree, or where catkin has installed it."""
+    """Returns the path of the package list, in the source tree or where catkin installed it."""
     here = Path(__file__).resolve()
     for above in here.parents:
         for place in (above / FILE, above / "share/cartpole" / FILE):

@@ -1,6 +1,6 @@
-"""A client for one service: a time limit on every call, and a connection that is renewed when it broke.
+"""A client for one service that limits the time of every call and renews a broken connection.
 
-rospy's proxies have no time limit, keep a dead connection, and ask the process's own master even if they
+rospy's proxies have no time limit, keep a dead connection, and ask the process's own master even when they
 know the address.
 """
 
@@ -26,8 +26,8 @@ TIMEOUT = 5.0  # [s] of wall time
 CHUNK = 65536  # [bytes]
 HEAD = struct.Struct("<BI")  # of an answer: whether the call succeeded, and its length
 LENGTH = struct.Struct("<I")
-CONNECTING = 10.0  # [s]; how long a call without a time limit may take to connect or to send
-LOOK = 0.1  # [s]; how often such a call looks whether the node has been shut down
+CONNECTING = 10.0  # [s] to connect or to send, for a call without a time limit
+LOOK = 0.1  # [s] between two checks of such a call for the node's shutdown
 
 
 class ServiceFailed(Exception):
@@ -39,28 +39,28 @@ class ServiceGone(ServiceFailed):
 
 
 class ServiceMissing(ServiceGone):
-    """The service was waited for, and didn't come."""
+    """The service didn't come up in time."""
 
 
 class ServiceHangs(ServiceFailed):
-    """The node is there, but gave no answer in time."""
+    """The node is registered, but didn't answer in time."""
 
 
 class ServiceClient:
     """Calls one service. Not thread-safe.
 
-    A call is `begin` and `end`: several services do their work at the same time if all are begun before
-    the first one is ended.
+    A call is `begin` and `end`: several services work in parallel if all calls begin before the first
+    one ends.
 
-    rospy's ServiceProxy waits for ever on a node that hangs, and a persistent one keeps a connection to
-    a node that has ended. This one does neither: after a failure the next call connects anew.
+    rospy's ServiceProxy waits for ever for a node that hangs, and a persistent one keeps the connection
+    to a node that has ended. This client does neither: after a failure the next call reconnects.
 
     Args:
         name: the service's name, global or relative to the node's namespace.
-        kind: its generated class.
-        persistent: keep the connection between calls; several times as fast.
-        timeout: wall time [s] that connecting and an answer may take; with infinity a call waits until
-            the caller's node is shut down. The attribute may be changed.
+        kind: the service's generated class.
+        persistent: keep the connection between calls, which is several times as fast.
+        timeout: limit for connecting and for an answer [s of wall time]; with infinity a call waits
+            until the caller's node shuts down. The attribute may be changed.
     """
 
     def __init__(
@@ -75,22 +75,22 @@ class ServiceClient:
         self._persistent = persistent
         self.timeout = timeout
         self._connection: Connection | None = None
-        self._begun = False  # whether an answer is still to be taken
+        self._begun = False  # whether an answer is outstanding
 
     def __call__(self, *request: Any) -> Any:
         """Calls the service with a request, or with its fields in order, and returns the response.
 
         Raises:
-            ServiceGone: not offered, or the connection broke; whether the call was carried out is
-                then not known.
+            ServiceGone: nobody offers the service, or the connection broke; the call may or may not
+                have been carried out.
             ServiceHangs: no answer in time.
-            ServiceFailed: the service refused, or the request can't be sent.
+            ServiceFailed: the service reported a failure, or the request can't be sent.
         """
         self._refuse_if_begun()
         try:
             self.begin(*request)
             return self.end()
-        except BaseException:  # also of a signal's handler, at any place
+        except BaseException:  # a signal handler may raise anywhere
             self.close()
             raise
 
@@ -99,7 +99,7 @@ class ServiceClient:
 
         Raises:
             ServiceFailed: as for a call.
-            RuntimeError: if a call was begun, and not ended.
+            RuntimeError: a call was begun and not ended.
         """
         self._refuse_if_begun()
         try:
@@ -113,11 +113,11 @@ class ServiceClient:
                 self.close()
 
     def end(self) -> Any:
-        """Waits for the response to what was begun; the time limit begins anew.
+        """Waits for the response to `begin` and returns it; the time limit starts anew.
 
         Raises:
             ServiceFailed: as for a call.
-            RuntimeError: if no call was begun, or `close` was called since.
+            RuntimeError: no call was begun, or `close` was called since.
         """
         if not self._begun or self._connection is None:
             raise RuntimeError(f"{self.name}: end() without begin()")
@@ -147,9 +147,9 @@ class ServiceClient:
         return ServiceFailed(f"{self.name}: {fault}")
 
     def call_idempotent(self, *request: Any) -> Any:
-        """As a call, and calls once more if the kept connection was to a node that has ended.
+        """Calls the service, a second time if a kept connection's node has ended.
 
-        For requests that may be carried out twice.
+        Only for requests that may be carried out twice.
         """
         if self._connection is not None:
             try:
@@ -176,7 +176,7 @@ class ServiceClient:
             ) from fault
 
     def close(self) -> None:
-        """Gives the connection up, and what was begun; the next call makes a new one."""
+        """Closes the connection and drops a begun call; the next call reconnects."""
         self._begun = False
         if self._connection is not None:
             self._connection.close()
@@ -194,14 +194,14 @@ class ConnectionEnded(CallFailed):
 class Connection:
     """A lasting connection to one service. Not thread-safe.
 
-    Time limits are wall time [s]; infinity means: until the caller's node is shut down.
+    Time limits are wall time [s]; infinity means until the caller's node shuts down.
     """
 
     def __init__(self, address: str, name: str, kind: Any, timeout: float) -> None:
         """Connects to the service at a ``rosrpc://`` address.
 
         Raises:
-            CallFailed: no connection, or another type of service.
+            CallFailed: the connection failed, or the service has another type.
             TimeoutError: no answer in time.
         """
         self._kind = kind
@@ -236,11 +236,11 @@ class Connection:
             raise CallFailed(answer["error"])
 
     def send(self, message: genpy.Message, timeout: float) -> None:
-        """Sends a request, whose answer `receive` must take before another one is sent.
+        """Sends a request; `receive` must take its answer before the next one.
 
         Raises:
-            CallFailed: it can't be sent; ConnectionEnded: there is no connection any more.
-            TimeoutError: it isn't taken in time; the connection is of no use afterwards.
+            CallFailed: the request can't be sent; ConnectionEnded: the connection broke.
+            TimeoutError: sending took too long; the connection can't be used afterwards.
         """
         payload = _serialized(message)
         try:
@@ -250,11 +250,11 @@ class Connection:
             raise _told(fault) from fault
 
     def receive(self, timeout: float) -> Any:
-        """Returns the response to the request that was sent; its time limit begins now.
+        """Returns the response to the last request; the time limit starts now.
 
         Raises:
-            CallFailed: the service failed; ConnectionEnded: there is no connection any more.
-            TimeoutError: no answer in time; the connection is of no use afterwards.
+            CallFailed: the service failed; ConnectionEnded: the connection broke.
+            TimeoutError: no answer in time; the connection can't be used afterwards.
         """
         deadline = time.monotonic() + timeout
         try:
@@ -275,7 +275,7 @@ class Connection:
         return response
 
     def _set_timeout(self, timeout: float) -> None:
-        """Lets the kernel see to the time limit: Python's own costs a system call more for each wait."""
+        """Sets the kernel's time limit on the socket: Python's costs one more system call per wait."""
         if timeout == self._kernels_timeout:
             return
         limit = struct.pack("@ll", int(timeout), int(timeout % 1.0 * 1e6))
@@ -285,7 +285,7 @@ class Connection:
         self._kernels_timeout = timeout
 
     def _receive(self, deadline: float) -> tuple[bool, bytes]:
-        """Reads one answer; most come in one piece, for which the kernel's time limit is enough."""
+        """Reads one answer; for one in a single piece, as most are, the kernel's time limit is enough."""
         data = self._part()
         while len(data) < HEAD.size:
             self._await_data(deadline)
@@ -306,10 +306,10 @@ class Connection:
         return part
 
     def _await_data(self, deadline: float) -> None:
-        """Returns once there is something to read, be it the end.
+        """Returns once there is data, or the end, to read.
 
         Raises:
-            TimeoutError: the deadline has passed, or it is infinity and the node is shut down.
+            TimeoutError: the deadline has passed, or it is infinity and the node has shut down.
         """
         poll = select.poll()
         poll.register(self._socket, select.POLLIN)
@@ -320,15 +320,15 @@ class Connection:
                 raise TimeoutError
 
     def close(self) -> None:
-        """Ends the connection."""
+        """Closes the connection."""
         self._socket.close()
 
 
 def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
-    """The request, given as such or by its fields in order.
+    """Returns the request message, given as such or by its fields in order.
 
     Raises:
-        CallFailed: if the fields are not the request's.
+        CallFailed: the fields don't fit the request.
     """
     if len(request) == 1 and isinstance(request[0], kind._request_class):
         return request[0]
@@ -339,7 +339,7 @@ def request_message(kind: Any, request: tuple[Any, ...]) -> genpy.Message:
 
 
 def _told(fault: OSError) -> Exception:
-    """What a fault of the socket is: the kernel's time limit is told as BlockingIOError."""
+    """Returns the exception for a socket's fault; the kernel reports its time limit as BlockingIOError."""
     if isinstance(fault, BlockingIOError | TimeoutError):
         return TimeoutError()
     return ConnectionEnded(str(fault))
@@ -350,7 +350,7 @@ def _finite(timeout: float) -> float:
 
 
 def _serialized(message: genpy.Message) -> bytes:
-    """The request with its length in front."""
+    """Returns the request's bytes, with their length in front."""
     buffer = io.BytesIO()
     buffer.seek(LENGTH.size)
     try:

@@ -1,4 +1,4 @@
-"""Waits with a bound, in wall time: simulated time may stand still, run fast or go back."""
+"""Bounded waits in wall time, because simulated time may stand still, run fast or go back."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ros_calls.absence import why_not_up
 from ros_calls.master import CALLER, NoAnswer, Refused
 from ros_calls.service import ServiceClient, ServiceFailed, ServiceMissing
 
-POLL = 0.05  # [s] between two looks at something that is being waited for
+POLL = 0.05  # [s] between two looks
 TIMEOUT = 30.0  # [s] for a service to come up
 CONNECTING = 1.0  # [s] for a node to accept a connection
 
@@ -23,18 +23,18 @@ Found = TypeVar("Found")
 
 
 def wait_until(look: Callable[[], Found], timeout: float, what: str) -> Found:
-    """Looks again and again until there is what is waited for.
+    """Calls `look` until it returns something true, and returns that.
 
     Args:
-        look: returns something true once it is there; always asked at least once.
-        timeout: bound of the wait [s], or infinity. The last look may go beyond it.
-        what: for the text of an interrupt.
+        look: returns something true once the wait is over; called at least once.
+        timeout: limit of the wait [s], or infinity; the last look may exceed it.
+        what: what is awaited, for the text of an interrupt.
 
     Returns:
-        What the last look returned; false if the time is over.
+        The last look's result; false after a timeout.
 
     Raises:
-        rospy.ROSInterruptException: the node was shut down meanwhile.
+        rospy.ROSInterruptException: the node shut down meanwhile.
     """
     deadline = time.monotonic() + timeout
     while not (found := look()):
@@ -47,10 +47,7 @@ def wait_until(look: Callable[[], Found], timeout: float, what: str) -> Found:
 
 
 def service_answers(name: str) -> bool:
-    """True if the service of that full name is offered and its node accepts connections.
-
-    The service isn't called.
-    """
+    """Returns True if a service, by its full name, is offered and its node accepts connections; no call."""
     try:
         address = rospy.core.parse_rosrpc_uri(master.call("lookupService", name))
         with socket.create_connection(address, CONNECTING) as connection:
@@ -72,25 +69,25 @@ def service_comes_up(name: str, timeout: float) -> bool:
         False if it doesn't in time.
 
     Raises:
-        rospy.ROSInterruptException: the node was shut down meanwhile.
+        rospy.ROSInterruptException: the node shut down meanwhile.
     """
     resolved = str(rospy.resolve_name(name))
     return wait_until(lambda: service_answers(resolved), timeout, f"service {resolved}")
 
 
 def wait_for_service(name: str, timeout: float = TIMEOUT) -> str:
-    """Waits until a service can be called, but not for a master.
+    """Waits until a service can be called; fails at once without a master.
 
     Args:
-        name: the service, global or relative to the node's namespace; doubled slashes do no harm.
-        timeout: bound of the wait [s].
+        name: the service, global or relative to the node's namespace; doubled slashes are harmless.
+        timeout: limit of the wait [s].
 
     Returns:
         The resolved name.
 
     Raises:
-        ServiceMissing: no master, or the service doesn't come in time.
-        rospy.ROSInterruptException: the node was shut down meanwhile.
+        ServiceMissing: no master, or the service doesn't come up in time.
+        rospy.ROSInterruptException: the node shut down meanwhile.
     """
     resolved = str(rospy.resolve_name(name))
 
@@ -112,17 +109,17 @@ def wait_for_service(name: str, timeout: float = TIMEOUT) -> str:
 
 
 def wait_and_call(name: str, kind: Any, *request: Any, timeout: float = TIMEOUT) -> Any:
-    """Waits for a service and calls it.
+    """Waits for a service, calls it, and returns the response.
 
     Args:
         name: the service.
-        kind: its generated class.
+        kind: the service's generated class.
         request: the request, or its fields in order.
-        timeout: bound of the wait for the service, and again of the call [s].
+        timeout: limit of the wait for the service, and again of the call [s].
 
     Raises:
-        ServiceFailed: not there in time (ServiceMissing), or the call failed. See `ServiceClient`.
-        rospy.ROSInterruptException: the node was shut down meanwhile.
+        ServiceFailed: the service isn't up in time (ServiceMissing), or fails. See `ServiceClient`.
+        rospy.ROSInterruptException: the node shut down meanwhile.
     """
     resolved = wait_for_service(name, timeout)
     try:

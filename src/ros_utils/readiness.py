@@ -1,4 +1,4 @@
-"""What has to be there before a world can be used, and waiting for it.
+"""Waits until a world can be used, and says what is missing.
 
 ready = Ready(models=["arm"], controllers=["joint_state_controller", "arm_controller"])
 ros_launch.ros_launch_from_pkg("my_arm", "arm.launch", ready=ready, timeout=120.0)
@@ -27,20 +27,20 @@ RUNNING = "running"
 
 
 class NotReady(Exception):
-    """Something is missing; the text says what, and the command that mends it."""
+    """Something is missing; the text says what, and the command that fixes it."""
 
 
 @dataclass(frozen=True)
 class Ready:
-    """A world that answers, with models in it and controllers that run.
+    """A requirement: a world that answers, with its models and running controllers.
 
     Args:
-        models: names of models that have to be in the world.
-        controllers: names of controllers that have to run; one that begins with a slash is in the
-            namespace that it names.
+        models: names of models that must be in the world.
+        controllers: names of controllers that must run; a name with a leading slash includes its
+            namespace.
         ns: the namespace of the other controllers' manager.
-        gazebo_ns: the simulator's node, whose name its services begin with.
-        lockstep: the world has to move in lock-step.
+        gazebo_ns: the simulator's node, the prefix of its services' names.
+        lockstep: the world must run in lock-step.
     """
 
     models: Sequence[str] = ()
@@ -51,14 +51,14 @@ class Ready:
 
     def __post_init__(self) -> None:
         for name in ("models", "controllers"):
-            if isinstance(getattr(self, name), str):  # a list of letters otherwise
+            if isinstance(getattr(self, name), str):  # else its letters would be the names
                 object.__setattr__(self, name, (getattr(self, name),))
 
     def missing(self, timeout: float = _CALL_TIMEOUT) -> str:
-        """The first thing that is missing, and the command that mends it; nothing if all is there.
+        """Returns the first missing thing and the command that fixes it; empty if nothing is missing.
 
         Args:
-            timeout: bound of each question [s].
+            timeout: limit of each call [s].
         """
         try:
             _master.require(timeout)
@@ -69,13 +69,13 @@ class Ready:
             return f"the master at {_master.uri()}: {fault}"
 
     def wait(self, timeout: float = TIMEOUT) -> None:
-        """Waits until all is there.
+        """Waits until nothing is missing.
 
         Args:
-            timeout: bound of the wait [s].
+            timeout: limit of the wait [s].
 
         Raises:
-            NotReady: something is still missing then.
+            NotReady: something is still missing after that.
             rospy.ROSInterruptException: the caller's node was shut down meanwhile.
         """
         deadline = time.monotonic() + timeout
@@ -107,7 +107,7 @@ class Ready:
             yield from _faults_of_manager(namespace, names, timeout)
 
     def _managers(self) -> dict[str, list[str]]:
-        """The names of controllers, by the namespace of their manager."""
+        """Returns the controllers' names, by their manager's namespace."""
         found: dict[str, list[str]] = {}
         for each in self.controllers:
             full = rosgraph.names.ns_join("/" + self.ns.strip("/"), each)

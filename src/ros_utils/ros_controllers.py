@@ -1,9 +1,9 @@
-"""Load, start, stop and unload controllers through a controller manager's services.
+"""Loads, starts, stops and unloads controllers through a controller manager's services.
 
-`ns` is everywhere the namespace of the controller manager: its services are
-``<ns>/controller_manager/…``; None is the root. `strictness` is BEST_EFFORT (1: what can't be done
-is left out) or STRICT (2: all or nothing). Every function takes `service_timeout` as keyword: the
-bound for a service to come up and again for its answer [s]. A failure is logged, never raised.
+`ns` is always the controller manager's namespace: its services are ``<ns>/controller_manager/…``;
+None is the root. `strictness` is BEST_EFFORT (1: skip what can't be done) or STRICT (2: all or
+nothing). Every function takes the keyword `service_timeout`: the limit for a service to come up, and
+again for its answer [s]. Failures are logged, never raised.
 """
 
 from __future__ import annotations
@@ -41,8 +41,7 @@ __all__ = [
 
 
 class ListResult(int):
-    """Whether a call succeeded for each controller of a list: true or false, and `failed`, the names
-    of those for which it didn't."""
+    """True if a call succeeded for all controllers of a list; `failed` names the others."""
 
     failed: list[str]
 
@@ -64,7 +63,7 @@ def _service_name(ns: str | None, service: str) -> str:
 
 
 def _states(ns: str | None, timeout: float) -> dict[str, str] | None:
-    """Name and state of the loaded controllers, or None if the manager doesn't tell."""
+    """Returns the loaded controllers' states by name, or None if the manager doesn't answer."""
     try:
         answer = wait_and_call(
             _service_name(ns, "list_controllers"), ListControllers, timeout=timeout
@@ -84,7 +83,7 @@ def _until_ok(
     max_retries: int,
     timeout: float,
 ) -> bool:
-    """Call a service until its answer is ok, at most `max_retries` times; a failed call ends it."""
+    """Calls a service until its answer is ok, at most `max_retries` times; gives up after a failed call."""
     try:
         for _ in range(max_retries):
             if wait_and_call(_service_name(ns, service), kind, *request, timeout=timeout).ok:
@@ -105,7 +104,7 @@ def load_controller_srv(
     *,
     service_timeout: float = TIMEOUT,
 ) -> bool:
-    """Load a controller, with up to `max_retries` attempts.
+    """Loads a controller, with up to `max_retries` attempts.
 
     Returns:
         True once the manager has loaded it. False if it refuses (already loaded, no parameters,
@@ -129,7 +128,7 @@ def load_controller_list_srv(
     *,
     service_timeout: float = TIMEOUT,
 ) -> ListResult:
-    """Load several controllers; all are tried.
+    """Loads several controllers; one failure doesn't stop the others.
 
     Returns:
         True if every one was loaded; its `failed` names those that were not.
@@ -150,7 +149,7 @@ def unload_controller_srv(
     *,
     service_timeout: float = TIMEOUT,
 ) -> bool:
-    """Unload a controller that doesn't run, with up to `max_retries` attempts.
+    """Unloads a controller that doesn't run, with up to `max_retries` attempts.
 
     Returns:
         True once it is unloaded. False if it runs, is unknown, or the manager doesn't answer.
@@ -173,7 +172,7 @@ def unload_controller_list_srv(
     *,
     service_timeout: float = TIMEOUT,
 ) -> ListResult:
-    """Unload several controllers; all are tried.
+    """Unloads several controllers; one failure doesn't stop the others.
 
     Returns:
         True if every one was unloaded; its `failed` names those that were not.
@@ -198,7 +197,7 @@ def switch_controllers_srv(
     *,
     service_timeout: float = TIMEOUT,
 ) -> bool:
-    """Start and stop controllers in one step, with up to `max_retries` attempts.
+    """Starts and stops controllers in one step, with up to `max_retries` attempts.
 
     Args:
         start_controllers: names to start.
@@ -206,12 +205,12 @@ def switch_controllers_srv(
         ns: see the module.
         strictness: see the module.
         start_asap: start each as soon as its hardware is ready; makes no difference in simulation.
-        timeout: how long the manager itself may take for the switch [s]; 0 is for ever.
+        timeout: the manager's own limit for the switch [s]; 0 for none.
         max_retries: attempts.
         service_timeout: see the module.
 
     Returns:
-        True if the manager has switched. With BEST_EFFORT this doesn't say that each one runs.
+        True if the manager has switched; with BEST_EFFORT some controllers may still not run.
     """
     request = (list(start_controllers), list(stop_controllers), strictness, start_asap, timeout)
     what = f"start {_names(start_controllers)}, stop {_names(stop_controllers)}"
@@ -230,7 +229,7 @@ def start_controllers_srv(
     *,
     service_timeout: float = TIMEOUT,
 ) -> bool:
-    """Start loaded controllers. See `switch_controllers_srv`."""
+    """Starts loaded controllers. See `switch_controllers_srv`."""
     return switch_controllers_srv(
         start_controllers, [], ns, strictness, start_asap, timeout, service_timeout=service_timeout
     )
@@ -245,7 +244,7 @@ def stop_controllers_srv(
     *,
     service_timeout: float = TIMEOUT,
 ) -> bool:
-    """Stop running controllers. See `switch_controllers_srv`."""
+    """Stops running controllers. See `switch_controllers_srv`."""
     return switch_controllers_srv(
         [], stop_controllers, ns, strictness, start_asap, timeout, service_timeout=service_timeout
     )
@@ -261,8 +260,7 @@ def reset_controllers_srv(
     *,
     service_timeout: float = TIMEOUT,
 ) -> bool:
-    """Stop controllers, with up to `max_retries` attempts, and start them again: set-points and PID
-    state begin anew.
+    """Restarts controllers, with up to `max_retries` attempts to stop them; resets set-points and PID state.
 
     `max_retries` is the second argument here, not the last.
 
@@ -293,11 +291,11 @@ def spawn_controllers_srv(
     *,
     service_timeout: float = TIMEOUT,
 ) -> bool:
-    """Load the controllers that aren't loaded yet, then start all that are.
+    """Loads the controllers that aren't loaded yet, then starts all loaded ones of the list.
 
     Returns:
-        True if every one is loaded and the manager has started them. One that can't be loaded
-        doesn't keep the others from starting.
+        True if all are loaded and the manager has started them. If one can't be loaded, the others
+        still start.
     """
     known = _states(ns, service_timeout)
     if known is None:
@@ -326,7 +324,7 @@ def kill_controllers_srv(
     *,
     service_timeout: float = TIMEOUT,
 ) -> bool:
-    """Stop controllers and, if that succeeded, unload them.
+    """Stops controllers and, if that succeeded, unloads them.
 
     Returns:
         True if all were stopped and unloaded.
@@ -339,15 +337,17 @@ def kill_controllers_srv(
 def list_controllers_srv(
     ns: str | None = None, *, service_timeout: float = TIMEOUT
 ) -> dict[str, str] | None:
-    """Name and state (initialized, running, stopped) of the loaded controllers, or None, with an
-    error in the log, if the manager doesn't tell."""
+    """Returns the loaded controllers' states (initialized, running, stopped) by name.
+
+    None, with an error in the log, if the manager doesn't answer.
+    """
     return _states(ns, service_timeout)
 
 
 def list_controller_types_srv(
     ns: str | None = None, *, service_timeout: float = TIMEOUT
 ) -> list[str] | None:
-    """The types of controllers that can be loaded, or None. See `list_controllers_srv`."""
+    """Returns the controller types that can be loaded, or None. See `list_controllers_srv`."""
     name = _service_name(ns, "list_controller_types")
     try:
         answer = wait_and_call(name, ListControllerTypes, timeout=service_timeout)

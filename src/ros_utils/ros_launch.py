@@ -1,4 +1,4 @@
-"""Start and end launch files."""
+"""Starts and ends launch files."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def ros_launch_from_pkg(
     master_uri: str | None = None,
     ready: Ready | None = None,
 ) -> Started | bool:
-    """Launch ``<pkg_name>/launch/<launch_file>``. Starts a master if there is none.
+    """Launches ``<pkg_name>/launch/<launch_file>``. Starts a master if there is none.
 
     Args:
         pkg_name: ROS package.
@@ -45,20 +45,20 @@ def ros_launch_from_pkg(
         args: launch arguments, ``"name:=value"`` each.
         launch_new_term: in an xterm, if there is a display and xterm; otherwise the output goes to
             a log file.
-        timeout: bound of the wait for roslaunch to start its nodes [s].
+        timeout: limit of the wait for roslaunch to start its nodes [s].
         output: "log" for a log file, "screen" for this terminal.
-        wait: False to go on at once.
+        wait: False to return at once.
         log_file: the file for the output; None for one of its own in ROS's log folder.
-        env: variables on top of this process's.
+        env: variables in addition to this process's.
         master_uri: the master to launch under; None for this process's.
-        ready: what has to be there besides, such as models and controllers that run, within
-            `timeout`; None for nothing.
+        ready: models, running controllers and the like that must also be there within `timeout`;
+            None for nothing.
 
     Returns:
-        A handle that is true, once roslaunch has started its nodes (or has ended by itself without
-        an error) and what `ready` names is there. A node that dies at once is named in a warning:
-        the rest of the launch file goes on. False, with an error in the log, if the package or file
-        is missing, no master can be used, roslaunch fails, or something isn't ready in time (the
+        A true handle once roslaunch has started its nodes (or has ended by itself without an error)
+        and everything in `ready` is there. A node that dies at once only causes a warning, and the
+        rest of the launch goes on. False, with an error in the log, if the package or file is
+        missing, no master can be used, roslaunch fails, or something isn't ready in time (the
         launch is ended then).
     """
     try:
@@ -93,7 +93,7 @@ def ros_launch_from_path(
     master_uri: str | None = None,
     ready: Ready | None = None,
 ) -> Started | bool:
-    """Launch a file by its path. See `ros_launch_from_pkg`."""
+    """Launches a file by its path. See `ros_launch_from_pkg`."""
     label = f"roslaunch {os.path.basename(launch_file_path)}"
     with _master.using(master_uri):
         try:
@@ -115,7 +115,7 @@ def ros_launch_from_path(
 
 
 def ros_kill_launch_process() -> bool:
-    """End every launch that this toolkit started under this master, with all its nodes.
+    """Ends every launch that this toolkit started under this master, with all its nodes.
 
     Returns:
         True if none is left.

@@ -1,4 +1,4 @@
-"""Start and end nodes and the master."""
+"""Starts and ends nodes and the master."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def ros_node_from_pkg(
     master_uri: str | None = None,
     ready: Ready | None = None,
 ) -> Started | bool:
-    """Start a node, as rosrun does, and wait until it is registered at the master.
+    """Starts a node, as rosrun does, and waits until it is registered at the master.
 
     Args:
         pkg_name: ROS package.
@@ -55,22 +55,22 @@ def ros_node_from_pkg(
         launch_master_term: the master in an xterm of its own, if there is a display and xterm.
         launch_new_term: the node in an xterm, if there is a display and xterm; otherwise see
             `output`.
-        name: the node's name; None for the one it gives itself.
+        name: the node's name; None for its own default.
         ns: namespace.
         output: "log" for a log file, "screen" for this terminal.
-        args: arguments for the node: one string, split as a shell would, or a list.
-        timeout: bound of the wait for the registration [s].
-        wait: False for a program that is no ROS node, or to go on at once.
+        args: the node's arguments: a string, split as in a shell, or a list.
+        timeout: limit of the wait for the registration [s].
+        wait: False for a program that isn't a ROS node, or to return at once.
         log_file: the file for the output; None for one of its own in ROS's log folder.
-        env: variables on top of this process's.
+        env: variables in addition to this process's.
         master_uri: the master to register at; None for this process's.
         ready: see `ros_launch.ros_launch_from_pkg`.
 
     Returns:
-        A handle that is true, once the node is registered, or if it has done its work and ended
-        with exit code 0, and what `ready` names is there. False, with an error in the log, if the
-        package or executable is missing, no master answers, or the node ends with another exit
-        code, doesn't register or something isn't ready in time (it is ended then).
+        A true handle once the node is registered, or has ended with exit code 0, and everything in
+        `ready` is there. False, with an error in the log, if the package or executable is missing,
+        no master answers, the node ends with another exit code, or the node isn't registered or
+        something isn't ready in time (the node is ended then).
     """
     label = f"node {pkg_name}/{node_name}"
     with _master.using(master_uri):
@@ -113,7 +113,7 @@ def ros_node_from_pkg(
 
 
 def ros_kill_node(node_name: str) -> bool:
-    """Ask a node to shut itself down, as rosnode kill does. The caller's own node is refused.
+    """Asks a node to shut itself down, as rosnode kill does; refuses the caller's own node.
 
     Returns:
         True if no such node is registered afterwards.
@@ -130,7 +130,7 @@ def ros_kill_node(node_name: str) -> bool:
 
 
 def ros_kill_all_nodes() -> bool:
-    """Ask every node of this master to shut itself down, except the caller's own and rosout.
+    """Asks every node of this master to shut itself down, except the caller's own and rosout.
 
     Returns:
         True if none is left.
@@ -139,10 +139,9 @@ def ros_kill_all_nodes() -> bool:
 
 
 def ros_kill_master() -> bool:
-    """Shut down all nodes of this master except the caller's own, and end the master if this
-    toolkit started it.
+    """Shuts down all nodes of this master except the caller's own, and the master if this toolkit started it.
 
-    A master that somebody else started goes on, with a warning.
+    A master that somebody else started keeps running, with a warning.
 
     Returns:
         True if no master runs afterwards.
@@ -157,17 +156,16 @@ def ros_kill_master() -> bool:
 
 
 def ros_kill_all_processes() -> bool:
-    """End all that this toolkit has started under this master, by whichever process, and shut down
-    the other nodes.
+    """Ends all that this toolkit started under this master, from any process, and shuts down other nodes.
 
     Nodes that somebody else started are only asked to shut down, as rosnode kill does; the caller's
-    own node and a master that somebody else started go on. Other masters and their nodes aren't
-    touched. Without a master it returns at once.
+    own node and a master that somebody else started keep running, as do other masters and their
+    nodes. Returns at once without a master.
 
     Returns:
-        True if nothing of it is left.
+        True if nothing of them is left.
     """
-    nodes = _nodes.node_uris()  # asked first: our master may go with the processes
+    nodes = _nodes.node_uris()  # asked first: the master may end with the processes
     gone = _programs.end(_processes.started())
     return _shut_down(nodes) and gone
 
@@ -183,7 +181,7 @@ def _shut_down(nodes: dict[str, str]) -> bool:
 
 
 def _executable(package: str, name: str) -> str:
-    """The path of a package's executable, as rosrun finds it."""
+    """Returns the path of a package's executable, found as by rosrun."""
     _packages.folder(package)
     try:
         found = roslib.packages.find_node(package, name, rospack=rospkg.RosPack())
@@ -197,7 +195,7 @@ def _executable(package: str, name: str) -> str:
 
 
 def _arguments(args: str | Sequence[str] | None) -> list[str]:
-    """The node's own arguments as a list.
+    """Returns the node's own arguments as a list.
 
     Raises:
         ValueError: a quote isn't closed.
@@ -209,7 +207,7 @@ def _arguments(args: str | Sequence[str] | None) -> list[str]:
 
 
 def _global(ns: str | None) -> str:
-    """A namespace with exactly one slash in front and none behind."""
+    """Returns the namespace with exactly one leading and no trailing slash."""
     return "/" + "/".join(part for part in (ns or "/").split("/") if part)
 
 
@@ -222,7 +220,7 @@ def _remappings(name: str | None, ns: str | None) -> list[str]:
 
 
 def _start_master(window: bool, timeout: float) -> bool:
-    """Start a master at ROS_MASTER_URI."""
+    """Starts a master at ROS_MASTER_URI."""
     _master.is_up_or_startable()
     port = str(_master.host_and_port()[1])
     handle = _programs.start(["roscore", "-p", port], "master", "roscore", window=window)
@@ -237,8 +235,7 @@ def _start_master(window: bool, timeout: float) -> bool:
 
 
 def _is_registered(handle: Handle, name: str | None, before: set[str]) -> bool:
-    """True if a node of this process is registered; a node of the same name from before doesn't
-    count."""
+    """Returns True if a node of this process is registered; an earlier one of that name doesn't count."""
     addresses = [_nodes.node_uri(name)] if name else list(_nodes.node_uris().values())
     new = [address for address in addresses if address and address not in before]
     return any(handle.owns(_nodes.node_pid(address)) for address in new)

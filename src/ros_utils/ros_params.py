@@ -1,4 +1,4 @@
-"""Load YAML files into the parameter server."""
+"""Loads YAML files into the parameter server."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ros_utils._internal import params as _params
 
 
 def ros_load_yaml_from_pkg(pkg_name: str, file_name: str, ns: str = "/") -> bool:
-    """Load ``<pkg_name>/config/<file_name>`` into the parameter server.
+    """Loads ``<pkg_name>/config/<file_name>`` into the parameter server.
 
     Args:
         pkg_name: ROS package.
@@ -25,7 +25,7 @@ def ros_load_yaml_from_pkg(pkg_name: str, file_name: str, ns: str = "/") -> bool
 
     Returns:
         True if every parameter was set. False, with an error in the log, if the package or file is
-        missing, no master answers, or the file is no YAML mapping; nothing was set then.
+        missing, no master answers, or the file isn't a YAML mapping; then nothing was set.
     """
     try:
         path = _packages.file(pkg_name, "config", file_name)
@@ -36,8 +36,7 @@ def ros_load_yaml_from_pkg(pkg_name: str, file_name: str, ns: str = "/") -> bool
 
 
 def ros_load_yaml_from_path(file_path: str, ns: str = "/") -> bool:
-    """Load a YAML file, given by its path, into the parameter server. See
-    `ros_load_yaml_from_pkg`."""
+    """Loads a YAML file, given by its path, into the parameter server. See `ros_load_yaml_from_pkg`."""
     try:
         documents = _read(_packages.existing(file_path))
         for document in documents:
@@ -52,10 +51,10 @@ def ros_load_yaml_from_path(file_path: str, ns: str = "/") -> bool:
 
 
 def _read(path: str) -> list[dict[str, Any]]:
-    """All documents of a YAML file, which may use ROS's ``deg(90)`` and ``rad(pi)``.
+    """Returns all documents of a YAML file, which may use ROS's ``deg(90)`` and ``rad(pi)``.
 
     Raises:
-        FileError: it can't be read, or is no YAML, or a document is no mapping; with the place.
+        FileError: the file can't be read or isn't YAML, or a document isn't a mapping; gives the place.
     """
     documents = load_parameters(read_file(Path(path)))
     if not documents:

@@ -1,5 +1,4 @@
-"""Bring a robot into the simulation: description, state publisher, model and controllers in one
-call."""
+"""Brings a robot into the simulation in one call: description, state publisher, model, controllers."""
 
 from __future__ import annotations
 
@@ -17,11 +16,11 @@ from ros_utils.readiness import NotReady, Ready
 def init_robot_state_pub(
     namespace: str = "/", max_pub_freq: float | None = None, launch_new_term: bool = False
 ) -> bool:
-    """Start a robot_state_publisher as node ``<namespace>/rob_st_pub``.
+    """Starts a robot_state_publisher as node ``<namespace>/rob_st_pub``.
 
     Args:
         namespace: where `robot_description` and `joint_states` are.
-        max_pub_freq: bound of its publishing rate [Hz]; None for its own.
+        max_pub_freq: limit of its publishing rate [Hz]; None for its default.
         launch_new_term: in an xterm, if there is a display and xterm.
 
     Returns:
@@ -68,18 +67,17 @@ def spawn_model_in_gazebo(
     verify: bool = False,
     ready: bool = False,
 ) -> bool:
-    """Load a robot's description, start its state publisher, spawn it, and load and start its
-    controllers.
+    """Loads a robot's description, starts its state publisher, spawns it, and starts its controllers.
 
     Args:
         pkg_name: ROS package of the robot.
         model_urdf_file: URDF or xacro file in it.
-        controllers_file: YAML file of the controllers; None for a robot without.
+        controllers_file: YAML file of the controllers; None for a robot without controllers.
         controllers_list: controllers to load and start.
         model_urdf_folder: the URDF's folder in the package.
         ns: namespace of description, state publisher and controller manager.
         args_xacro: xacro arguments, ``"name:=value"`` each.
-        max_pub_freq: bound of the state publisher's rate [Hz].
+        max_pub_freq: limit of the state publisher's rate [Hz].
         rob_st_term: the state publisher in an xterm.
         gazebo_name: name of the new model.
         gaz_ref_frame: model or link that the pose refers to.
@@ -89,11 +87,11 @@ def spawn_model_in_gazebo(
         controllers_pkg: package of `controllers_file`; None for `pkg_name`.
         timeout, gazebo_ns: see `ros_gazebo`.
         verify: go on only once the model is in the world's list.
-        ready: return only once the model is there and each controller of the list runs, within
-            `timeout` after it was started.
+        ready: return only once the model is there and all listed controllers run, within `timeout`
+            after their start.
 
     Returns:
-        True if every stage succeeded. The first failure ends it; earlier stages stay as they are.
+        True if every stage succeeded. The first failure ends the call; earlier stages aren't undone.
     """
     if not ros_urdf.urdf_load_from_pkg(
         pkg_name,

@@ -1,4 +1,4 @@
-"""Expand robot descriptions (xacro) and put them on the parameter server."""
+"""Expands robot descriptions (xacro) and puts them on the parameter server."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def urdf_load_from_pkg(
     ns: str | None = None,
     args_xacro: Sequence[str] | None = None,
 ) -> bool:
-    """Expand a package's URDF or xacro file and set it as a parameter.
+    """Expands a package's URDF or xacro file and sets it as a parameter.
 
     Args:
         pkg_name: ROS package.
@@ -48,8 +48,7 @@ def urdf_load_from_pkg(
 def urdf_load_from_path(
     model_path: str, param_name: str, ns: str | None = None, args_xacro: Sequence[str] | None = None
 ) -> bool:
-    """Expand a URDF or xacro file, given by its path, and set it as a parameter. See
-    `urdf_load_from_pkg`."""
+    """Expands a URDF or xacro file and sets it as a parameter. See `urdf_load_from_pkg`."""
     xml = urdf_parse_from_path(model_path, args_xacro)
     if xml is None:
         return False

@@ -1,4 +1,4 @@
-"""A client for one service, and its errors, which are `StepClient`'s too. See `ros_calls.service`."""
+"""A client for one service, and its errors, which `StepClient` raises, too. See `ros_calls.service`."""
 
 from ros_calls.service import (
     TIMEOUT,

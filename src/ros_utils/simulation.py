@@ -7,8 +7,8 @@ Several can run side by side, in one process or many::
             ros_gazebo.gazebo_spawn_urdf_path("robot.urdf", "robot")
         subprocess.run(["python3", "client.py"], env=simulation.environment())
 
-rospy knows one master for each process, so that publishers and subscribers of this process belong to
-ROS_MASTER_URI's; the functions of this package go where `active` says.
+rospy knows one master per process, so this process's publishers and subscribers belong to ROS_MASTER_URI's;
+within `active`, the functions of this package use the simulation's master.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class CannotSimulate(Exception):
 
 
 def reserved_port() -> int:
-    """A free TCP port on this machine's loopback, reserved for about a minute.
+    """Returns a free TCP port on this machine's loopback, reserved for about a minute.
 
-    The kernel chooses it. A connection to it that was closed keeps it from being given to anybody who
-    asks for some free port, while a server that names it, as a ROS master does, gets it.
+    A closed connection to it keeps the kernel from giving it to programs that ask for any free port;
+    a server that names it, as a ROS master does, still gets it.
     """
     with socket.socket() as listener, socket.socket() as client:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -47,17 +47,17 @@ def reserved_port() -> int:
 
 
 class Simulation:
-    """A running simulator: master, Gazebo-like server, and all that is started under them."""
+    """A running simulator: master, Gazebo-like server, and everything started under them."""
 
     def __init__(
         self, *, port: int | None = None, gui: bool = False, timeout: float = 30.0, **launch: Any
     ) -> None:
-        """Start master and simulator, and wait until it answers.
+        """Starts master and simulator, and waits until it answers.
 
         Args:
-            port: the master's; None for a free one.
+            port: the master's port; None for a free one.
             gui: with a window.
-            timeout: bound of the wait [s].
+            timeout: limit of the wait [s].
             launch: further arguments of `ros_gazebo.launch_Gazebo`, e.g. ``lockstep=True``.
 
         Raises:
@@ -78,7 +78,7 @@ class Simulation:
 
     @property
     def log_file(self) -> str | None:
-        """Where the output of master and simulator goes."""
+        """Path of the output of master and simulator."""
         return self._started.log_file
 
     @property
@@ -87,25 +87,25 @@ class Simulation:
         return self._started.running
 
     def active(self) -> contextlib.AbstractContextManager[None]:
-        """A block in which the functions of this package go to this simulator."""
+        """Returns a block in which the functions of this package use this simulator."""
         return _master.using(self.master_uri)
 
     def environment(self) -> dict[str, str]:
-        """The environment for a process that is to talk to this simulator."""
+        """Returns the environment for a process that uses this simulator."""
         return {**os.environ, "ROS_MASTER_URI": self.master_uri, "ROS_IP": LOOPBACK}
 
     def model_names(self) -> list[str]:
-        """The names of the models in the world."""
+        """Returns the names of the models in the world."""
         with self.active():
             return ros_gazebo.gazebo_get_model_names()
 
     def close(self) -> bool:
-        """End the simulator, its master, and what was started under it; a second time does nothing.
+        """Ends the simulator, its master, and everything started under it; a second call does nothing.
 
         Returns:
             True if nothing is left.
         """
-        if self._closed:  # the port may be somebody else's master's by now
+        if self._closed:  # another master may use the port by now
             return True
         with self.active():
             anything = self.running or _master.is_up()

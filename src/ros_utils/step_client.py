@@ -1,4 +1,4 @@
-"""Moves a world in lock-step from Python, by the services of bullet_gazebo_msgs.
+"""Steps a world in lock-step from Python, through the services of bullet_gazebo_msgs.
 
 client = StepClient()
 client.reset({"cart_pole": 0.1}, {"cart_pole": -0.5})
@@ -32,21 +32,21 @@ from ros_calls.service import ServiceClient, ServiceFailed, ServiceGone
 
 STEP_SERVICE = "/gazebo/step_world"
 TIMEOUT = 10.0  # [s] of wall time
-SLOWEST_TICK = 0.01  # [s] of wall time; one of a very full world
-MOST_PREPARED = 16  # steps with different names; older ones are prepared again
+SLOWEST_TICK = 0.01  # [s] of wall time; a tick of a very full world
+MOST_PREPARED = 16  # prepared steps kept; older ones are prepared again
 ATTEMPTS = 3  # to prepare a step anew while controllers or models come and go
-MOTION = 13  # numbers of a model or link: position, orientation, linear and angular velocity
+MOTION = 13  # numbers per model or link: position, orientation, linear and angular velocity
 Commands = Mapping[str, float | Sequence[float]]
 Some = bool | Sequence[str]
 """All, none, or those of these names."""
 
 
 class StepRefused(ServiceFailed):
-    """The simulator refused a request, and nothing has changed; the text says why."""
+    """The simulator rejected a request and changed nothing; the text says why."""
 
 
 class StepNames(NamedTuple):
-    """What a step commands and reads, in the words of PrepareStep.srv."""
+    """The names that a step commands and reads; the fields are those of PrepareStep.srv."""
 
     controllers: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
@@ -69,14 +69,14 @@ class StepAnswer(NamedTuple):
 
 
 class PreparedSteps:
-    """Steps whose names the simulator looks up once; requests and answers are numbers.
+    """Steps whose names the simulator looks up once; requests and answers are plain numbers.
 
-    A step is `begin` and `end`, so that several simulators can move at the same time. Not thread-safe.
+    A step is `begin` and `end`, so several simulators can move in parallel. Not thread-safe.
 
     Args:
-        service: the simulator's step_world; prepare_step and prepared_step stand beside it.
-        timeout: wall time [s] that a call may take, beside 10 ms for each tick.
-        client: the class of the clients, which decides on the errors.
+        service: the simulator's step_world; prepare_step and prepared_step share its namespace.
+        timeout: limit of a call [s of wall time], plus 10 ms for each tick.
+        client: the clients' class, which decides what errors are raised.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class PreparedSteps:
         self._begun = StepNames(), PreparedStepRequest()
 
     def prepare(self, names: StepNames) -> PrepareStepResponse:
-        """Has the names looked up, unless they have been; returns what the answers' numbers belong to.
+        """Prepares a step if it isn't yet; returns the names that the answers' numbers belong to.
 
         Raises:
             ServiceFailed: StepRefused for a wrong name; otherwise see `ServiceClient`.
@@ -114,9 +114,9 @@ class PreparedSteps:
         """Sends a step; `end` takes its answer and must come next.
 
         Args:
-            names: whom the commands are for, and what the answer tells.
-            ticks: physics steps; 0 only reads.
-            commands: for the controllers, then for the joints.
+            names: what the commands are for, and what the answer reports.
+            ticks: number of physics steps; 0 only reads.
+            commands: numbers for the controllers, then for the joints.
 
         Raises:
             ServiceFailed: see `prepare`.
@@ -127,7 +127,7 @@ class PreparedSteps:
         self._step.begin(request)
 
     def end(self) -> StepAnswer:
-        """Takes the answer; a step whose handle was stale is prepared and sent again.
+        """Returns the answer; prepares and sends the step again if its handle was stale.
 
         Raises:
             ServiceFailed: StepRefused for a refused step; otherwise see `ServiceClient`.
@@ -154,14 +154,14 @@ class PreparedSteps:
 
 
 class StepClient:
-    """Steps a world over lasting connections, which are renewed after a restart of the simulator.
+    """Steps a world over persistent connections, and reconnects after a restart of the simulator.
 
-    No call takes longer than `timeout` [s] of wall time, and 10 ms for each of its ticks. Errors are those of
-    ros_utils.service_client (ServiceGone, ServiceHangs, ServiceFailed), and StepRefused.
+    A call takes at most `timeout` [s of wall time] plus 10 ms for each of its ticks. It raises the errors of
+    ros_utils.service_client (ServiceGone, ServiceHangs, ServiceFailed) and StepRefused.
 
     Args:
-        service: the simulator's step_world; its other services stand beside it.
-        timeout: bound of a call [s].
+        service: the simulator's step_world; its other services share the namespace.
+        timeout: limit of a call [s].
     """
 
     def __init__(self, service: str = STEP_SERVICE, timeout: float = TIMEOUT) -> None:
@@ -179,19 +179,19 @@ class StepClient:
         links: Sequence[str] | Mapping[str, str] = (),
         contacts: Some = False,
     ) -> StepWorldResponse:
-        """Commands controllers and joints, and lets `ticks` physics steps pass.
+        """Commands controllers and joints, lets `ticks` physics steps pass, and returns the new state.
 
-        What the answer tells beside the joints costs nothing where it isn't asked for.
+        Beside the joints, the answer holds only what is asked for; the rest costs nothing.
 
         Args:
             ticks: at least 1.
-            commands: for controllers by name: a number, or as many as a group has joints
+            commands: by controller name: a number, or for a group one per joint
                 [m, rad, m/s, rad/s, N, N m].
-            joint_commands: for joints that no running controller has.
-            model_states: which models' poses and twists are told.
-            links: whose poses and twists are told, in this order: a plain name, or model::link. A
-                mapping says in which link's frame each is told; "": in the world.
-            contacts: those of the last tick: all, or those with these models, links or collisions.
+            joint_commands: for joints without a running controller, by name.
+            model_states: models whose poses and twists are reported.
+            links: links whose poses and twists are reported, in this order: plain names, or
+                model::link. A mapping gives the link in whose frame each is reported; "": the world.
+            contacts: contacts of the last tick: all, or those of these models, links or collisions.
         """
         commands, joint_commands = commands or {}, joint_commands or {}
         all_models, models = _chosen(model_states)
@@ -208,7 +208,7 @@ class StepClient:
             answer = self._prepared.end()
         except StepRefused:
             raise
-        except BaseException:  # also of a signal's handler, between begin and end
+        except BaseException:  # a signal handler may raise between begin and end
             self.close()
             raise
         return _response(answer)
@@ -228,16 +228,15 @@ class StepClient:
         links: Sequence[str] | Mapping[str, str] = (),
         contacts: Some = False,
     ) -> StepWorldResponse:
-        """Resets the world, and begins an episode from a defined state.
+        """Resets the world, begins an episode from a defined state, and returns that state.
 
         Args:
-            positions: joints to place [rad, m]. Those that aren't named stay, or go to 0 with
-                `everything`.
-            velocities: of the joints that are placed [rad/s, m/s]; the others rest.
-            seed: for the simulator's random numbers; 0 leaves them.
-            everything: as reset_simulation, time begins at 0; else as reset_world, it goes on.
-            models: models to place, in the world; the others stand where they were spawned.
-            twists: of the models that are placed; the others rest.
+            positions: joint positions [rad, m]. Other joints stay, or go to 0 with `everything`.
+            velocities: of the placed joints [rad/s, m/s]; the others rest.
+            seed: seed of the simulator's random numbers; 0 leaves them.
+            everything: True as reset_simulation: time starts at 0. False as reset_world: time goes on.
+            models: poses of models in the world; the others stand where they were spawned.
+            twists: of the placed models; the others rest.
             ticks, commands, model_states, links, contacts: as for `step`; no step unless asked for.
         """
         positions, models = positions or {}, models or {}
@@ -270,7 +269,7 @@ class StepClient:
             return self.send(request)
 
     def send(self, request: StepWorldRequest) -> StepWorldResponse:
-        """Sends a request as it is."""
+        """Sends a request unchanged and returns the response."""
         self._call.timeout = self._timeout + time_of(request.ticks)
         response: StepWorldResponse = self._call(request)
         if not response.success:
@@ -284,14 +283,14 @@ class StepClient:
 
 
 def time_of(ticks: Any) -> float:
-    """The most wall time [s] that steps take; what is no number of ticks is refused elsewhere."""
+    """Returns the longest wall time [s] for steps; bad numbers of ticks are rejected elsewhere."""
     return SLOWEST_TICK * max(0, int(ticks)) if isinstance(ticks, Integral) else 0.0
 
 
 def _flat(commands: Commands) -> list[float]:
     values: list[float] = []
     for command in commands.values():
-        if isinstance(command, float):  # nearly always, and isinstance of Sequence is slow
+        if isinstance(command, float):  # the usual case; isinstance of Sequence is slow
             values.append(command)
         else:
             values += command if isinstance(command, Sequence) else [command]
@@ -299,7 +298,7 @@ def _flat(commands: Commands) -> list[float]:
 
 
 def _response(answer: StepAnswer) -> StepWorldResponse:
-    """The answer as step_world gives it."""
+    """Returns the answer in the form of step_world's response."""
     numbers, joints, models = answer.numbers, len(answer.joints), len(answer.models)
     rest = range(3 * joints, len(numbers), MOTION)
     poses = [Pose(Point(*numbers[i : i + 3]), Quaternion(*numbers[i + 3 : i + 7])) for i in rest]

@@ -27,7 +27,7 @@ LOSSES = "losses/"
 SMOOTHED = (EPISODES, LENGTHS)  # and losses
 MAX_CHARTS = 16
 HEIGHT = 150  # [pixels]
-# Mantissas of the axes' ends. The range of steps is set by us, and seldom: when viser fits it to the
+# Mantissas of the axes' ends. We set the range of steps ourselves, and seldom: when viser fits it to the
 # data, a chart that is drawn while it is hidden loses its range.
 ENDS = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0, 6.4, 8.0, 10.0)
 AXES = (uplot.Axis(space=85), uplot.Axis(size=55))  # [pixels] for 100,000,000 and for 100,000
@@ -125,7 +125,7 @@ class Curves:
         )  # fmt: skip
 
     def _scales(self, tag: str, last: float) -> dict[str, uplot.Scale]:
-        """An axis from 0 to somewhat beyond the last step."""
+        """Returns an axis from 0 to somewhat beyond the last step."""
         tens = 10.0 ** math.floor(math.log10(max(last, 1.0)))
         self._ends[tag] = next(each * tens for each in ENDS if each * tens >= last)
         return {"x": uplot.Scale(time=False, auto=False, range=(0.0, self._ends[tag]))}
@@ -213,6 +213,6 @@ def _join(one: _Bucket, following: _Bucket) -> _Bucket:
 
 
 def _extremes(values: list[float]) -> tuple[float, float]:
-    """The least and the greatest value, in the order in which they came."""
+    """Returns the least and the greatest value, in the order in which they came."""
     low, high = min(values), max(values)
     return (low, high) if values.index(low) <= values.index(high) else (high, low)

@@ -1,4 +1,4 @@
-"""A viser server behind a gate, without viser's console output and its tunnel to the internet.
+"""A viser server behind a gate, without viser's console output or its tunnel to the internet.
 
 viser serves everybody who reaches the port. Pages of other sites in the same browser reach it too: a
 browser lets them connect anywhere and only reports where they come from. So `Gate` checks each request.
@@ -128,7 +128,7 @@ def stop(server: viser.ViserServer) -> None:
 
 @contextlib.contextmanager
 def hidden_page() -> Iterator[viser.ViserServer]:
-    """A page for recordings, which viser can make only of a server; nobody has its token."""
+    """Serves a page for recordings, which viser can make only from a server; nobody has its token."""
     server = _start(Address(LOOPBACK, 0, secrets.token_urlsafe(TOKEN_BYTES)))
     try:
         yield server

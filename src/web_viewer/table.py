@@ -17,7 +17,7 @@ ScalarPoint = tuple[float, str, float]  # step, tag, value
 
 @dataclass(frozen=True)
 class TableUpdate:
-    """What one read has brought."""
+    """The result of one read."""
 
     points: list[ScalarPoint] = field(default_factory=list)
     restarted: bool = False  # the file is another one now: forget earlier points

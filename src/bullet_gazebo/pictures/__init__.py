@@ -1,1 +1,1 @@
-"""Pictures, videos and web pages of what is in a world: without a display, and without touching the world."""
+"""Pictures, videos and web pages of a world; needs no display and never changes the world."""

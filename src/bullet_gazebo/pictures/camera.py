@@ -8,8 +8,8 @@ import numpy as np
 
 from bullet_gazebo.physics.pose import Vector
 
-NEAR, FAR = 0.02, 100.0  # of what is drawn, as shares of the distance
-MARGIN = 1.1  # around what an overview has to show
+NEAR, FAR = 0.02, 100.0  # clipping planes, as multiples of the camera's distance
+MARGIN = 1.1  # factor on the width and height that an overview must show
 SKY = (238, 242, 247)
 TILES = ((222, 225, 230), (203, 207, 213))
 TILES_IN_SIGHT = 8.0  # within the camera's distance
@@ -22,11 +22,11 @@ class Camera:
 
     Args:
         target: the point [m].
-        distance: from it [m].
+        distance: from the camera to the target [m].
         yaw: [degrees]; at 0 it looks along +y, with x to the right, at 90 along -x.
         pitch: [degrees]; negative looks down.
         view: vertical field of view [degrees].
-        follows: whether it follows a robot that drives, in pictures of an environment.
+        follows: whether it follows a robot that drives, in an environment's pictures.
     """
 
     target: Vector = (0.0, 0.0, 0.0)
@@ -37,7 +37,7 @@ class Camera:
     follows: bool = True
 
     def at(self, target: Vector) -> "Camera":
-        """Returns the same camera, looking at another point [m]."""
+        """Returns a copy that looks at another point [m]."""
         return replace(self, target=target)
 
     @property
@@ -56,12 +56,12 @@ class Camera:
 
     @property
     def near(self) -> float:
-        """The least distance that it sees [m]."""
+        """The distance of the near clipping plane [m]."""
         return NEAR * self.distance
 
     @property
     def far(self) -> float:
-        """The greatest distance that it sees [m]."""
+        """The distance of the far clipping plane [m]."""
         return FAR * self.distance
 
     @property
@@ -114,14 +114,14 @@ def overview(points: np.ndarray, aspect: float, looking: Camera | None = None) -
 
 
 class Background(NamedTuple):
-    """Colours (h, w, 3) of uint8, and the ground's depth as OpenGL measures it, by row (h, 1); 1 is none."""
+    """Colours (h, w, 3) of uint8, and the ground's OpenGL depth by row (h, 1), 1 where there is none."""
 
     colours: np.ndarray
     depth: np.ndarray
 
 
 def background(camera: Camera, width: int, height: int) -> Background:
-    """Draws what the camera sees of an empty world, whose ground is at z = 0."""
+    """Draws the empty world that the camera sees, with its ground at z = 0."""
     across = (np.arange(width) + 0.5 - width / 2.0) * (2.0 * camera.slope / height)
     down = (np.arange(height)[:, np.newaxis] + 0.5 - height / 2.0) * (2.0 * camera.slope / height)
     right, up, forward = camera.axes

@@ -1,7 +1,7 @@
 """Mesh files with their colours and textures.
 
-Our checked reader reads a file first. If it refuses the file, nothing is shown; else the file may be read
-once more for its materials, which that reader skips.
+Our checked reader goes first: a file that it refuses isn't shown. It skips materials, so the file may then
+be read once more for them.
 """
 
 import os
@@ -25,7 +25,7 @@ MOST_KEPT = 32  # files
 MOST_TEXTURE = 32_000_000  # [bytes] of a model with its textures, for the browser
 MOST_COLORS = 64  # of a mesh whose faces have colours of their own, for pictures
 LARGEST_IMAGE = 1024  # [pixels] a side, for pictures
-STOPGAP = 2  # [pixels] a side of trimesh's image for a missing one
+STOPGAP = 2  # [pixels] a side of the image by which trimesh replaces a missing one
 WHITE = (255, 255, 255, 255)
 PLAIN = (".stl",)  # endings of files that have no materials
 # What trimesh, pycollada and Pillow raise over broken materials: the shape is shown without its looks.
@@ -50,7 +50,7 @@ class MeshPart:
 
 @dataclass(frozen=True, eq=False)
 class MeshLook:
-    """Triangles; and the file's scene, z up and in metres, if it has materials."""
+    """A mesh's triangles, and its scene (z up, in metres) if it has materials."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -120,7 +120,7 @@ def _read(path: str, _changed: int, _size: int) -> MeshLook:
 
 
 def _scene(path: str) -> "trimesh.Scene | None":
-    """Returns the file with its materials; None if it has none that can be read."""
+    """Returns the file's scene with its materials, or None if it has none that can be read."""
     if path.lower().endswith(PLAIN):
         return None
     import trimesh
@@ -153,7 +153,7 @@ def _has_look(part: object) -> bool:
 
 
 def _is_stopgap(material: Any) -> bool:
-    """Returns whether it is trimesh's own, for a missing material."""
+    """Returns whether trimesh made this material up for a missing one."""
     image = getattr(material, "image", None)
     return getattr(material, "kwargs", None) == {} and (image is None or max(image.size) <= STOPGAP)
 
@@ -186,7 +186,7 @@ def _color(material: Any) -> Color:
 
 
 def _rgba(color: Any) -> Color:
-    """Converts a colour of trimesh's: of 0 to 255 if it has integers, else of 0 to 1."""
+    """Converts a trimesh colour: integers range from 0 to 255, floats from 0 to 1."""
     numbers = np.ravel(color)
     scale = 255.0 if np.issubdtype(numbers.dtype, np.integer) or numbers.max() > 1.0 else 1.0
     red, green, blue, *rest = np.clip(numbers / scale, 0.0, 1.0).tolist()

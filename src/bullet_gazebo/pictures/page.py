@@ -33,7 +33,7 @@ class DrawnModel:
 
 
 class Picture:
-    """Draws models. For one thread.
+    """Draws models. Not thread-safe.
 
     Args:
         server: of the page.

@@ -1,7 +1,7 @@
 """Nodes of a page that move with links: batches of shapes with one geometry, and single nodes.
 
-With a node and two messages for each moved link, a browser would hang at a thousand links. A batch has the
-poses of up to 128 shapes in one array.
+A node per link would need two messages per move, and a thousand moving links would hang a browser. A batch
+sends the poses of up to 128 shapes in one array.
 """
 
 from collections import defaultdict
@@ -54,7 +54,7 @@ class Instance(NamedTuple):
 
 @dataclass
 class _Entry:
-    """An instance in a link of a model, the model by its number."""
+    """An instance, with its link and its model's number."""
 
     number: int
     link: int
@@ -62,7 +62,7 @@ class _Entry:
 
 
 class Batches:
-    """The instances of all models, by the models' numbers, as nodes below another one. For one thread."""
+    """The instances of all models, by model number, as nodes below a parent. Not thread-safe."""
 
     def __init__(self, scene: viser.SceneApi, below: str) -> None:
         self._scene, self._below = scene, below
@@ -194,7 +194,7 @@ class _Single:
 
 
 class Singles:
-    """Single nodes of all models: the ground, files with transparency, names. For one thread."""
+    """Single nodes of all models: the ground, files with transparency, names. Not thread-safe."""
 
     def __init__(self, below: str) -> None:
         self._below, self._named = below, 0
@@ -232,7 +232,7 @@ class Singles:
 
 
 def compose(outer: np.ndarray, inner: np.ndarray) -> np.ndarray:
-    """Returns the poses (n, 7) `inner`, given in the frames `outer` (n, 7), in the frame of `outer`."""
+    """Returns poses `inner` (n, 7), which are relative to `outer` (n, 7), in the frame that `outer` is in."""
     turn, w = outer[:, 3:6], outer[:, 6:]
     point, v, u = inner[:, :3], inner[:, 3:6], inner[:, 6:]
     twice = 2.0 * np.cross(turn, point)

@@ -42,8 +42,8 @@ class ShapeMaker:
 
     Args:
         scene: of the page.
-        batches: gets most shapes.
-        singles: gets the others.
+        batches: receives most shapes.
+        singles: receives the others.
         warn: takes a line that says what can't be shown.
     """
 
@@ -96,7 +96,7 @@ class ShapeMaker:
             self._singles.add(*where, np.array([*end, 0.0, 0.0, 0.0, 1.0]), label)
 
     def clear(self) -> None:
-        """Begins anew, after everything was removed."""
+        """Counts names from 0 again, after everything was removed."""
         self._names = 0
 
     def _add_part(

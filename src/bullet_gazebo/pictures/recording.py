@@ -82,7 +82,7 @@ class RecordingOptions:
 
 
 class RecordedModel(NamedTuple):
-    """What the other process has to know of a model; `links` are in the order of their poses."""
+    """What the drawing process needs to know about a model; `links` are in the order of their poses."""
 
     name: str
     root: str
@@ -135,7 +135,7 @@ class SimulationRecorder:
             self._news.notify()
 
     def _feed(self) -> None:
-        """Sends what waits, until `close` or until the other process has ended."""
+        """Sends queued messages until `close`, or until the other process ends."""
         pipe: Any = self._process.stdin
         try:
             while True:
@@ -155,10 +155,10 @@ class SimulationRecorder:
             logger.warning("%d frames of the recording were dropped", self._dropped)
 
     def close(self, patience: float) -> None:
-        """Ends the recording; the other process draws the last frames also after this one's end.
+        """Ends the recording; the other process may outlive this one to draw the last frames.
 
         Args:
-            patience: [s] for sending what waits.
+            patience: time to send what is queued [s].
         """
         with self._news:
             self._ending = True

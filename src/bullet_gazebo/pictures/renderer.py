@@ -1,7 +1,7 @@
 """Draws models by PyBullet's software renderer: no display, no OpenGL.
 
-A renderer has a world of its own, in which nothing moves by itself: it is given poses. So a picture never
-changes a simulation, whatever its engine, and the same poses give the same picture everywhere.
+A renderer has a world of its own, where nothing moves until it is placed. So a picture never changes
+a simulation, whatever its engine, and the same poses give the same picture everywhere.
 """
 
 import hashlib
@@ -22,9 +22,9 @@ from bullet_gazebo.scratch import scratch_folder
 
 MOST_CORNERS = 90_000  # of a body: PyBullet refuses more than 131072
 FARTHEST = 1e6  # [m]; beyond it nothing is drawn
-FINER = 2  # the renderer's pixels across one of the picture: smooth edges
-LIGHT = (1.0, -2.0, 4.0)  # direction that it comes from
-NOTHING = 0.9999  # depth, as OpenGL measures it, beyond which nothing is visible
+FINER = 2  # rendered pixels per pixel of the picture, along each side: smooth edges
+LIGHT = (1.0, -2.0, 4.0)  # the direction towards it
+NOTHING = 0.9999  # OpenGL depth beyond which nothing is visible
 
 Region = tuple[int, int, int, int]
 """Left, top, right and bottom [pixels]."""
@@ -89,11 +89,11 @@ class DrawnPart:
             self.show()
 
     def show(self) -> None:
-        """Puts it to its own place."""
+        """Puts it back in its place."""
         self._put(self._seen)
 
     def hide(self, place: Vector) -> None:
-        """Puts it to a place [m] out of sight until `show`."""
+        """Moves it to a place [m] out of sight until `show`."""
         self._put(Pose(place, IDENTITY))
 
     def _put(self, pose: Pose) -> None:
@@ -176,7 +176,7 @@ class Renderer:
         return np.concatenate([np.zeros((0, 3)), *found])
 
     def picture(self, camera: Camera, width: int, height: int) -> np.ndarray:
-        """Draws what the camera sees."""
+        """Returns what the camera sees: (height, width, 3) of uint8."""
         behind: Background = self._background(camera, FINER * width, FINER * height)
         fine = Image.fromarray(behind.colours)
         whole = np.asarray(fine.reduce(FINER)).copy()

@@ -107,7 +107,7 @@ def _joint(joint: Joint) -> VisibleJoint:
 
 
 def visible_shapes(model: ModelDescription) -> list[tuple[str, Shape]]:
-    """Returns a model's visible shapes with their links; its collision shapes if it has no visuals."""
+    """Returns a model's visible shapes with their links, or its collision shapes if it has no visuals."""
     visuals = [(link.name, shape) for link in model.links.values() for shape in link.visuals]
     found = visuals or [
         (link.name, shape) for link in model.links.values() for shape in link.collisions

@@ -1,6 +1,6 @@
-"""threading.Lock and RLock, where the script itself makes them: a thread that waits for one rests.
+"""Replaces threading.Lock and RLock where the script itself creates them: a thread that waits for one rests.
 
-Else a callback that wants a lock would seem to compute, and be waited for by the very thread that holds it.
+Otherwise a callback blocked on a lock would seem to compute, and the lock's holder would wait for it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from lockstep_runner.script import GO_BETWEENS, is_the_script
 
 
 def install(runner: ScriptRunner) -> None:
-    """Puts the functions in place."""
+    """Replaces threading.Lock and threading.RLock."""
     make_lock, make_rlock = threading.Lock, threading.RLock
 
     def lock() -> Any:
@@ -30,7 +30,7 @@ def install(runner: ScriptRunner) -> None:
 
 
 def _is_asked_for_by_the_script() -> bool:
-    """Python's own, as those inside an Event, are held for moments; but a Condition's may be held long."""
+    """Returns False for locks inside Event and the like, held briefly; a Condition's may be held long."""
     return is_the_script(2) and (
         sys._getframe(2).f_globals.get("__name__") not in GO_BETWEENS
         or sys._getframe(2).f_code is threading.Condition.__init__.__code__
@@ -38,17 +38,17 @@ def _is_asked_for_by_the_script() -> bool:
 
 
 class _Lock:
-    """A lock whose waits are simulated time where its holder's are."""
+    """A lock whose waits take simulated time if the clock controls waiter and holder."""
 
     def __init__(self, runner: ScriptRunner, real: Any) -> None:
         self._runner = runner
         self._real = real
-        self._holder = 0  # the thread that has it; 0: nobody
+        self._holder = 0  # id of the thread that holds it; 0 if free
         self._at_fork_reinit = real._at_fork_reinit
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        """As of Python's own."""
-        if timeout == -1 or not blocking:  # Python says what is wrong with both
+        """As Python's own."""
+        if timeout == -1 or not blocking:  # Python's own lock rejects a time limit without blocking
             came = self._real.acquire(False) if blocking else self._real.acquire(False, timeout)
         else:
             came = self._real.acquire(True, 0 if timeout > 0 else timeout)
@@ -64,7 +64,7 @@ class _Lock:
         self.release()
 
     def release(self) -> None:
-        """As of Python's own."""
+        """As Python's own."""
         holder, self._holder = self._holder, 0
         try:
             self._real.release()
@@ -73,11 +73,11 @@ class _Lock:
             raise
 
     def locked(self) -> bool:
-        """As of Python's own."""
+        """As Python's own."""
         return bool(self._real.locked())
 
     def _wait(self, seconds: float) -> bool:
-        """Until nobody has it; in wall time where the clock doesn't know who has."""
+        """Waits for the lock and takes it; in wall time if the clock doesn't control its holder."""
         runner, clock = self._runner, self._runner.clock
         end = clock.passed + seconds * NANOSECONDS
         while (
@@ -96,14 +96,14 @@ class _Lock:
 
 
 class _RLock(_Lock):
-    """One that its holder may take again."""
+    """A lock that its holder may take again."""
 
     def __init__(self, runner: ScriptRunner, real: Any) -> None:
         super().__init__(runner, real)
         self._depth = 0  # how often its holder has taken it
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        """As of Python's own."""
+        """As Python's own."""
         came = super().acquire(blocking, timeout)
         self._depth += came
         return came
@@ -111,14 +111,14 @@ class _RLock(_Lock):
     __enter__ = acquire
 
     def release(self) -> None:
-        """As of Python's own."""
+        """As Python's own."""
         if self._depth == 1 or not self._is_owned():
-            super().release()  # which may refuse
+            super().release()  # raises if this thread doesn't hold it
         else:
             self._real.release()
         self._depth -= 1
 
-    # What Condition asks of it
+    # Condition calls the methods below.
 
     def _is_owned(self) -> bool:
         return bool(self._real._is_owned())
@@ -129,7 +129,7 @@ class _RLock(_Lock):
 
     def _acquire_restore(self, saved: Any) -> None:
         depth, real = saved
-        super().acquire()  # which may take time
+        super().acquire()  # simulated time may pass here
         self._real.release()
         self._real._acquire_restore(real)
         self._depth, self._holder = depth, threading.get_ident()

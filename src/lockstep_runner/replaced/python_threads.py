@@ -1,7 +1,7 @@
-"""Waits of Python's that become simulated time where the script itself calls them.
+"""Makes Python's waits take simulated time where the script itself calls them.
 
 Event.wait, Condition.wait, Thread.start and join; through them queue, threading.Timer and concurrent.futures;
-time.sleep, and with --virtual-wall-clock time.time, monotonic and perf_counter.
+time.sleep; with --virtual-wall-clock also time.time, monotonic and perf_counter.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from lockstep_runner.looks import LOOK
 from lockstep_runner.runner import ScriptRunner
 from lockstep_runner.script import caller, is_the_script
 
-# [s]; what is left of a time limit where the last digits of its two ends were rounded: it is over.
+# [s] a time limit with less than this left is over: the rest is floating-point error.
 ROUNDING = 1e-6
 
 
 def replace_threads(runner: ScriptRunner) -> None:
-    """Puts the methods in place."""
-    rounded = threading.local()  # `passed`: where a thread's time limit was all but over
+    """Replaces the waits of threading, queue and concurrent.futures."""
+    rounded = threading.local()  # `passed`: when a thread's time limit was all but over
 
     def covered() -> bool:
         return (
@@ -52,7 +52,7 @@ def replace_threads(runner: ScriptRunner) -> None:
     def condition_wait(self: threading.Condition, timeout: float | None = None) -> bool:
         if not covered():
             return originals.condition_wait(self, timeout)
-        if timeout is not None and 0.0 < timeout < ROUNDING:  # else its caller asks for it for ever
+        if timeout is not None and 0.0 < timeout < ROUNDING:  # else its caller asks again for ever
             rounded.passed = runner.clock.passed
             timeout = 0.0
         return wait_for_notice(runner, self, timeout)
@@ -71,7 +71,7 @@ def replace_threads(runner: ScriptRunner) -> None:
         work, gate = self.run, threading.Lock()
 
         def run() -> None:
-            gate.acquire()  # until it is known: its first wait may come at once
+            gate.acquire()  # until the clock knows this thread: it may wait at once
             vars(self).pop("run", None)
             work()
 
@@ -84,11 +84,11 @@ def replace_threads(runner: ScriptRunner) -> None:
             gate.release()
 
     def time_limits() -> float:
-        """The clock of time limits: simulated where the wait is."""
+        """Returns the time [s] for time limits: simulated time where the wait is simulated."""
         if not covered():
             return originals.monotonic()
         passed = runner.clock.passed
-        is_over = vars(rounded).pop("passed", None) == passed  # asked once, by who waited
+        is_over = vars(rounded).pop("passed", None) == passed  # once, for the waiting thread
         return begun + passed / 1e9 + (ROUNDING if is_over else 0.0)
 
     begun = originals.monotonic()
@@ -101,10 +101,10 @@ def replace_threads(runner: ScriptRunner) -> None:
 
 
 def wait_for_notice(runner: ScriptRunner, condition: Any, timeout: float | None) -> bool:
-    """As Condition.wait, in simulated time: the lock is given back while it waits.
+    """As Condition.wait in simulated time: releases the lock while it waits.
 
     Raises:
-        RuntimeError: if the lock isn't held.
+        RuntimeError: the caller doesn't hold the lock.
     """
     if not condition._is_owned():
         raise RuntimeError("cannot wait on un-acquired lock")
@@ -131,17 +131,17 @@ def _span(timeout: float | None) -> float:
 
 @dataclass
 class _Tasks:
-    """Those of one executor."""
+    """The tasks of one executor."""
 
     guard: Any = field(default_factory=originals.Condition)
     submitted: int = 0
     begun: int = 0
-    busy: int = 0  # threads
-    over: bool = False  # its threads end when they have done what there is to do
+    busy: int = 0  # threads that run a task
+    over: bool = False  # shut down: its threads end after the last task
 
 
 class _Task:
-    """A function of the script's for an executor."""
+    """A function that the script submitted to an executor."""
 
     def __init__(self, call: Callable[..., Any], tasks: _Tasks) -> None:
         self.tasks = tasks
@@ -152,7 +152,7 @@ class _Task:
 
 
 def replace_futures(runner: ScriptRunner) -> None:
-    """Puts the methods in place."""
+    """Replaces ThreadPoolExecutor.submit and shutdown, and what its workers run."""
     submit, run = ThreadPoolExecutor.submit, pools._WorkItem.run
     shut_down = ThreadPoolExecutor.shutdown
     executors: WeakKeyDictionary[ThreadPoolExecutor, _Tasks] = WeakKeyDictionary()
@@ -166,7 +166,7 @@ def replace_futures(runner: ScriptRunner) -> None:
         with tasks.guard:
             future = submit(self, _Task(call, tasks), *args, **kwds)
             tasks.submitted += 1
-            # It begins before the script goes on, unless all threads are busy
+            # The task begins before the script goes on, unless all workers are busy
             while tasks.begun < tasks.submitted and tasks.busy < self._max_workers:
                 originals.condition_wait(tasks.guard, LOOK)
         return future
@@ -186,7 +186,7 @@ def replace_futures(runner: ScriptRunner) -> None:
         finally:
             with tasks.guard:
                 tasks.busy -= 1
-                if tasks.begun == tasks.submitted and not tasks.over:  # else it has more to do
+                if tasks.begun == tasks.submitted and not tasks.over:  # else more tasks wait
                     runner.clock.ended(threading.current_thread())
 
     def shutting_down(self: ThreadPoolExecutor, *args: Any, **kwds: Any) -> None:
@@ -195,7 +195,7 @@ def replace_futures(runner: ScriptRunner) -> None:
             with tasks.guard:
                 tasks.over = True
                 for thread in self._threads:
-                    runner.clock.began(thread)  # to end; those that rest do so later
+                    runner.clock.began(thread)  # it computes until it ends; resting ones end later
         shut_down(self, *args, **kwds)
 
     ThreadPoolExecutor.shutdown = shutting_down  # type: ignore[method-assign, assignment]
@@ -204,10 +204,10 @@ def replace_futures(runner: ScriptRunner) -> None:
 
 
 def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
-    """Puts the functions in place."""
+    """Replaces time.sleep, and with `virtual_wall_clock` Python's clocks."""
 
     def sleep(seconds: float) -> None:
-        """As time.sleep: the world moves on by as much."""
+        """As time.sleep, in simulated time [s]."""
         if (
             rospy.core.is_shutdown()
             or not is_the_script(1)
@@ -222,7 +222,7 @@ def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
                 " thread: its sleeps are wall time, so that what it does isn't repeatable; rospy.sleep,"
                 " rospy.Rate and rospy.Timer are covered",
             )
-            runner.clock.ended(threading.current_thread())  # nobody waits for it
+            runner.clock.ended(threading.current_thread())  # time doesn't wait for this thread
             originals.sleep(seconds)
         elif runner.is_connected():
             if seconds < 0:
@@ -243,6 +243,6 @@ def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
 
 
 def _is_wall_time(runner: ScriptRunner) -> bool:
-    """Whether this thread's time.sleep isn't covered: the script's own threads are free to use the wall's."""
+    """Returns whether this thread sleeps in wall time, as threads do that the script itself started."""
     clock = runner.clock
     return not clock.covers_this_thread() or clock.is_own(threading.current_thread())

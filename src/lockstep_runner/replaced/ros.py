@@ -1,6 +1,6 @@
-"""What is replaced of rospy: publishers, subscribers, service calls, waits, timers, and reading the time.
+"""Replaces rospy's publishers, subscribers, service calls, waits, timers, and time readings.
 
-Messages to and from the simulator go with its time; connections to services last.
+Messages to and from the simulator travel with its time; connections to services are kept.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ros_calls.service import ServiceClient
 
 
 def replace_topics(runner: ScriptRunner) -> None:
-    """Puts the methods in place."""
+    """Replaces publishing, subscribing and rospy.wait_for_message."""
     _divert(runner)
     _leave_others_out(runner)
     publish = rospy.topics.Publisher.publish
@@ -48,7 +48,7 @@ def replace_topics(runner: ScriptRunner) -> None:
 
     def subscriber(self: rospy.Subscriber, *args: Any, **kwds: Any) -> None:
         begin_subscriber(self, *args, **kwds)
-        self.impl.set_queue_size(None)  # else what came in one reading is thrown away
+        self.impl.set_queue_size(None)  # a limit would drop messages that arrive together
         runner.topics.changed()
 
     rospy.topics.Publisher.publish = publishing
@@ -59,7 +59,7 @@ def replace_topics(runner: ScriptRunner) -> None:
 
 
 def _divert(runner: ScriptRunner) -> None:
-    """What is published for the simulator waits for the next call instead of going over the connection."""
+    """Keeps messages for the simulator until the next call, instead of sending them over the connection."""
     add_connection = _TopicImpl.add_connection
 
     def adding(topic: _TopicImpl, connection: Any) -> bool:
@@ -71,7 +71,7 @@ def _divert(runner: ScriptRunner) -> None:
 
 
 def _leave_others_out(runner: ScriptRunner) -> None:
-    """What comes from others in wall time is left out of topics that the simulator publishes, too."""
+    """Drops other nodes' messages, which come in wall time, on topics that the simulator publishes."""
     receive = _SubscriberImpl.receive_callback
 
     def receiving(self: _SubscriberImpl, messages: list[Any], connection: Any) -> None:
@@ -82,7 +82,7 @@ def _leave_others_out(runner: ScriptRunner) -> None:
 
 
 class _Waiting:
-    """rospy.wait_for_message. It keeps its subscriptions: a new one each time costs 10 ms."""
+    """Replaces rospy.wait_for_message. Keeps its subscriptions, as each new one costs 10 ms."""
 
     def __init__(self, runner: ScriptRunner, original: Callable[..., Any]) -> None:
         self._runner = runner
@@ -122,12 +122,12 @@ class _Last:
         self.count += 1
 
     def latched(self) -> bool:
-        """Whether a new subscriber would get the newest message at once."""
+        """Returns whether a new subscriber would get the newest message at once."""
         return any(each.is_latched for each in self._subscriber.impl.connections)
 
 
 def replace_services(runner: ScriptRunner) -> None:
-    """Puts the methods in place."""
+    """Replaces the calls of rospy's ServiceProxy and of ServiceClient."""
     begin, call = ServiceProxy.__init__, ServiceProxy.call
 
     def beginning(
@@ -155,7 +155,7 @@ def replace_services(runner: ScriptRunner) -> None:
                 raise
             finally:
                 self._lockstep_guard.release()
-        else:  # another thread is in the middle of a call
+        else:  # another thread is calling over this connection
             proxy = ServiceProxy(self.resolved_name, self.service_class)
             try:
                 answer = call(proxy, request)
@@ -170,12 +170,12 @@ def replace_services(runner: ScriptRunner) -> None:
 
 
 def _let_time_pass_with(runner: ScriptRunner, kind: type[ServiceClient]) -> None:
-    """The same for those of ros_utils, whose connections are its own affair; a call is begun and ended."""
+    """Does the same for ServiceClient, which keeps its own connections and splits a call in two."""
     begin, end = kind.begin, kind.end
     requests: WeakKeyDictionary[ServiceClient, tuple[Any, ...]] = WeakKeyDictionary()
 
     def beginning(self: ServiceClient, *request: Any) -> None:
-        if self.name != ADVANCE:  # which is ours
+        if self.name != ADVANCE:  # the runner's own call
             runner.before_call(self.name)
             requests[self] = request
         begin(self, *request)
@@ -191,7 +191,7 @@ def _let_time_pass_with(runner: ScriptRunner, kind: type[ServiceClient]) -> None
 
 
 def _drop_if_broken(proxy: ServiceProxy) -> None:
-    """A kept connection has nothing to say between two calls, unless its other end has gone."""
+    """Closes a kept connection if its other end has gone: only then is it readable between two calls."""
     if proxy._lockstep_kept and proxy.transport is not None:
         connection = proxy.transport.socket
         if connection is None or select.select([connection], [], [], 0)[0]:
@@ -211,7 +211,7 @@ def _bytes(request: Any) -> bytes:
 
 
 def replace_time(runner: ScriptRunner) -> None:
-    """Puts the functions in place."""
+    """Replaces rospy's sleep, spin, Timer and time readings."""
     sleep, spin, start_timer = rospy.timer.sleep, rospy.spin, rospy.timer.Timer.__init__
 
     def ros_sleep(duration: float | genpy.Duration) -> None:
@@ -246,7 +246,7 @@ def replace_time(runner: ScriptRunner) -> None:
 
 
 def _counted(runner: ScriptRunner, read: Callable[[], Any]) -> Callable[[], Any]:
-    """A script that only looks at the clock waits for it."""
+    """Returns `read` with its calls counted: a script that only reads the clock is waiting for it."""
 
     def look() -> Any:
         runner.reads_time()

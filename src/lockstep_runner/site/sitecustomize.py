@@ -1,4 +1,4 @@
-"""Read by every Python process below a script in lock-step, and by no other (see ../nodes/starting.py)."""
+"""Read by every Python process below a script in lock-step, and by no other (see ../followers.py)."""
 
 import importlib.machinery
 import importlib.util

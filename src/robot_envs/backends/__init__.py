@@ -21,7 +21,7 @@ BACKENDS = (IN_PROCESS, MUJOCO, LOCKSTEP, OWN, REALTIME)
 
 
 def has_ros() -> bool:
-    """Whether ROS's Python packages can be imported."""
+    """Returns whether ROS's Python packages can be imported."""
     return find_spec("rospy") is not None
 
 

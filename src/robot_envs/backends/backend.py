@@ -26,7 +26,7 @@ class RobotBackend(Protocol):
     shared: bool  # whether all backends of its kind in a process move the same robots
 
     def look(self, query: StateQuery) -> None:
-        """Adds to all later states what a query names, beside the joints."""
+        """Adds what a query names to all later states, which otherwise have only joints."""
         ...
 
     def reset(self, initial: InitialState) -> WorldState:
@@ -38,7 +38,7 @@ class RobotBackend(Protocol):
         ...
 
     def begin(self, commands: Commands) -> None:
-        """Sends commands whose result `act` with the same commands will wait for, and returns at once.
+        """Sends commands and returns at once; `act` with the same commands waits for the result.
 
         Calling it is optional, and does nothing in this process and in real time. Any other call before
         `act` takes the answer first; a reset drops it.
@@ -54,7 +54,7 @@ class RobotBackend(Protocol):
         ...
 
     def poses(self, links: Sequence[str]) -> list[Pose]:
-        """Poses of link frames in the world, each link named model::link."""
+        """Returns poses of link frames in the world, each link named model::link."""
         ...
 
     def close(self) -> None:
@@ -63,7 +63,7 @@ class RobotBackend(Protocol):
 
 
 def ticks_per_action(control_period: float, physics_step: float) -> int:
-    """How many physics steps make one control period, both in [s].
+    """Returns how many physics steps make one control period, both in [s].
 
     Raises:
         ValueError: if the period isn't a whole number of steps.
@@ -90,7 +90,7 @@ class StartingWorld(Protocol):
 
 
 class Slot(NamedTuple):
-    """Which of the simulators that start together one is, from 1 on."""
+    """The place of a simulator among those that start together, from 1 on."""
 
     number: int = 1
     of: int = 1
@@ -140,7 +140,7 @@ def side_by_side(count: int) -> Iterator[None]:
 
 
 def next_slot() -> Slot:
-    """The slot of the simulator that starts now."""
+    """Returns the slot of the simulator that starts now."""
     group = _group.get()
     return Slot() if group is None else Slot(len(group.starting) + 1, group.count)
 

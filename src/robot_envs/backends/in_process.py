@@ -221,7 +221,7 @@ def _motion(state: tuple[Pose, Twist]) -> Motion:
 
 
 def control_tick(description: ModelDescription) -> float:
-    """The period at which the URDF has controllers updated [s]; 0: every physics step."""
+    """Returns the period at which the URDF has controllers updated [s]; 0: every physics step."""
     for plugin in description.plugins:
         if plugin.filename == DRIVES:
             with contextlib.suppress(ValueError):
@@ -280,7 +280,7 @@ class InProcessChanges:
         return self._sim.world.gravity
 
     def set_gravity(self, gravity: Vector) -> None:
-        # The service set_physics_properties sets step and solver, too, and the bits must be the same.
+        # As the service set_physics_properties, also sets step and solver, to stay bit-identical to it.
         world = self._sim.world
         world.set_gravity(gravity)
         self._sim.set_time_step(world.time_step)

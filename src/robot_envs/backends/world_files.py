@@ -60,7 +60,7 @@ def _read(source: Source) -> WorldDescription:
 
 
 def world_models(source: Source | None) -> dict[str, ModelDescription]:
-    """The models of a world file; none for `EMPTY`. Raises RobotEnvError if it can't be read."""
+    """Returns the models of a world file; none for `EMPTY`. Raises RobotEnvError if it can't be read."""
     return {} if source is None or source == EMPTY else _read(source).models
 
 

@@ -47,7 +47,7 @@ class LinkView:
         self._wanted = list(zip(keys, places, frames, strict=True))
 
     def __call__(self, joints: Mapping[str, JointState]) -> dict[str, Motion]:
-        """The links, each in the frame asked for, by the names of the query.
+        """Returns the links, each in the frame asked for, by the names of the query.
 
         Args:
             joints: at least those that move the links.
@@ -67,13 +67,13 @@ class LinkView:
         return found
 
     def _poses(self, joints: Mapping[str, JointState], time: float) -> dict[str, Pose]:
-        """Poses of all links at a time from now [s]."""
+        """Returns the poses of all links at a time from now [s]."""
         positions = {name: each.position + time * each.velocity for name, each in joints.items()}
         return link_poses(self._links, self._root, positions)
 
 
 def _twist(before: Pose, after: Pose) -> tuple[Vector, Vector]:
-    """Linear and angular velocity in the world, between two poses 2 * INSTANT apart."""
+    """Returns the linear and angular velocity in the world, between two poses 2 * INSTANT apart."""
     rate = 0.5 / INSTANT
     linear = scale(subtract(after.position, before.position), rate)
     x, y, z, w = multiply(after.orientation, conjugate(before.orientation))
@@ -102,7 +102,7 @@ def _of_frame(robot: Robot, query: LinkQuery) -> tuple[str, Pose] | None:
 
 
 def _of_link(robot: Robot, name: str) -> tuple[str, Pose]:
-    """The link that joints move, and the pose in it of the link of that name, which it may include.
+    """Returns the link that joints move, and the pose in it of the link of that name, which it may include.
 
     Raises:
         RobotEnvError: if there is none, or it depends on a joint whose position isn't known.

@@ -51,7 +51,7 @@ class CommandLimits:
         ]
 
     def __call__(self, command: Command, held: Command) -> Limited:
-        """The nearest command that is allowed after the present one."""
+        """Returns the nearest command that is allowed after the present one."""
         exceeded, numbers = [], []
         wanted, before = self._numbers(command), self._numbers(held)
         for joint, value, start, (lower, upper), way in zip(
@@ -67,7 +67,7 @@ class CommandLimits:
         return [command] if self._port.single else list(command)  # type: ignore[list-item, arg-type]
 
     def stop(self, joints: Mapping[str, JointState]) -> Command:
-        """The command that stops the joints: their present positions, or zero velocity or effort."""
+        """Returns the command that stops the joints: their present positions, or zero velocity or effort."""
         return self._port.at_start({name: each.position for name, each in joints.items()})
 
 
@@ -88,8 +88,8 @@ Say = Callable[[str], None]
 class Pilot:
     """Runs a policy on a task, as in an environment, from the robot's joint states.
 
-    All methods of the task are called as in an environment, also its reward, so that data which a task
-    stores is as in the training. Joints aren't moved to the task's initial state.
+    Calls all methods of the task as an environment does, even its reward, so that the task stores the same
+    data as in training. Joints aren't moved to the task's initial state.
 
     Args:
         robot: the robot.

@@ -65,12 +65,12 @@ class JointListener:
                 self._known[name] = JointState(*values), stamp, now
 
     def missing(self) -> list[str]:
-        """The joints whose states aren't known yet."""
+        """Returns the joints whose states aren't known yet."""
         with self._lock:
             return [name for name in self._joints if name not in self._known]
 
     def look(self) -> tuple[dict[str, JointState], float]:
-        """The joints, all of which are known, and when the oldest of their states arrived [s of ROS time]."""
+        """Returns all joints, once known, and when the oldest of their states arrived [s of ROS time]."""
         with self._lock:
             known = {name: self._known[name] for name in self._joints}
         oldest = min(arrival for _, _, arrival in known.values())
@@ -82,7 +82,7 @@ class JointListener:
             self._known.clear()
 
     def close(self) -> None:
-        """Leaves the topic."""
+        """Unsubscribes."""
         self._subscriber.unregister()
 
 
@@ -93,7 +93,7 @@ SENDING = 1.0  # [s] of wall time, for each of the last commands to be sent
 
 
 def late_by_default(period: float) -> float:
-    """How long the robot may be without a joint state before it is stopped [s], for a control period [s]."""
+    """Returns how long joint states may be missing before a stop [s], for a control period [s]."""
     return max(LATE_PERIODS * period, LATE_AT_LEAST)
 
 
@@ -162,7 +162,7 @@ class PolicyNode:
         """Runs until it should end, or the node is shut down.
 
         Args:
-            should_end: is polled. A signal handler can't end the run itself: it may have interrupted a
+            should_end: polled. A signal handler can't end the run itself: it may have interrupted a
                 command that is being published.
 
         Raises:
@@ -179,7 +179,7 @@ class PolicyNode:
             self._ended.set()
 
     def _end_in_time(self) -> None:
-        """After `rosnode kill`: messages that are published later aren't sent."""
+        """Holds up `rosnode kill` until the robot is stopped: later messages wouldn't be sent."""
         self._is_killed.set()
         self._ended.wait(3.0 * SENDING)
 
@@ -286,7 +286,7 @@ class PolicyNode:
         rospy.loginfo("the robot is stopped")
 
     def _sent(self) -> dict[tuple[str, int], int]:
-        """How many messages each listener was sent, by topic and connection."""
+        """Returns how many messages each listener was sent, by topic and connection."""
         return {
             (name, connection.id): connection.stat_num_msg
             for name, topic in self._topics.items()

@@ -60,7 +60,7 @@ class RobotPicture:
         self._drawn: _DrawnRobot | None = None
 
     def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
-        """The robot with its joints at these positions [rad, m], by name: (height, width, 3) of uint8.
+        """Draws the robot with its joints at these positions [rad, m], by name: (height, width, 3) of uint8.
 
         Raises:
             RobotEnvError: if the robot's file can't be read.
@@ -163,7 +163,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         return {plain: joints[name].position for plain, name in names.items() if name in joints}
 
     def _base(self) -> Pose:
-        """The pose of the first robot's root link."""
+        """Returns the pose of the first robot's root link."""
         robot = self.scene.robots[0]
         if robot.links.fixed_base:
             return self.scene.stand(self._initial, robot).compose(robot.links.root_pose)
@@ -173,7 +173,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         return self.backend.poses(links)
 
     def render(self) -> np.ndarray | None:
-        """A picture of the robot, (height, width, 3) of uint8; None in the render mode "human".
+        """Returns a picture of the robot, (height, width, 3) of uint8; None in the render mode "human".
 
         Raises:
             SimulatorError: if the backend has to be asked where the robot is, and doesn't answer.

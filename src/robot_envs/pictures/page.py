@@ -174,7 +174,7 @@ def _draw_ground(server: viser.ViserServer) -> None:
 
 
 def _seen(placement: Placement) -> list[VisibleModel]:
-    """The robot with all of its links, and the visible links of what is beside it."""
+    """Returns the robot with all of its links, and the visible links of what is beside it."""
     models = []
     for number, (name, shapes) in enumerate(placement.models.items()):
         links: dict[str, list[Shape]] = defaultdict(list)

@@ -49,7 +49,7 @@ class Surroundings:
         return self._scene.robots[1:]
 
     def poses(self) -> dict[str, dict[str, Pose]]:
-        """The poses of links, by model."""
+        """Returns the poses of links, by model."""
         asked = self._asked
         found: dict[str, dict[str, Pose]] = {model: {} for model, _ in asked}
         if asked:
@@ -104,7 +104,7 @@ class Placement:
         return {self.name: self.shapes, **(self._beside.shapes if self._beside else {})}
 
     def poses(self, positions: Mapping[str, float], base: Pose) -> dict[str, dict[str, Pose]]:
-        """The frame of every link in the world, by model.
+        """Returns the frame of every link in the world, by model.
 
         Args:
             positions: of the robot's joints [rad, m].
@@ -115,7 +115,7 @@ class Placement:
         return {self.name: own, **others}
 
     def reach(self) -> np.ndarray:
-        """Corners of boxes around all that the robots' joints can reach from the start, (n, 3) [m]."""
+        """Returns box corners around all that the robots' joints can reach from the start, (n, 3) [m]."""
         others = [Placement(each).reach() for each in self._beside.robots] if self._beside else []
         return np.concatenate([self._own_reach(), *others])
 
@@ -144,7 +144,7 @@ class Placement:
         return replace(seen, distance=ROOM * seen.distance)
 
     def travelled(self, positions: Mapping[str, float], base: Pose) -> Vector:
-        """How far it has moved from its start [m]: its root link, and along slides without near stops."""
+        """Returns how far it is from its start [m]: its root link, and along slides without near stops."""
         if self._carried is None:
             return subtract(base.position, self._start.position)
         here, there = (
@@ -162,7 +162,7 @@ class Placement:
                 continue  # drawing it reports that
 
     def _places(self) -> Iterator[tuple[Joint, float]]:
-        """Sample positions of the joints [rad, m]: at their stops, or all the way round."""
+        """Yields sample positions of the joints [rad, m]: at their stops, or all the way round."""
         for joint in self.description.movable_joints:
             if _has_near_stops(joint):
                 yield from ((joint, joint.lower), (joint, joint.upper))

@@ -95,13 +95,13 @@ class Balance(Task):
         return 1.0 - 0.5 * off * off - 0.01 * float(np.square(action).sum())
 
     def is_terminal(self, state: WorldState) -> bool:
-        """Whether a rod has fallen, or the cart is at the rail's end."""
+        """Returns whether a rod has fallen, or the cart is at the rail's end."""
         cart, lower, upper = rods(state)
         return abs(cart[0]) > EDGE or abs(lower[0]) > LEAN or abs(upper[0]) > LEAN
 
 
 def rods(state: WorldState) -> list[tuple[float, float]]:
-    """Position and speed of the cart [m, m/s], and of both rods against the vertical [rad, rad/s]."""
+    """Returns position and speed: the cart's [m, m/s], and both rods' from the vertical [rad, rad/s]."""
     cart, lower, upper = (
         state.joints[name] for name in ("cart_joint", "lower_joint", "upper_joint")
     )

@@ -95,7 +95,7 @@ class SwingUp(Task):
         return height * (0.4 + 0.3 * calm + 0.3 * near)
 
     def is_terminal(self, state: WorldState) -> bool:
-        """Whether the arm has gone round."""
+        """Returns whether the arm has gone round."""
         return abs(state.joints["arm_joint"].position) > TURNS
 
     def info(self, state: WorldState) -> dict[str, Any]:

@@ -110,7 +110,7 @@ class HopForward(Task):
         return 0.5 + speed - 0.02 * float(np.square(action).sum())
 
     def is_terminal(self, state: WorldState) -> bool:
-        """Whether it has fallen."""
+        """Returns whether it has fallen."""
         joints = state.joints
         return joints["up"].position < LOW or abs(joints["pitch"].position) > LEAN
 

@@ -119,5 +119,5 @@ class ReachInSpace(Task):
 
 
 def set_points(state: WorldState) -> tuple[float, ...]:
-    """The set-points of the joints [rad]."""
+    """Returns the set-points of the joints [rad]."""
     return state.commands["arm_controller"]

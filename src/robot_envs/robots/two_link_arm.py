@@ -141,7 +141,7 @@ class ReachGoal(GoalTask):
         return spaces.numbers(6)
 
     def goals(self) -> gymnasium.spaces.Box:
-        """Points of the plane (x, y) [0.1 m]."""
+        """Returns points of the plane (x, y) [0.1 m]."""
         return gymnasium.spaces.Box(-10.0, 10.0, (2,), np.float32)
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
@@ -161,31 +161,31 @@ class ReachGoal(GoalTask):
         return np.array(tip(state), np.float32) / np.float32(GOAL_UNIT)
 
     def is_success(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
-        """Whether the tip is there; vectorised."""
+        """Returns whether the tip is there; vectorised."""
         return np.linalg.norm(achieved - desired, axis=-1) <= CLOSE / GOAL_UNIT
 
 
 def draw_pose(rng: np.random.Generator) -> InitialState:
-    """A pose at rest, away from the joints' stops."""
+    """Returns a pose at rest, away from the joints' stops."""
     shoulder, elbow = rng.uniform(-2.4, 1.6), rng.uniform(0.2, 2.4)
     return InitialState(joints={"shoulder": float(shoulder), "elbow": float(elbow)})
 
 
 def draw_target(rng: np.random.Generator) -> tuple[float, float]:
-    """A point (x, y) [m] that the tip can reach; each as likely as any other."""
+    """Returns a point (x, y) [m] that the tip can reach; each as likely as any other."""
     radius = math.sqrt(rng.uniform(NEAREST**2, FURTHEST**2))
     bearing = rng.uniform(-WIDEST, WIDEST)
     return radius * math.cos(bearing), radius * math.sin(bearing)
 
 
 def speeds(action: np.ndarray) -> dict[str, float]:
-    """The commands of the controllers [rad/s]."""
+    """Returns the commands of the controllers [rad/s]."""
     shoulder, elbow = action * FASTEST
     return {"shoulder_controller": float(shoulder), "elbow_controller": float(elbow)}
 
 
 def joints(state: WorldState) -> list[float]:
-    """Cosine and sine of shoulder and elbow, and their speeds [3 rad/s]."""
+    """Returns the cosine and sine of shoulder and elbow, and their speeds [3 rad/s]."""
     shoulder, elbow = state.joints["shoulder"], state.joints["elbow"]
     return [
         math.cos(shoulder.position),
@@ -198,6 +198,6 @@ def joints(state: WorldState) -> list[float]:
 
 
 def tip(state: WorldState) -> tuple[float, float]:
-    """Position of the tip in the plane, (x, y) [m]."""
+    """Returns the position of the tip in the plane, (x, y) [m]."""
     x, y, _ = state.links["tip"].pose.position
     return x, y

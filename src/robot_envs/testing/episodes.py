@@ -123,7 +123,6 @@ def _given(env: Any, actions: list[Any], wrong: list[Any]) -> list[tuple[Any, ..
 
 
 def _wrong(space: gymnasium.Space[Any]) -> list[Any]:
-    """Actions outside a space."""
     wrong: list[Any] = [None, "1", float("nan")]
     if isinstance(space, gymnasium.spaces.Discrete):
         return [*wrong, int(space.start) - 1, int(space.start + space.n), np.zeros(2)]

@@ -146,7 +146,7 @@ def _vectors(subject: Subject) -> list[tuple[VectorEnv, str]]:
 
 
 def _run(env: gymnasium.Env[Any, Any], index: int, steps: int) -> list[Any]:
-    """Results of one environment alone; the step after an end is a reset, as in a vector."""
+    """Returns the results of one environment alone; the step after an end is a reset, as in a vector."""
     env.action_space.seed(SEED)
     given: list[Any] = [env.reset(seed=SEED + index)[0]]
     ended = False
@@ -162,7 +162,7 @@ def _run(env: gymnasium.Env[Any, Any], index: int, steps: int) -> list[Any]:
 
 
 def _run_all(vector: VectorEnv, steps: int) -> list[list[Any]]:
-    """The same for all environments of a vector."""
+    """Returns the same for all environments of a vector."""
     space = vector.single_action_space
     space.seed(SEED)
     seen, _ = vector.reset(seed=SEED)

@@ -47,12 +47,12 @@ class Subject:
         return self.options if self.backend is None else {**self.options, "backend": self.backend}
 
     def over(self, backend: str | None) -> "Subject":
-        """The same over another backend."""
+        """Returns the same over another backend."""
         return replace(self, backend=backend)
 
 
 def expect(right: bool, otherwise: str) -> None:
-    """Raises AssertionError with a text unless something is right."""
+    """Raises AssertionError with the text `otherwise` unless `right`."""
     if not right:
         raise AssertionError(otherwise)
 
@@ -61,9 +61,9 @@ def expect_error(call: Callable[[], Any], what: str, *kinds: type[Exception]) ->
     """Raises AssertionError unless a call raises an error of some kinds.
 
     Args:
-        call: should be refused.
+        call: what should be refused.
         what: describes the call, for the error.
-        kinds: of errors that are right.
+        kinds: the errors that may be raised.
     """
     wanted = " or ".join(kind.__name__ for kind in kinds)
     try:
@@ -88,7 +88,7 @@ PARTS = {
 
 
 def rollout(env: gymnasium.Env[Any, Any], steps: int, seed: int, two_phases: bool = False) -> Given:
-    """Results of an environment for seeded random actions; episodes follow one another.
+    """Returns the results of an environment for seeded random actions; episodes follow one another.
 
     Args:
         env: the environment.
@@ -109,7 +109,7 @@ def rollout(env: gymnasium.Env[Any, Any], steps: int, seed: int, two_phases: boo
 
 
 def differences(one: Given, other: Given) -> str:
-    """The first difference of two rollouts, in words; empty if they are bit-identical."""
+    """Returns the first difference of two rollouts, in words; empty if they are bit-identical."""
     for at, (first, second) in enumerate(zip(one, other, strict=False)):
         steps = sum(len(each) == 5 for each in one[: at + 1])
         when = f"step {steps}" if len(first) == 5 else f"the reset after {steps} steps"
@@ -122,7 +122,7 @@ def differences(one: Given, other: Given) -> str:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Whether two values are bit-identical: arrays, numbers, and containers of them."""
+    """Returns whether two values are bit-identical: arrays, numbers, and containers of them."""
     if type(one) is not type(other):
         return False
     if isinstance(one, np.ndarray):
@@ -140,7 +140,7 @@ def same(one: Any, other: Any) -> bool:
 
 
 def outside(space: gymnasium.Space[Any], value: Any) -> str:
-    """Why a value isn't in a space, in words; empty if it is."""
+    """Returns why a value isn't in a space, in words; empty if it is."""
     if space.contains(value):
         return ""
     if isinstance(space, gymnasium.spaces.Dict) and isinstance(value, Mapping):
@@ -165,7 +165,7 @@ def _outside_parts(space: gymnasium.spaces.Dict, value: Mapping[str, Any]) -> st
 
 
 def numbers(value: Any) -> Iterator[np.ndarray]:
-    """All arrays in a value."""
+    """Yields all arrays in a value."""
     if isinstance(value, Mapping):
         value = list(value.values())
     if isinstance(value, (list, tuple)):

@@ -117,7 +117,7 @@ def _run(
         check(*subjects)
     except AssertionError as error:
         faults[f"{name}: {' '.join(str(error).split())}"] = error
-    except Exception as error:  # noqa: BLE001 - the cause of the error that tells all faults
+    except Exception as error:  # noqa: BLE001 - the cause of the error that lists all faults
         text = f"{type(error).__name__}: {' '.join(str(error).split())}"
-        if not any(each.endswith(text) for each in faults):  # several checks run into one
+        if not any(each.endswith(text) for each in faults):  # several checks meet the same one
             faults[f"{name}: {text}"] = error

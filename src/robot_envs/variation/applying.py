@@ -29,7 +29,7 @@ class Changeable(Protocol):
     """A world whose robots can be varied; each method raises SimulatorError if the world refuses."""
 
     def link(self, link: RobotPart) -> Inertia:
-        """A link's present inertia."""
+        """Returns a link's present inertia."""
         ...
 
     def set_link(self, link: RobotPart, inertia: Inertia) -> None:
@@ -45,7 +45,7 @@ class Changeable(Protocol):
         ...
 
     def pids(self, controller: RobotPart) -> Mapping[str, PidGains]:
-        """The present gains of a controller's PIDs, by their place below the controller."""
+        """Returns the present gains of a controller's PIDs, by their place below the controller."""
         ...
 
     def set_pid(self, controller: RobotPart, place: str, gains: PidGains) -> None:
@@ -53,7 +53,7 @@ class Changeable(Protocol):
         ...
 
     def gravity(self) -> Vector:
-        """The world's present gravity [m/s²]."""
+        """Returns the world's present gravity [m/s²]."""
         ...
 
     def set_gravity(self, gravity: Vector) -> None:

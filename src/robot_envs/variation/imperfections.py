@@ -12,7 +12,7 @@ from robot_envs.world_state import Joints, JointState, WorldState
 
 
 def is_number(value: Any) -> bool:
-    """Whether it is a finite number, Python's or NumPy's, and no bool."""
+    """Returns whether it is a finite number, Python's or NumPy's, and no bool."""
     if isinstance(value, bool):
         return False
     try:
@@ -24,7 +24,7 @@ def is_number(value: Any) -> bool:
 def by_name(
     option: str, given: Any, names: Sequence[str], kind: str, which: str = ""
 ) -> dict[str, Any]:
-    """An option's values by name, unchecked; a mapping may leave names out.
+    """Returns an option's values by name, unchecked; a mapping may leave names out.
 
     Args:
         option: its name, for the error.
@@ -46,14 +46,14 @@ def by_name(
 
 
 def at_least_zero(option: str, given: Any) -> float:
-    """A finite number >= 0; raises ValueError for anything else."""
+    """Returns `given` as a finite number >= 0; raises ValueError for anything else."""
     if not is_number(given) or given < 0.0:
         raise ValueError(f"{option} must be a number >= 0, not {given!r}")
     return float(given)
 
 
 def steps(option: str, given: Any, most: int) -> int:
-    """A number of control steps; raises ValueError for anything else."""
+    """Returns `given` as a number of control steps; raises ValueError for anything else."""
     if not is_number(given) or not 0 <= given <= most or given != int(given):
         raise ValueError(
             f"{option} must be a number of control steps from 0 to {most}, not {given!r}"
@@ -80,12 +80,12 @@ class Encoder(NamedTuple):
     step: float = 0.0
 
     def rounded(self, position: float) -> float:
-        """The position that the encoder measures."""
+        """Returns the position that the encoder measures."""
         return round(position / self.step) * self.step if self.step else position
 
 
 class Sensor:
-    """Measures the joints, with noise, rounding and delay. The rest of a state is delayed alone, but for the
+    """Measures the joints, with noise, rounding and delay. The rest of a state is only delayed, except the
     commands, which are the present ones.
 
     The velocity of a joint with an `encoder_step` is the difference of two measured positions over the
@@ -161,7 +161,7 @@ class Sensor:
     def _measured(
         self, name: str, encoder: Encoder, position: float, velocity: float
     ) -> tuple[float, float]:
-        """What an encoder measures; before its start an episode's joints are taken to have moved steadily."""
+        """Returns what an encoder measures; joints are taken to have moved steadily before the episode."""
         measured = encoder.rounded(position)
         before = self._before.get(name)
         if before is None:
@@ -171,7 +171,7 @@ class Sensor:
 
 
 def _pair(option: str, given: Any) -> tuple[float, float]:
-    """Standard deviations of position and velocity."""
+    """Returns the standard deviations of position and velocity."""
     numbers = [given, given] if is_number(given) else np.ravel(given).tolist()
     if len(numbers) != 2:
         raise ValueError(f"{option} is a number or a pair (position, velocity), not {given!r}")

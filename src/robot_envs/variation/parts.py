@@ -72,15 +72,15 @@ class Parts:
                 self.controllers[scene.controller(robot, plain)] = RobotPart(robot, plain)
 
     def link(self, name: str) -> RobotPart:
-        """The link of that name; raises SimulatorError if there is none."""
+        """Returns the link of that name; raises SimulatorError if there is none."""
         return _found("link", self.links, name)
 
     def joint(self, name: str) -> RobotPart:
-        """The movable joint of that name; raises SimulatorError if there is none."""
+        """Returns the movable joint of that name; raises SimulatorError if there is none."""
         return _found("joint", self.joints, name)
 
     def controller(self, name: str) -> RobotPart:
-        """The running controller of that name; raises SimulatorError if there is none."""
+        """Returns the running controller of that name; raises SimulatorError if there is none."""
         return _found("controller", self.controllers, name)
 
     def pids(self) -> dict[str, dict[str, Gains]]:
@@ -97,7 +97,7 @@ def _found(kind: str, parts: Mapping[str, RobotPart], name: str) -> RobotPart:
 
 
 def gains_of(controller: RobotPart) -> dict[str, Gains]:
-    """The gains of a controller's PIDs in the robot's files, by their place below it."""
+    """Returns the gains of a controller's PIDs in the robot's files, by their place below it."""
     robot, name = controller
     try:
         loaded = load([name], robot.parameters, robot.hardware())[1]
@@ -107,7 +107,7 @@ def gains_of(controller: RobotPart) -> dict[str, Gains]:
 
 
 def check_tunable(pids: Mapping[str, Mapping[str, Gains]], factors: Mapping[str, float]) -> None:
-    """Checks that gains can be changed over ROS: dynamic_reconfigure clips larger ones silently.
+    """Checks that gains can be changed over ROS: dynamic_reconfigure silently clips large ones.
 
     Args:
         pids: gains by controller, and place below it.

@@ -49,7 +49,7 @@ class Option(NamedTuple):
     either_way: bool = True
 
 
-OPTIONS = (  # in the order of drawing, which is part of the bits: new ones go to the end
+OPTIONS = (  # in the order of drawing, which changes results: append new ones at the end
     Option("mass", LINKS, 0.1, 10.0),
     Option("length", LINKS, 0.1, 10.0),
     Option("com", LINKS, -10.0, 10.0, nominal=0.0, numbers=3),
@@ -69,7 +69,7 @@ class UniformRange(NamedTuple):
     high: float
 
     def at(self, share: float) -> float:
-        """The value at a share of the way from low to high, 0 to 1."""
+        """Returns the value at a share of the way from low to high, 0 to 1."""
         return self.low + (self.high - self.low) * share
 
 
@@ -83,7 +83,7 @@ def check_names(given: Iterable[str]) -> None:
 
 
 def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, UniformRange]:
-    """The intervals of an option, by name.
+    """Returns the intervals of an option, by name.
 
     Args:
         option: the option.
@@ -237,7 +237,7 @@ def _check_whole(option: Option, given: Any, lumped: Mapping[str, str]) -> None:
 
 
 def _reported(drawn: Any) -> Any:
-    """A copy with arrays for several numbers, which vectors of environments can stack."""
+    """Returns a copy with arrays for several numbers, which vectors of environments can stack."""
     if not isinstance(drawn, Mapping):
         return drawn
     return {

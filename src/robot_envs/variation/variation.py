@@ -97,13 +97,13 @@ _ENTRIES = {
 
 
 def length_axis(inertia: Inertia) -> str:
-    """The axis of the link's frame along which its centre of mass lies furthest out."""
+    """Returns the axis of the link's frame along which its centre of mass lies furthest out."""
     x, y, z = (abs(value) for value in inertia.com.position)
     return "z" if z >= max(x, y) else "x" if x >= y else "y"
 
 
 def scaled(inertia: Inertia, scale: LinkScale) -> Inertia:
-    """A link's inertia as a variation changes it, as if the link were a rod.
+    """Returns a link's inertia as a variation changes it, as if the link were a rod.
 
     Moments about axes across the length scale with its square; the moment about it doesn't change.
     """

@@ -1,7 +1,7 @@
-"""Messages to the user: through rospy once a node exists, straight to the terminal before that.
+"""Logs messages to the user: through rospy once a node exists, before that to the terminal.
 
-Before ``rospy.init_node`` rospy's logger has no handler: it drops every info and prints warnings
-without their level.
+Before ``rospy.init_node`` rospy's logger has no handler: it drops infos and prints warnings without
+their level.
 """
 
 import sys
@@ -10,7 +10,7 @@ import rospy
 
 
 def info(text: str) -> None:
-    """Tell the user about normal progress."""
+    """Logs normal progress."""
     if rospy.core.is_initialized():
         rospy.loginfo("%s", text)
     else:
@@ -18,7 +18,7 @@ def info(text: str) -> None:
 
 
 def warn(text: str) -> None:
-    """Tell the user about something that works differently from what was asked."""
+    """Logs that something works differently from the request."""
     if rospy.core.is_initialized():
         rospy.logwarn("%s", text)
     else:
@@ -26,7 +26,7 @@ def warn(text: str) -> None:
 
 
 def error(text: str) -> None:
-    """Tell the user why a call failed, in one line."""
+    """Logs in one line why a call failed."""
     if rospy.core.is_initialized():
         rospy.logerr("%s", text)
     else:

@@ -1,4 +1,4 @@
-"""The nodes registered at a ROS master, each question with a time limit."""
+"""Queries and shuts down the nodes of a ROS master; every call has a time limit."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ros_calls import master as _master
 from ros_calls.master import NoAnswer, NobodyListens, Refused, call_node, call_plain
 from ros_calls.waiting import POLL
 
-CORE_NODES = ("/rosout",)  # lives and dies with the master
+CORE_NODES = ("/rosout",)  # starts and ends with the master
 
 
 def node_names() -> list[str]:
-    """Names of all registered nodes, sorted; empty without a master."""
+    """Returns the sorted names of all registered nodes; empty without a master."""
     try:
         state = _master.call("getSystemState")
     except (NoAnswer, Refused):
@@ -26,7 +26,7 @@ def node_names() -> list[str]:
 
 
 def node_uri(name: str) -> str | None:
-    """The XML-RPC address of a node, or None if the master doesn't know it (or is down)."""
+    """Returns a node's XML-RPC address, or None if the master doesn't know it or is down."""
     try:
         return str(_master.call("lookupNode", name))
     except (NoAnswer, Refused):
@@ -34,13 +34,13 @@ def node_uri(name: str) -> str | None:
 
 
 def node_uris() -> dict[str, str]:
-    """Name and XML-RPC address of all registered nodes."""
+    """Returns the XML-RPC addresses of all registered nodes, by name."""
     found = {name: node_uri(name) for name in node_names()}
     return {name: address for name, address in found.items() if address}
 
 
 def node_pid(address: str) -> int | None:
-    """The process id of the node at an XML-RPC address, or None if it doesn't answer."""
+    """Returns the process id of the node at an XML-RPC address, or None if it doesn't answer."""
     try:
         return int(call_node(address, "getPid", timeout=1.0))
     except (NoAnswer, Refused):
@@ -48,14 +48,14 @@ def node_pid(address: str) -> int | None:
 
 
 def is_own(address: str) -> bool:
-    """True if the XML-RPC address is the calling process's own node."""
+    """Returns True if the XML-RPC address is this process's own node's."""
     return bool(rospy.core.is_initialized()) and address == rospy.core.get_node_uri()
 
 
 def _master_of(address: str) -> str | None:
-    """The address of a node's master, or None if there is no way to know.
+    """Returns the address of a node's master, or None if it can't be found out.
 
-    roscpp nodes don't offer the question: what their process was started with answers it.
+    roscpp nodes have no method for it, so the answer comes from what their process was started with.
     """
     try:
         return str(call_node(address, "getMasterUri", timeout=1.0))
@@ -67,7 +67,7 @@ def _master_of(address: str) -> str | None:
 
 
 def _started_with(pid: int) -> str | None:
-    """Returns the master that a process was started with; None if it wasn't, or is another user's."""
+    """Returns the master that a process was started with; None if not given, or another user's process."""
     try:
         process = psutil.Process(pid)
         given = [each for each in process.cmdline() if each.startswith("__master:=")]
@@ -79,11 +79,11 @@ def _started_with(pid: int) -> str | None:
 
 
 def ask_to_shut_down(address: str) -> bool:
-    """Ask the node at an XML-RPC address to shut itself down, as rosnode kill does.
+    """Asks the node at an XML-RPC address to shut itself down, as rosnode kill does.
 
     Returns:
-        False if nobody listens there, or somebody whose master is another one: a dead node's port
-        may have been given to a node of somebody else's.
+        False if nobody listens there, or a node of another master does: it may have got a dead
+        node's port.
     """
     theirs = _master_of(address)
     if theirs is not None and not _master.is_at(theirs):
@@ -98,13 +98,13 @@ def ask_to_shut_down(address: str) -> bool:
 
 
 def shut_down_nodes(nodes: dict[str, str], timeout: float = 5.0) -> list[str]:
-    """Ask nodes to shut down and wait until the master has forgotten them.
+    """Asks nodes to shut down and waits until they are unregistered.
 
-    The caller's own node and rosout are left alone.
+    Skips the caller's own node and rosout.
 
     Args:
-        nodes: name and XML-RPC address.
-        timeout: bound of the wait for all of them [s].
+        nodes: XML-RPC addresses by name.
+        timeout: limit of the wait for all of them [s].
 
     Returns:
         The names that are still registered afterwards.
@@ -117,12 +117,12 @@ def shut_down_nodes(nodes: dict[str, str], timeout: float = 5.0) -> list[str]:
     for address in asked.values():
         ask_to_shut_down(address)
     deadline = time.monotonic() + timeout
-    # Also once the caller's own node is shut down, which ends wait_until().
+    # Not wait_until(): it ends once the caller's own node has shut down.
     while asked and time.monotonic() < deadline:
         for name, address in list(asked.items()):
             if _is_dead(address):
                 _unregister(name, address)
-        # lookupNode isn't asked: it also knows nodes of which nothing but a parameter watch is left
+        # Not by lookupNode: it also knows nodes of which only a parameter subscription is left
         asked = {name: asked[name] for name in node_names() if name in asked}
         if asked:
             time.sleep(POLL)
@@ -130,7 +130,7 @@ def shut_down_nodes(nodes: dict[str, str], timeout: float = 5.0) -> list[str]:
 
 
 def _is_dead(address: str) -> bool:
-    """True if nobody listens at a node's XML-RPC address any more."""
+    """Returns True if nobody listens at a node's XML-RPC address any more."""
     try:
         call_node(address, "getPid", timeout=1.0)
     except NobodyListens:
@@ -141,9 +141,9 @@ def _is_dead(address: str) -> bool:
 
 
 def _unregister(name: str, address: str) -> None:
-    """Have the master forget a dead node, as rosnode cleanup does.
+    """Unregisters a dead node at the master, as rosnode cleanup does.
 
-    A rospy node that is asked to shut down often exits before it has taken its leave of the master.
+    A rospy node that is asked to shut down often exits before it has unregistered itself.
     """
     with contextlib.suppress(NoAnswer, Refused):
         publishers, subscribers, services = _master.call("getSystemState")

@@ -1,4 +1,4 @@
-"""Find packages and the files in them."""
+"""Finds packages and the files in them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import rospkg
 
 
 class NotFound(Exception):
-    """No such package or file; the text says which, and where it was looked for."""
+    """No such package or file; the text says which, and where the search looked."""
 
 
 def folder(package: str) -> str:
-    """The folder of a ROS package.
+    """Returns the folder of a ROS package.
 
     Raises:
         NotFound: no such package.
@@ -26,7 +26,7 @@ def folder(package: str) -> str:
 
 
 def file(package: str, subfolder: str, name: str) -> str:
-    """The path of a file in a package's subfolder.
+    """Returns the path of a file in a package's subfolder.
 
     Raises:
         NotFound: no such package, or no such file in it.
@@ -35,10 +35,10 @@ def file(package: str, subfolder: str, name: str) -> str:
 
 
 def existing(path: str) -> str:
-    """The path itself, if it is a file.
+    """Returns the path itself if it is a file.
 
     Raises:
-        NotFound: it isn't.
+        NotFound: no such file.
     """
     if not os.path.isfile(path):
         raise NotFound(f"{path}: no such file")

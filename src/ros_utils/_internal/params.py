@@ -1,6 +1,6 @@
-"""Parameters of the master that the calls go to, each question with a time limit.
+"""Reads and sets parameters of the current master (`ros_calls.master.using`), with a time limit.
 
-rospy's own functions know one master for the whole process.
+rospy's own functions know one master per process.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from ros_calls.master import NoAnswer, Refused
 
 
 def get(name: str) -> Any:
-    """The value of a parameter.
+    """Returns the value of a parameter.
 
     Raises:
-        KeyError: it isn't set.
+        KeyError: the parameter isn't set.
         MasterDown: no master.
     """
     _master.require()
@@ -32,7 +32,7 @@ def get(name: str) -> Any:
 
 
 def put(name: str, value: Any) -> None:
-    """Set a parameter; a mapping sets each of its own.
+    """Sets a parameter; a mapping sets each of its entries.
 
     Raises:
         MasterDown: no master, or it refuses.

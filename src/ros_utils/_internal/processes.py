@@ -1,7 +1,7 @@
-"""What this toolkit started: known to all processes of the user, and ended with all that came from it.
+"""Records the programs that this toolkit starts, for all processes of the user, and ends them.
 
-The starts under one master are listed in `<ROS_HOME>/ros_utils/<host>_<port>.json`. Whatever comes from a
-start carries its token in an environment variable, so that children are found whose parent was killed.
+The starts under one master are listed in `<ROS_HOME>/ros_utils/<host>_<port>.json`. All descendants of a
+start carry its token in an environment variable, so they are found even if their parent was killed.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from file_access.locks import locked_file
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
 
-MARK = "ROS_UTILS_LAUNCH"  # environment variable; tokens, those of outer starts in front
+MARK = "ROS_UTILS_LAUNCH"  # environment variable with tokens, outer starts first
 # roslaunch gives each of its nodes 15 s after SIGINT and 2 s after SIGTERM before it ends itself.
 PATIENCE = {"node": 8.0, "launch": 20.0, "master": 20.0}  # [s] after SIGINT
-LEFTOVERS = 3.0  # [s] instead, for what outlives the program itself
+LEFTOVERS = 3.0  # [s] instead, for processes that outlive the program itself
 AFTER_TERM = 3.0  # [s]
 AFTER_KILL = 2.0  # [s]
 POLL = 0.05  # [s]
@@ -38,18 +38,18 @@ hurry = threading.Event()  # set: skip SIGINT
 
 @dataclass(frozen=True)
 class Start:
-    """A program that was started, and all that came from it."""
+    """A started program and all its descendants."""
 
     pid: int
     token: str  # value of the mark in its environment
     kind: str  # "master", "launch" or "node"
-    label: str  # what the user knows it by
+    label: str  # name for the user
     log: str | None = None
-    caller: int = 0  # its parent, whose end the kernel reports to it; 0: none
+    caller: int = 0  # id of its parent, whose end the kernel signals to it; 0: none
 
     @property
     def is_orphan(self) -> bool:
-        """Whether it still runs although its caller has been killed."""
+        """Returns whether it still runs although its caller was killed."""
         if not self.caller:
             return False
         root = next((each for each in family(self.token) if each.pid == self.pid), None)
@@ -60,7 +60,7 @@ class Start:
 
 
 def family(token: str) -> list[psutil.Process]:
-    """Returns the living processes of one start: all that carry its token, and their descendants.
+    """Returns the living processes of a start: those with its token, and their descendants.
 
     The token finds children whose parent was killed; descent finds those with a cleaned environment.
     """
@@ -88,7 +88,7 @@ def list_path() -> Path:
     """Returns the file that lists the starts under the present master."""
     try:
         host, port = _master.host_and_port()
-        # One master, whatever name of this machine is used.
+        # All names of this machine mean the same master.
         name = f"{'localhost' if _master.is_local() else host}_{port}"
     except _master.MasterDown:
         name = "unknown"
@@ -124,7 +124,7 @@ def _change(edit: Callable[[list[Start]], list[Start]]) -> None:
 def _locked() -> Iterator[None]:
     path = list_path()
     with contextlib.ExitStack() as stack:
-        # Where nothing can be written, there is nothing to disturb.
+        # Where nothing can be written, no lock is needed.
         with contextlib.suppress(OSError):
             path.parent.mkdir(parents=True, exist_ok=True)
             stack.enter_context(locked_file(path.with_suffix(".json.lock")))
@@ -135,7 +135,7 @@ def _read() -> list[Start]:
     try:
         return [Start(**item) for item in json.loads(list_path().read_text(encoding="utf-8"))]
     except (OSError, ValueError, TypeError):
-        return []  # absent, or not ours: there is nothing that could be ended safely
+        return []  # absent, or not ours: nothing can be ended safely
 
 
 def _write(known: list[Start]) -> None:
@@ -150,9 +150,9 @@ def _write(known: list[Start]) -> None:
 
 
 def end(starts: Sequence[Start], reap: Callable[[set[str]], bool]) -> bool:
-    """Ends all that came from these starts, nodes first and the master last, and takes it off the list.
+    """Ends starts with their descendants, nodes first and the master last, and removes them from the list.
 
-    A start that the calling process itself came from is left alone.
+    Skips a start that the calling process itself descends from.
 
     Args:
         starts: what to end.
@@ -160,7 +160,7 @@ def end(starts: Sequence[Start], reap: Callable[[set[str]], bool]) -> bool:
             all have come.
 
     Returns:
-        Whether nothing else of it is left.
+        Whether nothing else of them is left.
     """
     own_line = {process.pid for process in (psutil.Process(), *psutil.Process().parents())}
     gone = True
@@ -177,10 +177,10 @@ def end(starts: Sequence[Start], reap: Callable[[set[str]], bool]) -> bool:
 
 
 def end_orphans(reap: Callable[[set[str]], bool]) -> bool:
-    """Waits until the launches and masters are gone whose caller was killed: the kernel has signalled them.
+    """Waits until launches and masters with a killed caller are gone: the kernel has signalled them.
 
-    They take some seconds, in which their master still answers whoever starts something. What doesn't end
-    by itself is ended.
+    That takes some seconds, in which their master still answers. Those that don't end by themselves are
+    ended.
 
     Returns:
         Whether none is left.
@@ -195,7 +195,7 @@ def end_orphans(reap: Callable[[set[str]], bool]) -> bool:
 def _end_wave(
     starts: Sequence[Start], patience: float, reap: Callable[[set[str]], bool]
 ) -> set[str]:
-    """Sends SIGINT, then SIGTERM, then SIGKILL; returns the tokens of what still runs."""
+    """Sends SIGINT, then SIGTERM, then SIGKILL; returns the tokens of starts that still run."""
     for number, grace in (
         (signal.SIGINT, patience),
         (signal.SIGTERM, AFTER_TERM),
@@ -234,13 +234,13 @@ def _end_with(
             return True
         for root, members in families.items():
             for process in members:
-                # As Ctrl-C in a terminal: the program and its process group, which end their own children.
+                # As Ctrl-C in a terminal: to the program's process group, which ends its own children.
                 # roslaunch puts its nodes into groups of their own and ends them in order.
                 whole = root not in roots or number is signal.SIGKILL
                 if process.pid not in signalled and (whole or _group(process) == root):
                     signalled.add(process.pid)
                     with contextlib.suppress(psutil.Error):
-                        process.send_signal(number)  # not to another process of the same id
+                        process.send_signal(number)  # never reaches a new process with the same id
         time.sleep(POLL)
 
 

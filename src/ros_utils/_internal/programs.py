@@ -1,9 +1,8 @@
 """Starts programs, waits until they are ready, and ends them when this process exits.
 
-Every program gets its own session, so that Ctrl-C in the terminal reaches only the caller, whose exit then
-ends the programs in order. Should the caller be killed outright, the kernel sends them SIGTERM (needs
-setpriv of util-linux, and a start from the main thread); what survives even that is ended by the next
-`ros_kill_all_processes`.
+Every program gets its own session: Ctrl-C in the terminal reaches only the caller, whose exit then ends the
+programs in order. If the caller is killed outright, the kernel sends them SIGTERM (needs setpriv of
+util-linux, and a start from the main thread). The next `ros_kill_all_processes` ends any survivors.
 """
 
 from __future__ import annotations
@@ -32,8 +31,8 @@ from ros_utils._internal import log as _log
 from ros_utils._internal import processes as _processes
 from ros_utils.readiness import Ready
 
-COLLECTED = 5.0  # [s] from the end of a process's main thread to its exit code, at most
-# A caller that a shell put into the background ignores Ctrl-C, and so would all that it starts.
+COLLECTED = 5.0  # [s] longest time from the end of a process's main thread to its exit code
+# A caller in a shell's background ignores SIGINT, and its children would inherit that.
 LISTENING = ("env", "--default-signal=INT")
 
 _handles: list[Handle] = []
@@ -51,7 +50,7 @@ class Handle:
 
     start: _processes.Start
     process: subprocess.Popen[bytes]
-    status_file: str | None = None  # where a terminal window leaves the program's exit code
+    status_file: str | None = None  # a terminal window writes the program's exit code here
 
     def exit_code(self) -> int | None:
         """Returns the program's exit code, or None while it runs."""
@@ -65,11 +64,11 @@ class Handle:
             return code or 1  # the window was closed before the program ended
 
     def owns(self, pid: int | None) -> bool:
-        """Returns whether the process id is the program's or one of its descendants'."""
+        """Returns whether the process id is the program's or a descendant's."""
         return any(each.pid == pid for each in _processes.family(self.start.token))
 
     def lines(self, part: str = "") -> list[str]:
-        """Returns the log's lines that contain a text; none if the output went to a terminal."""
+        """Returns the log's lines that contain `part`; empty if the output went to a terminal."""
         if self.start.log is None:
             return []
         with open(self.start.log, encoding="utf-8", errors="replace") as file:
@@ -77,31 +76,31 @@ class Handle:
         return [line for line in plain if line and part in line]
 
     def reason(self) -> str:
-        """Returns the reason of a failure: the last error of the log, or else its last lines."""
+        """Returns the reason for a failure: the last error in the log, else its last lines."""
         lines = self.lines()
         errors = [line for line in lines if re.search(r"(Error|Exception|ERROR|error):", line)]
         return " | ".join(errors[-1:] or lines[-3:]) or "it said nothing"
 
     def where(self) -> str:
-        """Returns where to read on, for the end of a message."""
+        """Returns where to find the output, for the end of a message."""
         return f" (log: {self.start.log})" if self.start.log else ""
 
     def end(self) -> bool:
-        """Ends the program with all that came from it; returns whether nothing is left."""
+        """Ends the program and its descendants; returns whether nothing is left."""
         return end([self.start])
 
 
 class Started(int):
-    """A program that was started. It is true and equal to True, so ``if ros_launch_…(…):`` works.
+    """A started program. It is true and equal to True, so ``if ros_launch_…(…):`` works.
 
-    Ends with `close` or at the end of a ``with`` block; in any case when this Python process exits.
+    It ends with `close` or a ``with`` block, and at the latest when this Python process exits.
     """
 
     _handle: Handle | None
     master_uri: str
 
     def __new__(cls, handle: Handle | None = None) -> Started:
-        """Without a handle: something that ran already, and that `close` leaves alone."""
+        """Without a handle the program ran before, and `close` doesn't end it."""
         self = super().__new__(cls, 1)
         self._handle = handle
         self.master_uri = _master.uri()
@@ -114,7 +113,7 @@ class Started(int):
 
     @property
     def log_file(self) -> str | None:
-        """Where its output goes; None for a terminal."""
+        """Path of its output; None for a terminal."""
         return self._handle.start.log if self._handle else None
 
     @property
@@ -127,7 +126,7 @@ class Started(int):
         return self._handle.exit_code() if self._handle else None
 
     def close(self) -> bool:
-        """Ends the program with all that came from it: SIGINT, then SIGTERM, then SIGKILL.
+        """Ends the program and its descendants by SIGINT, then SIGTERM, then SIGKILL.
 
         Returns:
             True if nothing of it is left.
@@ -168,12 +167,12 @@ def start(
     Args:
         command: the program and its arguments.
         kind: "master", "launch" or "node"; programs are ended in the order node, launch, master.
-        label: what the user knows it by.
+        label: the program's name for the user.
         window: run it in an xterm if there is a display and xterm is installed; otherwise its
             output goes to a file.
         screen: its output goes to the caller's terminal instead of a file.
         log_file: the file for its output; None for one of its own in ROS's log folder.
-        env: variables on top of the caller's.
+        env: variables in addition to the caller's.
 
     Raises:
         CannotStart: no such program, or the log file can't be written.
@@ -187,7 +186,7 @@ def start(
     full = [*bound, *LISTENING, *command]
     if window and not log_file and os.environ.get("DISPLAY") and shutil.which("xterm"):
         log, status_file, bound = None, _log_path(label, token) + ".status", []
-        # xterm keeps exit codes to itself. The command comes as arguments, so nothing of it is parsed.
+        # xterm hides exit codes. The command is passed as arguments, so the shell parses none of it.
         keep_code = '"$@"; echo $? > "$0"'
         full = ["xterm", "-T", label, "-e", "/bin/sh", "-c", keep_code, status_file, *full]
     elif window and not log_file:
@@ -221,11 +220,11 @@ def end_orphans() -> bool:
 def _reap(tokens: set[str]) -> bool:
     """Collects exit codes of ended children, which stay zombies until then.
 
-    On a busy machine other threads of a process may take a while after its main thread has ended, and
-    until then it has no exit code.
+    On a busy machine a process's other threads may outlive its main thread for a while; it has no exit
+    code until they end.
 
     Returns:
-        False if the exit code of one with these tokens doesn't come.
+        False if a child with one of these tokens gives no exit code in time.
     """
     with _lock:
         ours = [handle.process for handle in _handles if handle.start.token in tokens]
@@ -251,18 +250,18 @@ def _log_path(label: str, token: str) -> str:
 
 
 def _dying_with_caller() -> list[str]:
-    """Returns a prefix that has the kernel end the program when the caller is killed outright."""
-    # The kernel looks at the thread that started the program: a short-lived one would end it too early.
+    """Returns a command prefix with which the kernel ends the program if the caller is killed."""
+    # The kernel watches the thread that started the program; a short-lived one would end it too early.
     if threading.current_thread() is not threading.main_thread() or shutil.which("setpriv") is None:
         return []
     return ["setpriv", "--pdeathsig", "TERM", "--"]
 
 
 def _environment(token: str) -> dict[str, str]:
-    """Returns the caller's environment, marked, and with the caller's Python first on PATH.
+    """Returns the caller's environment with the token, and with the caller's Python first on PATH.
 
-    Many ROS scripts begin with ``#!/usr/bin/env python3``, and the first one on PATH often has no
-    rospy; ours has.
+    Many ROS scripts begin with ``#!/usr/bin/env python3``, and the first Python on PATH often lacks
+    rospy; the caller's has it.
     """
     outer = os.environ.get(_processes.MARK)
     path = os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", os.defpath)])
@@ -297,10 +296,10 @@ def _spawn(
 
 @atexit.register
 def _end_own() -> None:
-    """Ends what this process started when it exits; a second Ctrl-C makes it quick."""
-    if os.getpid() != _owner or not _handles:  # a forked child has inherited the list, not the duty
+    """Ends this process's programs when it exits; a second Ctrl-C makes it quick."""
+    if os.getpid() != _owner or not _handles:  # a forked child owns none of them
         return
-    with contextlib.suppress(ValueError):  # not the main thread
+    with contextlib.suppress(ValueError):  # outside the main thread
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: _processes.hurry.set())
     end([handle.start for handle in _handles])
@@ -315,19 +314,19 @@ class Readiness(enum.Enum):
 
 
 def wait_until_ready(ready: Callable[[], bool], handle: Handle, timeout: float) -> Readiness:
-    """Look at the program again and again.
+    """Waits until `ready` is true, the program ends, or time is up; returns which.
 
     Args:
-        ready: tells whether what is waited for is there.
+        ready: returns whether the wait is over.
         handle: the program.
-        timeout: bound [s].
+        timeout: limit of the wait [s].
 
     Raises:
         rospy.ROSInterruptException: the caller's node was shut down meanwhile.
     """
 
     def look() -> Readiness | None:
-        # First: what it did before it ended must not be missed.
+        # Checked before `ready`, so that a program's last act before its end isn't missed.
         ended = handle.exit_code() is not None
         if ready():
             return Readiness.READY
@@ -343,17 +342,17 @@ def wait_for_world(
     begin: float,
     timeout: float,
 ) -> Started | bool:
-    """Wait until a world is ready after something was started; if it isn't, end what was started.
+    """Waits until a world is ready after a start; ends the started program if it isn't.
 
     Args:
-        started: what is returned if all is well.
-        ready: what has to be there; None for nothing.
-        handle: what was started; None if it ran before.
-        begin: when it was started, by time.monotonic() [s].
-        timeout: bound of the wait, from then on [s].
+        started: the result on success.
+        ready: the world to wait for; None for no wait.
+        handle: the started program; None if it ran before.
+        begin: time of the start, by time.monotonic() [s].
+        timeout: limit of the wait, from the start on [s].
 
     Returns:
-        `started`, or False, with what is missing as an error in the log.
+        `started`, or False, with the missing part as an error in the log.
 
     Raises:
         rospy.ROSInterruptException: the caller's node was shut down meanwhile.

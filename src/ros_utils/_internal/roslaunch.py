@@ -1,4 +1,4 @@
-"""Start roslaunch, and ask a running one about its processes. Part of `ros_launch` and `ros_gazebo`."""
+"""Starts roslaunch, and asks it about its processes. Part of `ros_launch` and `ros_gazebo`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import programs as _programs
 from ros_utils._internal.programs import Handle
 
-SETTLE = 5.0  # [s] at most, for the nodes of a launch file to register after their processes run
+SETTLE = 5.0  # [s] limit for nodes to register once their processes run
 STABLE = 0.3  # [s] without a further process: roslaunch has started them all
 STABLE_EMPTY = 1.5  # [s] without any process: the launch file sets parameters only
-CORE = ("master", "rosout-1")  # roslaunch's names for what belongs to the master that it brought up
+CORE = ("master", "rosout-1")  # roslaunch's names for its own master and rosout
 
 
 def start(
@@ -27,13 +27,13 @@ def start(
     log_file: str | None = None,
     env: Mapping[str, str] | None = None,
 ) -> Handle:
-    """Start roslaunch without waiting for anything.
+    """Starts roslaunch without waiting for anything.
 
     Raises:
         MasterDown: there is no master and roslaunch couldn't start one there.
         CannotStart: roslaunch can't be run.
     """
-    _programs.end_orphans()  # or their master would be taken for one that stays
+    _programs.end_orphans()  # else their ending master would pass for a lasting one
     _master.is_up_or_startable()
     return _programs.start(
         ["roslaunch", *arguments],
@@ -47,13 +47,12 @@ def start(
 
 
 def list_processes(handle: Handle) -> tuple[list[str], list[str]] | None:
-    """Processes of the launch, running and dead, without master and rosout; None as long as
-    roslaunch doesn't tell."""
+    """Returns the launch's running and dead processes, without master and rosout; None without an answer."""
     try:
         addresses = _master.call("getParam", "/roslaunch/uris")
     except (NoAnswer, Refused):
         return None
-    for address in addresses.values():  # one for each roslaunch under this master, also ended ones
+    for address in addresses.values():  # one per roslaunch under this master, ended ones included
         try:
             if handle.owns(call_plain(address, "get_pid")):
                 running, dead = call_plain(address, "list_processes")
@@ -64,8 +63,7 @@ def list_processes(handle: Handle) -> tuple[list[str], list[str]] | None:
 
 
 def let_settle(handle: Handle) -> None:
-    """Wait until the launch's processes have registered as nodes, but not for long: not every
-    program is a node."""
+    """Waits until the launch's processes have registered as nodes; briefly, as not every program is one."""
     deadline = time.monotonic() + SETTLE
     seen: tuple[list[str], list[str]] = ([], [])
     since = time.monotonic()
@@ -88,7 +86,7 @@ def _warn(handle: Handle, text: str) -> None:
 
 
 def _own_nodes(handle: Handle) -> int:
-    """How many registered nodes came from the launch."""
+    """Returns the number of registered nodes that belong to the launch."""
     nodes = [
         address for name, address in _nodes.node_uris().items() if name not in _nodes.CORE_NODES
     ]

@@ -1,4 +1,4 @@
-"""Expand robot descriptions (xacro). Part of `ros_urdf` and `ros_gazebo`."""
+"""Expands robot descriptions (xacro). Part of `ros_urdf` and `ros_gazebo`."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ros_utils._internal import packages as _packages
 
 
 class BadArgument(ValueError):
-    """A xacro argument has another form; the text says which."""
+    """A xacro argument isn't of the form ``name:=value``; the text says which."""
 
 
 def urdf_parse_from_pkg(
     pkg_name: str, model_name: str, folder: str = "/urdf", args_xacro: Sequence[str] | None = None
 ) -> str | None:
-    """Expand a package's URDF or xacro file.
+    """Expands a package's URDF or xacro file.
 
     Returns:
         The XML text, or None, with an error in the log, if the package or file is missing or the
@@ -28,7 +28,7 @@ def urdf_parse_from_pkg(
 
 
 def urdf_parse_from_path(model_path: str, args_xacro: Sequence[str] | None = None) -> str | None:
-    """Expand a URDF or xacro file, given by its path. See `urdf_parse_from_pkg`."""
+    """Expands a URDF or xacro file, given by its path. See `urdf_parse_from_pkg`."""
     try:
         mappings = dict(_mapping(argument) for argument in args_xacro or [])
         return expand(_packages.existing(model_path), mappings)
@@ -38,7 +38,7 @@ def urdf_parse_from_path(model_path: str, args_xacro: Sequence[str] | None = Non
 
 
 def find(caller: str, package: str, folder: str, name: str) -> str | None:
-    """The path of a package's file, or None, with an error in the log that begins with `caller`."""
+    """Returns the path of a package's file, or None with an error in the log that names `caller`."""
     try:
         return _packages.file(package, folder, name)
     except _packages.NotFound as fault:

@@ -97,8 +97,7 @@ def get_rosparam_controller_names(namespace: str = "/") -> list[str]:
     return found
 
 
-# The filters take and return lists, and keep the order. With `match_substring` the text only has to contain
-# the wanted one.
+# The filters keep the list's order. With `match_substring`, containing the text is enough.
 
 
 def filter_by_name(
@@ -163,7 +162,7 @@ def filter_by_resources(
 
 
 def _candidates(namespace: str) -> Sequence[str]:
-    """Returns the namespaces, in or below one, that have a service list_controllers."""
+    """Returns the namespaces, in or below `namespace`, that have a service list_controllers."""
     _, _, services = rosgraph.Master(rospy.get_caller_id()).getSystemState()
     inside = namespace.rstrip("/") + "/"
     return sorted(

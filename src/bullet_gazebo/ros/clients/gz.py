@@ -1,6 +1,6 @@
 """The command `gz world`, and the client behind it (docs/contract/gazebo_launch.md 5.1).
 
-``gz world -p 1|0`` pauses and goes on, ``-s`` does one step, ``-m N`` does N, ``-r`` resets time and
+``gz world -p 1|0`` pauses and resumes, ``-s`` does one step, ``-m N`` does N, ``-r`` resets time and
 models, ``-t`` the time, ``-o`` the models. It imports no rospy, so that it starts at once.
 """
 
@@ -42,7 +42,7 @@ class RemoteWorld:
             ) from fault
 
     def command(self, name: str, count: int = 1) -> None:
-        """Carries out one command: pause, unpause, step, reset, reset_models, reset_time or show.
+        """Runs one command: pause, unpause, step, reset, reset_models, reset_time or show.
 
         Raises:
             ControlFailed: the simulator doesn't answer, or refuses.
@@ -57,10 +57,10 @@ class RemoteWorld:
             raise ControlFailed(f"{self._node} doesn't answer: {fault}") from fault
 
     def step(self, ticks: int) -> None:
-        """Pauses the world and does `ticks` steps, all of them before it returns.
+        """Pauses the world, and returns after `ticks` steps.
 
         Raises:
-            ControlFailed: as `command`.
+            ControlFailed: see `command`.
         """
         while ticks > 0:
             count = min(ticks, CHUNK)
@@ -69,7 +69,7 @@ class RemoteWorld:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Carries out one command; returns the exit code: 0, 1 if it failed, 2 for a wrong command line."""
+    """Runs one command; returns the exit code: 0, 1 if it failed, 2 for a wrong command line."""
     options = _parse(rosgraph.myargv(sys.argv if argv is None else list(argv))[1:])
     node = rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(), options.node)
     try:

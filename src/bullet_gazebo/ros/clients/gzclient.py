@@ -34,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     def work() -> int:
         become_node(command_line)
-        stop_hearing_clock()  # the scene's messages have the time, thirty times a second instead of thousands
+        stop_hearing_clock()  # the scene's messages carry the time at 30 Hz, /clock at thousands
         if options.ignored:
             rospy.logwarn("Arguments without effect here: %s", " ".join(options.ignored))
         missing = lack(WINDOW)
@@ -54,9 +54,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def become_node(command_line: Sequence[str]) -> None:
-    """Registers as `gazebo_gui`, with a number behind it if another window has that name.
+    """Registers as `gazebo_gui`, with a number appended if another window has that name.
 
-    A name on the command line is taken in any case, as every node does.
+    A name from the command line is used as it is, as by every node.
     """
     wait_for_master(NAME)
     name = full_name(command_line, NAME)

@@ -1,7 +1,7 @@
 """The commands `controller_manager` and `controller_group` (docs/contract/ros_control.md 2).
 
-Both print what the manager did, and end with 0 also if it refused; with 1 if there is no manager or no such
-group, with 2 for a wrong command line.
+Both print what the manager did. They end with 0, even if it refused; with 1 if there is no manager or no such
+group; with 2 for a wrong command line.
 """
 
 import sys
@@ -74,7 +74,7 @@ ON_MANAGER: dict[tuple[str, ...], tuple[list[str], Callable[[], object]]] = {
 }
 PARAMETER = "controller_groups"
 PATIENCE = 30.0  # [s] for each service; launch files start scripts before there is a manager
-NOTICE = 2.0  # [s] until the user reads which service the command waits for
+NOTICE = 2.0  # [s] until the command prints which service it waits for
 
 Groups = dict[str, list[str]]
 
@@ -154,7 +154,7 @@ def _require(services: Iterable[str]) -> None:
 
 
 def _read_groups() -> Groups:
-    _require(())  # a master, which has the parameters
+    _require(())  # just the master, for its parameters
     found = rospy.get_param(PARAMETER, None)
     place = f"the parameter {rospy.resolve_name(PARAMETER)}"
     if found is None:

@@ -3,7 +3,7 @@
 The functions are the Python module `controller_manager.controller_manager_interface`. They print what they
 did, in the words of the script `controller_manager`, and those that change something return whether the
 manager did it. They talk to the manager in the namespace of the program, need no initialised node, and wait
-for its services without limit. rospy.ServiceException says that the manager went away during a call.
+for its services without limit. They raise rospy.ServiceException if the manager goes away during a call.
 
 `ManagerClient` is the same with a time limit on each call, for spawner and unspawner.
 """
@@ -41,7 +41,7 @@ def list_controllers() -> None:
 
 
 def reload_libraries(force_kill: bool, restore: bool = False) -> bool:
-    """Makes the manager look for its controller types anew.
+    """Makes the manager search for controller types again.
 
     Args:
         force_kill: stop and unload all controllers first; without it the manager refuses if there
@@ -100,7 +100,7 @@ def stop_controllers(names: Sequence[str]) -> bool:
 
 
 def switch_controllers(start: Sequence[str], stop: Sequence[str]) -> bool:
-    """Starts and stops controllers as one act, strictly, and without a time limit for the manager."""
+    """Starts and stops controllers in one switch, strictly, and without a time limit for the manager."""
     switched = _switch(start, stop, STRICT)
     given = [each for each in (("start", start), ("stop", stop)) if each[1]]
     if switched:
@@ -114,7 +114,7 @@ def switch_controllers(start: Sequence[str], stop: Sequence[str]) -> bool:
 
 
 def loaded_controllers() -> list[ControllerState]:
-    """Returns what the manager lists."""
+    """Returns the manager's controllers."""
     return list(_call("list_controllers", srv.ListControllers).controller)
 
 
@@ -133,7 +133,7 @@ class ManagerClient:
     """The services of the controller manager in one namespace. A call raises ServiceFailed."""
 
     def __init__(self, namespace: str = "", user: str = "Controller Spawner") -> None:
-        """`user` is who waits, for the log."""
+        """`user` names the waiting program in the log."""
         self._user = user
         self._prefix = (
             f"{namespace.rstrip('/')}/controller_manager" if namespace else "controller_manager"
@@ -143,11 +143,11 @@ class ManagerClient:
         """Waits until all of the services are offered.
 
         Args:
-            services: names without the manager's.
+            services: names relative to the manager's.
             timeout: bound for each of them [wall-clock s], or infinity.
 
         Returns:
-            The first one that didn't come up in time; None if all did.
+            The first one that isn't offered in time, or None.
         """
         for service in services:
             name = str(rospy.resolve_name(f"{self._prefix}/{service}"))

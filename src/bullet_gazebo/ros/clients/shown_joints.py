@@ -2,11 +2,11 @@
 
 RViz draws a link white, and at the wrong place, until it knows where the link is. Joint states come only
 while simulated time passes, in a paused world or in lock-step maybe never. So until one comes, this node
-asks the simulator by a service that answers while paused, too. Then it forwards the newest state; not those
-of joint_state_publisher, which are zeros.
+asks the simulator by a service that also answers while paused. Then it forwards the newest state, except
+joint_state_publisher's, which are zeros.
 
-Of a robot that isn't fixed to the world nobody publishes the place to tf: this node asks the simulator, and
-publishes the transform from world to the root link.
+Nobody publishes the pose of a robot that isn't fixed to the world to tf: this node asks the simulator for it,
+and publishes the transform from world to the root link.
 """
 
 import contextlib
@@ -77,12 +77,12 @@ class ShownJoints:
         return positions if len(positions) == len(names) else []
 
     def _publish(self, names: Sequence[str], positions: Sequence[float]) -> None:
-        """Publishes with wall time, as tf and RViz use here: simulated time may stand still or go back."""
+        """Stamps with wall time, as tf and RViz use here: simulated time may stand still or go back."""
         self._publisher.publish(JointState(header=_now(), name=names, position=positions))
 
 
 class ShownBase:
-    """Publishes to ~tf where the root link of a robot is that isn't fixed to the world."""
+    """Publishes the root link's pose to ~tf, for a robot that isn't fixed to the world."""
 
     def __init__(self, root: str) -> None:
         self._root = root
@@ -102,7 +102,7 @@ class ShownBase:
             time.sleep(PATIENCE if pose is None else PERIOD)
 
     def _pose(self) -> Pose | None:
-        """Returns where the link is in the world; None while no model has it."""
+        """Returns the link's pose in the world, or None while no model has it."""
         for model in [self._model] if self._model else self._models().model_names:
             answer = self._state(f"{model}::{self._root}", WORLD)
             if answer.success:

@@ -93,7 +93,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _not_an_option(argument: str) -> str:
-    """Puts a blank in front of a negative number: argparse takes -1e-05 for an option."""
+    """Puts a space before a negative number: argparse would take -1e-05 for an option."""
     try:
         float(argument)
     except ValueError:
@@ -139,7 +139,7 @@ def _spawn(options: argparse.Namespace, xml: str, gazebo: str) -> None:
 
 
 class _Bond:
-    """Deletes the model at the node's shutdown, also in the middle of the block that spawns it."""
+    """Deletes the model when the node shuts down, even while the block that spawns it runs."""
 
     def __init__(self, gazebo: str, model: str) -> None:
         self._service, self._model = f"{gazebo}/delete_model", model

@@ -65,7 +65,7 @@ def _work(manager: ManagerClient, options: argparse.Namespace) -> int:
 
 
 def _find(manager: ManagerClient, timeout: float) -> str | None:
-    """Waits for the manager; returns the service that is missing after the time limit.
+    """Waits for the manager; returns the service still missing at the time limit, or None.
 
     While simulated time is zero, the simulator isn't ready yet, and the wait begins anew.
     """
@@ -127,7 +127,7 @@ def _names(argument: str, namespace: str) -> list[str]:
 
 
 class _Spawner:
-    """Loads and starts controllers, and takes them away when the node is shut down."""
+    """Loads and starts controllers, and unloads them when the node is shut down."""
 
     def __init__(self, manager: ManagerClient) -> None:
         self._manager = manager
@@ -136,7 +136,7 @@ class _Spawner:
         self._turn = threading.Lock()  # held while the manager does something for us
 
     def run(self, names: Sequence[str], stopped: bool) -> None:
-        """Returns when the node is shut down."""
+        """Runs until the node is shut down."""
         # First: a shutdown in the middle of loading unloads what has been loaded by then.
         rospy.on_shutdown(self._leave)
         for name in names:
@@ -191,7 +191,7 @@ class _Spawner:
 
     def _stop(self) -> None:
         rospy.loginfo("Stopping all controllers...")
-        # Somebody else may have stopped one: a strict request to stop that too would stop none.
+        # Somebody else may have stopped one: a strict request that names it would stop none.
         running = [name for name in self._manager.running(FAREWELL) if name in self._loaded]
         self._manager.switch([], running, STRICT, FAREWELL)
 
@@ -249,7 +249,7 @@ def _inhibit(manager: ManagerClient, controllers: Sequence[str]) -> None:
 
 
 def _stop_running(manager: ManagerClient, controllers: Sequence[str]) -> list[str]:
-    """Stops those that run; returns their names."""
+    """Stops the running ones among `controllers`; returns their names."""
     try:
         running = [name for name in manager.running(ANSWER) if name in controllers]
         if running and manager.switch([], running, BEST_EFFORT, ANSWER):

@@ -1,4 +1,4 @@
-"""An actionlib server for simulated time, which stands still, runs fast and goes back."""
+"""An actionlib server for simulated time, which may stand still, run fast or go back."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from bullet_gazebo.ros.common.rospy_topics import wait_until_sent
 
 QUEUE = 50
-KEPT = 5.0  # [s] that the status of an ended goal is published, as by actionlib
+KEPT = 5.0  # [s] that an ended goal's status is published, as in actionlib
 MOST_KEPT = 100  # goals that have ended
 NEVER = rospy.Duration(10**9)
 ENDED = (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.REJECTED,
@@ -21,9 +21,8 @@ ENDED = (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalSta
 class SteadyActionServer(ActionServer):
     """An action server without a timer: its owner calls publish_status() now and then.
 
-    actionlib's own timer stands still with simulated time, and dies when it goes back. Then the status of
-    an ended goal would be kept until time has passed its old value, and a stamped cancel request would
-    refuse all goals until then.
+    actionlib's own timer stands still with simulated time, and dies when it goes back. Until time passed its
+    old value, an ended goal's status would be kept, and a stamped cancel request would refuse all goals.
     """
 
     last_cancel: rospy.Time
@@ -70,14 +69,14 @@ class SteadyActionServer(ActionServer):
                 topic.unregister()
 
     def internal_goal_callback(self, goal: object) -> None:
-        """Takes a goal also where a cancel request from before time went back would refuse it."""
+        """Accepts a goal even if a cancel request from before time went back would refuse it."""
         with self.lock:
             if self.last_cancel > rospy.Time.now():
                 self.last_cancel = rospy.Time()
             super().internal_goal_callback(goal)
 
     def publish_status(self) -> None:
-        """Publishes the status of all goals but those that ended a while ago."""
+        """Publishes the status of all goals, except those that ended a while ago."""
         with self.lock:
             self._forget_ended()
             super().publish_status()

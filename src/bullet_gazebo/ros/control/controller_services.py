@@ -93,7 +93,7 @@ class ControllerServices:
         return True
 
     def _know_type(self, params: object) -> None:
-        """Imports a user's own type, without the simulator's lock, because it takes a while."""
+        """Imports a user's own type, without holding the simulator's lock: it may take a while."""
         kind = params.get("type") if isinstance(params, dict) else None
         if isinstance(kind, str) and kind not in self._manager.types:
             found = find_type(kind)

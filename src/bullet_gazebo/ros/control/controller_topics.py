@@ -140,7 +140,7 @@ def _unchanged(message: Any) -> Any:
 
 
 def _publish(publisher: rospy.Publisher, message: Any) -> None:
-    """Publishes; a user's bad message must not end the thread that sends for all."""
+    """Publishes a message; a user's bad one must not end the thread that sends for all."""
     try:
         publisher.publish(message)
     except rospy.ROSException as error:

@@ -185,7 +185,7 @@ class TrajectoryAction:
 
 
 class ActionGoal:
-    """Takes the controller's news of one goal within a control tick, and passes them on."""
+    """Receives the controller's reports on one goal within a control tick, and passes them on."""
 
     def __init__(self, action: TrajectoryAction, handle: ServerGoalHandle) -> None:
         self._action = action

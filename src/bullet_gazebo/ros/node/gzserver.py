@@ -56,7 +56,7 @@ from ros_calls import master
 
 NAME = "gazebo"
 EMPTY_WORLD = "empty.world"
-INERT = {  # options of Gazebo's that have no effect here: how many values follow them
+INERT = {  # Gazebo options without effect here, and how many values follow each
     ("-r", "--record"): 0,
     ("-q", "--quiet"): 0,
     ("--verbose",): 0,
@@ -71,10 +71,10 @@ INERT = {  # options of Gazebo's that have no effect here: how many values follo
     ("--record_period",): 1,
     ("--record_filter",): 1,
 }
-MORE_ARGUMENTS = "GZSERVER_ARGS"  # variable: for a server that another program starts
+MORE_ARGUMENTS = "GZSERVER_ARGS"  # environment variable, for a server that another program starts
 MOST_FREQUENT = 1e9  # [Hz]; time is counted in nanoseconds
 EXIT_TIMEOUT = 10.0  # [s] for what plugins have left to do at the end
-HANGING_TIMEOUT = 1.0  # [s] the same where one of them hangs
+HANGING_TIMEOUT = 1.0  # [s] the same if one of them hangs
 RECORDING_TIMEOUT = 5.0  # [s] to hand over the last frames
 WINDOW = "import sys; from bullet_gazebo.ros.clients.gzclient import main; sys.exit(main())"
 WINDOW_NAME = "gazebo_gui"
@@ -170,7 +170,7 @@ class GazeboNode:
         """Simulates until the node is shut down; returns the exit code."""
         # Called before the topics close, so that no tick publishes to a closed one.
         rospy.on_shutdown(self._watchdog.stop)
-        if signals.noted():  # during the start: no time passes any more
+        if signals.noted():  # they came during the start: no more time passes
             self._watchdog.stop()
         else:
             self._watchdog.start()
@@ -202,7 +202,7 @@ def _recording(args: argparse.Namespace) -> RecordingOptions | None:
 
 
 def _flag(name: str) -> bool:
-    """Returns a parameter whose default is true; another value than a bool is a warning, as in Gazebo."""
+    """Returns a parameter that is true by default; warns unless its value is a bool, as Gazebo does."""
     value = rospy.get_param(name, True)
     if isinstance(value, bool):
         return value
@@ -211,7 +211,7 @@ def _flag(name: str) -> bool:
 
 
 def _clock_frequency() -> float:
-    """Returns ~pub_clock_frequency [Hz of simulated time]; 0, which is every tick, if that is invalid."""
+    """Returns ~pub_clock_frequency [Hz of simulated time]; 0 (every tick) if it is invalid."""
     value = rospy.get_param("~pub_clock_frequency", 0)
     # A period of less than a nanosecond, or of more than a thousand years, is a mistake.
     if isinstance(value, (int, float)) and (
@@ -279,7 +279,7 @@ def main(argv: list[str] | None = None) -> int:
 def main_with_window(argv: Sequence[str] | None = None) -> int:
     """Runs the node in this process and the window in another one; returns the node's exit code."""
     command_line = list(sys.argv if argv is None else argv)
-    # Until the node listens to them, both end the block, and with it the window.
+    # Until the node handles them, both signals end the block, and with it the window.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     try:

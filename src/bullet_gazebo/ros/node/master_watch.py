@@ -13,7 +13,7 @@ from ros_calls.master import NoAnswer, Refused, living_address
 PERIOD = 10.0  # [s of wall time] between two questions
 TIMEOUT = 5.0  # [s] of each question
 LIVING = 5.0  # [s] for an answer of a busy node; that of a killed one comes at once
-MISSES = 2  # unanswered questions, after which the master is gone
+MISSES = 2  # unanswered questions, after which the master counts as gone
 TIME = "/use_sim_time"
 MASTERS_REASON = "new node registered with same name"
 
@@ -23,11 +23,7 @@ class NodeNameTaken(Exception):
 
 
 def refuse_twin(name: str) -> None:
-    """Makes sure that no living node has that name: registering would end it without a word.
-
-    Raises:
-        NodeNameTaken: if one has.
-    """
+    """Raises NodeNameTaken if a living node has that name: registering would end that node silently."""
     try:
         address = living_address(name, LIVING)
     except NoAnswer:  # the master has gone meanwhile; rospy waits for it

@@ -16,7 +16,7 @@ QUEUE = 10
 
 
 class StateTopic(ThinnedTopic):
-    """A topic with the state before each step, made only for subscribers."""
+    """A topic with the state before each step, built only while somebody subscribes."""
 
     def __init__(
         self, name: str, kind: type, sim: Simulator, thinner: Thinner, make: Callable[[], object]

@@ -19,7 +19,7 @@ from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.timing import FairLock
 
 STOP_TIMEOUT = 5.0  # [s] for the tick in progress
-GRACE = 0.5  # [s] the same where the tick was found to hang
+GRACE = 0.5  # [s] the same if the tick is known to hang
 PATIENCE = 10.0  # [s of wall time] for whoever keeps the lock
 LONGEST_LOOK = 1.0  # [s] counted between two looks; a suspended process sees more pass
 DEPTH = 12  # innermost frames that are logged
@@ -39,7 +39,7 @@ class Watchdog:
         self._ended = threading.Event()
         self._fault = False
         self._stall = StallWatch(sim, rospy.logwarn)
-        self._deadline: float | None = None  # of the end
+        self._deadline: float | None = None  # until which `stop` waits
 
     def start(self) -> None:
         """Lets time pass."""
@@ -94,7 +94,7 @@ class Watchdog:
             self._ended.wait(max(0.0, self._deadline - time.monotonic()))
 
     def left_hanging(self) -> str | None:
-        """Returns who still keeps the world's lock after `stop`, if anybody does."""
+        """Returns who still keeps the world's lock after `stop`, or None."""
         lock = self._sim.lock
         ended = not self._began or self._ended.is_set()
         return holder(lock) if self._stall.reported or (lock.held and not ended) else None
@@ -139,7 +139,7 @@ class StallWatch:
 
 
 def holder(lock: FairLock) -> str:
-    """Says who holds the lock, with the innermost lines of the stack."""
+    """Returns who holds the lock, with the innermost lines of its stack."""
     thread = lock.holder
     frame = sys._current_frames().get(thread) if thread is not None else None
     if frame is None:

@@ -1,8 +1,8 @@
 """The XML-RPC call `gazeboWorld` of the simulator's node, which `gz world` makes.
 
 Every ROS node answers XML-RPC calls of master and tools (getPid, shutdown and so on). The simulator answers
-one more: it is found by the node's name from any machine, and is neither a topic nor a service, of which
-there must be only Gazebo's own (docs/contract/gazebo.md 7).
+one more: any machine finds it by the node's name, and it is neither a topic nor a service, of which there
+must be only Gazebo's own (docs/contract/gazebo.md 7).
 """
 
 from collections.abc import Callable
@@ -43,7 +43,7 @@ class WorldControl:
         answer_xmlrpc(METHOD, self.answer)
 
     def answer(self, *arguments: object) -> Answer:
-        """Carries out a command; returns code (1 is success), text, ticks done.
+        """Runs a command; returns code (1 is success), text, ticks done.
 
         Args:
             arguments: the command; for "step" also the number of ticks, 1 by default. XML-RPC has no

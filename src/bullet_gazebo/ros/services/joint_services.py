@@ -95,7 +95,7 @@ class JointServices:
             plain = [name.removeprefix(f"{model.name}::") for name in names]
             self._sim.set_joint_positions(model, dict(zip(plain, positions, strict=True)))
         unknown = sorted(set(plain) - set(model.joint_names))
-        if unknown:  # Gazebo ignores them without a word
+        if unknown:  # Gazebo ignores them silently
             some = [name[:LONGEST_NAME] for name in unknown[:MOST_NAMES]]
             more = f" and {len(unknown) - MOST_NAMES} more" if len(unknown) > MOST_NAMES else ""
             text = "SetModelConfiguration: model '%s' has no joint %s%s"
@@ -153,7 +153,7 @@ class ForceServices:
         return srv.ApplyBodyWrenchResponse(True, "")
 
     def _interval(self, start: genpy.Time, duration: genpy.Duration) -> ActingTime:
-        """A start in the past means now."""
+        """Returns when a force acts; a start in the past means now."""
         return ActingTime(max(start.to_nsec(), self._sim.now), duration.to_nsec())
 
     def _clear_efforts(self, request: srv.JointRequestRequest) -> srv.JointRequestResponse:

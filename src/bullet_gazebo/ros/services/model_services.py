@@ -32,13 +32,13 @@ QUEUE = 10
 
 
 class _StateResponse(srv.GetModelStateResponse):
-    """rospy puts its own count into header.seq of responses that say they begin with a header."""
+    """Keeps our header.seq: rospy overwrites it in responses that say they begin with a header."""
 
     _has_header = False
 
 
 class ModelServices:
-    """get_model_properties, get_model_state and set_model_state; the topic of the latter has no answer."""
+    """get_model_properties, get_model_state and set_model_state, which is also a topic without answers."""
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
@@ -129,7 +129,7 @@ class ModelServices:
 
 
 class LinkServices:
-    """get_ and set_link_properties, get_ and set_link_state; the topic of the latter has no answer."""
+    """get_ and set_link_properties, get_ and set_link_state, which is also a topic without answers."""
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim

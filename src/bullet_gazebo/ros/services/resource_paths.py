@@ -1,4 +1,4 @@
-"""Where model files, meshes and worlds are looked for (docs/contract/gazebo_launch.md 4.1 and 4.2)."""
+"""Search paths for model files, meshes and worlds (docs/contract/gazebo_launch.md 4.1 and 4.2)."""
 
 import contextlib
 import functools
@@ -24,7 +24,7 @@ def resources() -> Resources:
 
 @functools.cache
 def _model_folders() -> tuple[Path, ...]:
-    """Read once, as Gazebo does: reading all packages takes long in a large workspace."""
+    """Reads them once, as Gazebo does: reading all packages takes long in a large workspace."""
     return tuple(Path(path) for path in [*model_paths(), os.path.expanduser(HOME_MODELS)])
 
 

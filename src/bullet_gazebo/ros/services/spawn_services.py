@@ -136,7 +136,7 @@ class SpawnServices:
 
 
 def read_world(name: str, interrupted: Callable[[], bool]) -> WorldDescription:
-    """Reads a world file. An unusable one is a message, and a world with just a ground plane.
+    """Reads a world file. If it is unusable, logs why and returns a world with just a ground plane.
 
     Reading ends early once `interrupted` returns true.
     """
@@ -189,7 +189,7 @@ def _warn(name: str, description: ModelDescription) -> None:
 
 
 def _log(what: str, warnings: list[str], left_out: list[str]) -> None:
-    """Logs what a file asked for in vain."""
+    """Logs a file's warnings, and what was left out of the world."""
     for warning in _at_most(warnings):
         rospy.logwarn("%s: %s", what, warning)
     if left_out:
@@ -235,6 +235,6 @@ def _with_package_paths(text: str) -> str:
 
 
 def _refused(reason: str) -> rospy.ServiceException:
-    """Gazebo fails the call as such here, instead of answering success=false."""
+    """Returns an exception: here Gazebo fails the call itself, instead of answering success=false."""
     rospy.logerr("SpawnModel: Failure - %s", reason)
     return rospy.ServiceException(f"SpawnModel: Failure - {reason}")

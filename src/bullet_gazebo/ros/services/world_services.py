@@ -117,7 +117,7 @@ class PhysicsServices:
             )
 
     def set(self, request: srv.SetPhysicsPropertiesRequest) -> srv.SetPhysicsPropertiesResponse:
-        """Sets all fields: none is optional. A bad one refuses the whole request."""
+        """Sets all fields, none of which is optional; one bad value refuses the whole request."""
         fault = bad_number(request)
         if not fault and not SHORTEST_STEP <= request.time_step <= LONGEST_STEP:
             fault = (
@@ -148,7 +148,7 @@ class PhysicsReconfigure(DynamicServer):
         super().__init__(PARAMETERS, self._apply)
 
     def _apply(self, config: Config, level: int) -> Config:
-        """Carries `config` out; returns the one in force if the world refuses it."""
+        """Applies `config` and returns it, or the one in force if the world refuses it."""
         if level == FIRST:
             config.update(self._in_force())
             return config

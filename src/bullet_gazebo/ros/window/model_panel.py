@@ -198,7 +198,7 @@ class ModelPanel:
             self._world.position = self._start - place
 
     def _let_go(self) -> None:
-        """Puts the world back to where it belongs, and keeps what the cameras see."""
+        """Moves the world back, and all cameras with it, so that they see the same."""
         way = -np.array(self._world.position)
         self._start, self._followed = None, ""
         if np.abs(way).max() > 0.0:
@@ -209,7 +209,7 @@ class ModelPanel:
 
 
 def _range(joint: VisibleJoint) -> tuple[float, float]:
-    """Returns the slider's ends [rad, m]: the joint's limits, or what suits its kind."""
+    """Returns the slider's ends [rad, m]: the joint's limits, or defaults for its kind."""
     reach = REACH.get(joint.kind, 1.0)
     if joint.lower >= joint.upper:
         return -reach, reach

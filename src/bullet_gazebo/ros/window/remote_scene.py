@@ -39,7 +39,7 @@ class RemoteScene:
         self._times: deque[tuple[float, float]] = deque(maxlen=SPAN)  # wall, simulated [s]
 
     def look(self, poses: bool, contacts: bool) -> None:
-        """Subscribes to poses and contacts, or not."""
+        """Subscribes to or unsubscribes from poses and contacts; asks a silent simulator for them."""
         self._listen("scene_poses", ScenePoses, poses)
         self._listen("scene_contacts", SceneContacts, contacts)
         now = time.monotonic()

@@ -169,13 +169,13 @@ class Window:
 
 
 class TrainingTab:
-    """A tab with a training's curves, which comes once somebody has named a training.
+    """A tab with a training's curves, shown once somebody has named a training.
 
     A thread of its own reads the training's table.
     """
 
     def __init__(self, server: viser.ViserServer, tabs: viser.GuiTabGroupHandle) -> None:
-        """`tabs` of the page gets the tab."""
+        """`tabs` is the group of tabs on the page, which receives this one."""
         self._server, self._tabs = server, tabs
         self._curves: Curves | None = None
         self._named = ""

@@ -32,7 +32,7 @@ def bring_up(scene: Scene, say: Say) -> list[Undo]:
 
     Args:
         scene: the robots; `SharedWorld` spawns its objects.
-        say: is called with a line for each thing that is done.
+        say: called with a line for each thing that is done.
 
     Returns:
         What undoes the changes, in the order in which they were made.
@@ -53,12 +53,12 @@ def bring_up(scene: Scene, say: Say) -> list[Undo]:
 
 
 def full_name(robot: Robot, name: str) -> str:
-    """The name of a controller, topic or parameter in the robot's namespace."""
+    """Returns the name of a controller, topic or parameter in the robot's namespace."""
     return str(rospy.names.ns_join(f"/{robot.namespace.strip('/')}", name))
 
 
 def ready(scene: Scene) -> Ready:
-    """The models and controllers that have to exist before robots can be used."""
+    """Returns the models and controllers that have to exist before robots can be used."""
     wanted = [(robot, name) for robot in scene.robots for name in (robot.publisher, *robot.run)]
     models = [robot.model for robot in scene.robots]
     return Ready(models, list(dict.fromkeys(full_name(*each) for each in wanted)))
@@ -132,7 +132,7 @@ def _controller_states(robot: Robot) -> dict[str, str]:
 
 
 def spawn_command(robot: Robot, argv: list[str]) -> int:
-    """The command spawn_robot.py: waits for a simulator, brings the robot up, ends.
+    """Runs the command spawn_robot.py: waits for a simulator, brings the robot up, ends.
 
     Returns:
         The exit code; a failure is one line.

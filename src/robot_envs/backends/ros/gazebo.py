@@ -22,7 +22,7 @@ from ros_utils import ros_gazebo
 
 NODE = "/gazebo"
 WORLD_SERVICE = "/gazebo/get_world_properties"
-STEP_SERVICE = "/gazebo/step_world"  # only of a simulator in lock-step
+STEP_SERVICE = "/gazebo/step_world"  # only a simulator in lock-step has it
 Undo = Callable[[], object]
 
 
@@ -60,7 +60,7 @@ class RunningSimulator:
         self._address = _registered_address()
 
     def is_registered(self) -> bool:
-        """Whether the master still knows it."""
+        """Returns whether the master still knows it."""
         return self._address is not None and self._address == _registered_address()
 
     def __enter__(self) -> None:
@@ -90,7 +90,7 @@ class RunningSimulator:
 
 
 def _registered_address() -> str | None:
-    """The address of the simulator's node, dead or alive."""
+    """Returns the address of the simulator's node, dead or alive."""
     try:
         return str(master.call("lookupNode", NODE))
     except (NoAnswer, Refused):
@@ -98,7 +98,7 @@ def _registered_address() -> str | None:
 
 
 def simulator_answers() -> bool:
-    """Whether a living simulator offers Gazebo's services.
+    """Returns whether a living simulator offers Gazebo's services.
 
     Raises:
         SimulatorHangs: if there is one that doesn't answer.
@@ -115,7 +115,7 @@ def simulator_answers() -> bool:
 
 
 def lockstep_hint() -> str:
-    """Why simulated time stands still, if the simulator is in lock-step; otherwise empty."""
+    """Returns why simulated time stands still, if the simulator is in lock-step; otherwise empty."""
     with contextlib.suppress(RobotEnvError):  # the master may be gone
         if node.service_is_registered(STEP_SERVICE):
             return (
@@ -126,7 +126,7 @@ def lockstep_hint() -> str:
 
 
 def world_path(source: Source | None, write: Callable[[str], str]) -> str | None:
-    """The world file for a simulator to be started; None: its default, a ground plane.
+    """Returns the world file for a simulator to be started; None: its default, a ground plane.
 
     Args:
         source: the robot's world.
@@ -138,7 +138,7 @@ def world_path(source: Source | None, write: Callable[[str], str]) -> str | None
 
 
 def physics_step() -> float:
-    """The simulator's physics step [s].
+    """Returns the simulator's physics step [s].
 
     Raises:
         RobotEnvError: if it doesn't answer.
@@ -161,7 +161,7 @@ def check_world(robot: Robot) -> None:
 
 
 def models() -> list[str]:
-    """Names of the models in the world.
+    """Returns the names of the models in the world.
 
     Raises:
         SimulatorError: if the simulator doesn't answer.

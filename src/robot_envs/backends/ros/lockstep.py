@@ -77,7 +77,7 @@ class LockstepWorld:
         with self._simulator:
             its_turn = self._world.claim_if_free(self)
         names = _names(query)
-        if query != StateQuery() and its_turn:  # otherwise the reset finds what isn't there
+        if query != StateQuery() and its_turn:  # otherwise the reset reports unknown names
             self._take()
             self._look(names)
         self._query, self._names = query, names
@@ -195,7 +195,7 @@ class LockstepWorld:
         """See `RobotBackend.vary`."""
         self._drop()
         with self._simulator:
-            self._world.claim(self)  # what others have varied isn't this one's to start from
+            self._world.claim(self)  # undoes what others have varied, before this one varies
         self._variation(variation)
 
     def restore(self) -> None:

@@ -12,19 +12,19 @@ from ros_calls.master import NoAnswer, Refused, living_address
 
 
 def plain_arguments(argv: list[str]) -> list[str]:
-    """The arguments without what roslaunch adds (`__name:=`, `__log:=`, remappings)."""
+    """Returns the arguments without what roslaunch adds (`__name:=`, `__log:=`, remappings)."""
     return rospy.myargv(["", *argv])[1:]
 
 
 def full_name(argv: list[str], default: str) -> str:
-    """The node's name with its namespace, as `__name:=` and ROS_NAMESPACE give it."""
+    """Returns the node's name with its namespace, as `__name:=` and ROS_NAMESPACE give it."""
     mappings = rosgraph.names.load_mappings(argv)
     namespace = mappings.get("__ns") or os.environ.get("ROS_NAMESPACE", "/")
     return rosgraph.names.ns_join("/" + namespace.strip("/"), mappings.get("__name", default))
 
 
 def master_is_up() -> bool:
-    """Whether the ROS master answers.
+    """Returns whether the ROS master answers.
 
     Raises:
         RobotEnvError: if it doesn't answer and can't be started here: it is another machine's, or something
@@ -37,7 +37,7 @@ def master_is_up() -> bool:
 
 
 def service_is_registered(name: str) -> bool:
-    """Whether a node has registered the service.
+    """Returns whether a node has registered the service.
 
     Raises:
         RobotEnvError: if the master doesn't answer.
@@ -46,7 +46,7 @@ def service_is_registered(name: str) -> bool:
 
 
 def private_parameters(name: str) -> dict[str, Any]:
-    """The private parameters of a node; empty if there are none, or no master.
+    """Returns the private parameters of a node; empty if there are none, or no master.
 
     Raises:
         RobotEnvError: see `master_is_up`.
@@ -56,7 +56,7 @@ def private_parameters(name: str) -> dict[str, Any]:
 
 
 def _ask_master(method: str, name: str) -> Any:
-    """The master's answer; None if it doesn't know the name."""
+    """Returns the master's answer, or None if it doesn't know the name."""
     try:
         return master.call(method, name)
     except Refused:
@@ -66,7 +66,7 @@ def _ask_master(method: str, name: str) -> Any:
 
 
 def command_line_parameters(argv: list[str]) -> dict[str, Any]:
-    """The private parameters among a node's arguments, as in `_seed:=3`.
+    """Returns the private parameters among a node's arguments, as in `_seed:=3`.
 
     Raises:
         RobotEnvError: if a value isn't YAML.

@@ -36,7 +36,7 @@ NOT_INHERITED = ("ROS_HOSTNAME", "ROS_IPV6", "ROS_NAMESPACE")
 
 
 def free_memory() -> int:
-    """Memory that new processes may take [bytes]."""
+    """Returns how much memory new processes may take [bytes]."""
     found = re.search(r"MemAvailable:\s*(\d+) kB", Path("/proc/meminfo").read_text("ascii"))
     return int(found[1]) * 1024 if found else sys.maxsize
 
@@ -58,7 +58,7 @@ class OwnSimulator:
     The constructor only starts them; `wait` returns once they can be used.
 
     Args:
-        slot: which of the simulators that start together this one is.
+        slot: its place among the simulators that start together.
         world: the robot's world file, or its text, which is written beside the log.
         seed: of random numbers that plugins draw.
 
@@ -109,7 +109,7 @@ class OwnSimulator:
         return [*([self.pid] if self.pid else []), self._process.pid]
 
     def has_died(self) -> bool:
-        """Whether it has died; gives the supervisor time to notice."""
+        """Returns whether it has died; gives the supervisor time to notice."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(NOTICING)
         return not self.is_alive
@@ -160,7 +160,7 @@ class OwnSimulator:
         """Kills a simulator that has failed; returns how it ended, and the last line of its log.
 
         Args:
-            hangs: it won't end by itself.
+            hangs: whether it hangs, and so won't end by itself.
         """
         how = ""
         if not hangs and self.has_died():

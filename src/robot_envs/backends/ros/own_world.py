@@ -210,7 +210,7 @@ class OwnWorld:
             raise SimulatorError(f"{self._simulator} has no episode; begin one with reset()")
 
     def _perform(self, action: Callable[[LockstepWorld], Result]) -> Result:
-        """Performs an action in the simulator, or in the one that replaces it: the one place that decides.
+        """Performs an action in the simulator or in its replacement; only this method decides which.
 
         An action that a healthy simulator refuses is the caller's error. A failure is answered by one
         replacement, unless the simulator never came up and another one would do the same.

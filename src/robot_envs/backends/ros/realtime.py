@@ -36,7 +36,7 @@ from robot_envs.world_state import (
 STATE_TIMEOUT = 5.0  # [s] of wall time without a joint state
 RESET_WAIT = 0.5  # [s] of wall time for the joint state that a reset publishes
 _SAME = 1e-6  # [m], [rad]
-_EARLY = 1e-6  # [s]; of rounding
+_EARLY = 1e-6  # [s] of rounding error
 _ONLY_JOINTS = "a world in real time gives the joints alone (backend 'ros-realtime')"
 
 
@@ -159,7 +159,7 @@ class CommandTopic:
             )
 
     def _is_linked(self, bound: float) -> bool:
-        """Whether somebody subscribes within a time [s]."""
+        """Returns whether somebody subscribes within a time [s]."""
         deadline = time.monotonic() + bound
         while self._publisher.get_num_connections() == 0:
             if time.monotonic() > deadline:

@@ -69,7 +69,7 @@ class RosSession:
         If the simulator was started here and dies before its robots are there, another one is started once.
 
         Args:
-            say: is called with a line for each thing that is started.
+            say: called with a line for each thing that is started.
 
         Raises:
             RobotEnvError: if something can't be started, or what runs doesn't fit; `close` ends what was
@@ -173,11 +173,11 @@ class RosSession:
             windows.report_opening(say, registered=True)
 
     def serves(self, scene: Scene, realtime: bool) -> bool:
-        """Whether it has these robots, and moves as asked."""
+        """Returns whether it has these robots, and moves as asked."""
         return self.moves(scene.robots) and self._realtime == realtime
 
     def moves(self, robots: Sequence[Robot]) -> bool:
-        """Whether it has these robots."""
+        """Returns whether it has these robots."""
         return self._scene.robots == tuple(robots)
 
     def connect(
@@ -227,7 +227,7 @@ class RosSession:
 
 
 def running_session(scene: Scene, realtime: bool) -> RosSession:
-    """The process's session, started if there is none; it runs until the process ends.
+    """Returns the process's session, started if there is none; it runs until the process ends.
 
     If its simulator has died, another one is started. A session of other robots ends.
 
@@ -268,5 +268,5 @@ def _undo_if_running(running: RunningSimulator, undo: Undo) -> None:
 
 @lru_cache(maxsize=1)
 def _sessions() -> list[RosSession]:
-    """The process's sessions, oldest first."""
+    """Returns the process's sessions, oldest first."""
     return []

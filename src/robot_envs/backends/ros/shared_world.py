@@ -18,12 +18,12 @@ class SharedBackend(Protocol):
     scene: Scene
 
     def restore(self) -> None:
-        """Undoes what this backend has varied of the robots."""
+        """Undoes this backend's variations of the robots."""
         ...
 
 
 class SharedWorld:
-    """Knows which backend has begun an episode last, and keeps that one's objects in the world.
+    """Knows which backend began the latest episode, and keeps its objects in the world.
 
     Models of the same names that were there before are used, and left there.
     """

@@ -36,7 +36,7 @@ def show_curves(folder: Path) -> Callable[[], None]:
 
 
 def is_open() -> bool:
-    """Whether the simulator has a window."""
+    """Returns whether the simulator has a window."""
     return living_address(f"/{NODE}") is not None
 
 
@@ -54,7 +54,7 @@ def open_window(say: Say) -> Callable[[], object]:
 def report_open(say: Say) -> None:
     """Says where a window is that was open before.
 
-    A window for other machines keeps its address, which holds a token, to whoever opened it.
+    A window for other machines has a token in its address, so only whoever opened it is shown that.
     """
     for line in rospy.get_param(WINDOW, []) or [
         "the simulator's window is open already; whoever opened it was told its address"
@@ -66,7 +66,7 @@ def report_opening(say: Say, registered: bool) -> None:
     """Waits for a window to open, and says where it is: the simulator's own output goes to its log.
 
     Args:
-        say: is called with each line.
+        say: called with each line.
         registered: whether its node has registered already, so that it has ended if it isn't there.
     """
     lines: list[str] = []

@@ -1,1 +1,1 @@
-"""Gazebo's services, launch and models."""
+"""Calls Gazebo's services, launches it, and spawns models."""

@@ -1,4 +1,4 @@
-"""Calls of the simulator's services, and the results of several values. Part of `ros_gazebo`."""
+"""Calls the simulator's services, and defines results with several values. Part of `ros_gazebo`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ros_utils._internal import log as _log
 
 
 class SpawnResult(NamedTuple):
-    """Whether a model was spawned, and the simulator's text or what went wrong before."""
+    """Whether a model was spawned, and the simulator's text or an earlier error."""
 
     success: bool
     status_message: str
@@ -59,7 +59,7 @@ class JointPropertiesResult(NamedTuple):
 
 
 class WorldPropertiesResult(NamedTuple):
-    """What is in the world: the simulated time [s], and the models' names."""
+    """The world's simulated time [s] and its models' names."""
 
     success: bool
     sim_time: float
@@ -78,7 +78,7 @@ class BadNumber(ValueError):
 
 
 def call(service: str, kind: Any, *request: Any, timeout: float, gazebo_ns: str) -> Any:
-    """The answer of a service of the simulator, or None; whatever went wrong is logged."""
+    """Returns the simulator's answer, or None after a failure, which is logged."""
     name = f"{gazebo_ns.rstrip('/')}/{service}"
     try:
         answer = waiting.wait_and_call(name, kind, *request, timeout=timeout)
@@ -91,18 +91,18 @@ def call(service: str, kind: Any, *request: Any, timeout: float, gazebo_ns: str)
 
 
 def succeeded(answer: Any) -> bool:
-    """True for an answer that says so."""
+    """Returns True if there is an answer and it reports success."""
     return answer is not None and bool(answer.success)
 
 
 def empty_call(service: str, retries: int, timeout: float, gazebo_ns: str) -> bool:
-    """Call a service without arguments, again after a failure, at most `retries` times."""
+    """Calls a service without arguments until it succeeds, at most `retries` times."""
     name = f"{gazebo_ns.rstrip('/')}/{service}"
     for attempt in range(1, retries + 1):
         try:
             waiting.wait_and_call(name, std_srvs.srv.Empty, timeout=timeout)
             return True
-        except (ServiceMissing, ServiceHangs) as fault:  # waited for already
+        except (ServiceMissing, ServiceHangs) as fault:  # the wait was long enough: no retry
             _log.error(str(fault))
             return False
         except ServiceFailed as fault:
@@ -111,28 +111,28 @@ def empty_call(service: str, retries: int, timeout: float, gazebo_ns: str) -> bo
 
 
 def make_pose(x: float, y: float, z: float, qx: float, qy: float, qz: float, qw: float) -> Pose:
-    """A pose; a quaternion that is all zeros means no rotation."""
+    """Returns a pose; a quaternion that is all zeros means no rotation."""
     if not any((qx, qy, qz, qw)):
         qw = 1.0
     return Pose(position=Point(x, y, z), orientation=Quaternion(qx, qy, qz, qw))
 
 
 def make_twist(linear: tuple[float, float, float], angular: tuple[float, float, float]) -> Twist:
-    """A twist [m/s, rad/s]."""
+    """Returns a twist [m/s, rad/s]."""
     return Twist(Vector3(*linear), Vector3(*angular))
 
 
 def check_finite(what: str, *numbers: float) -> None:
-    """Return if all numbers are finite.
+    """Returns if all numbers are finite.
 
     Raises:
-        BadNumber: one isn't.
+        BadNumber: a number isn't finite.
     """
     if not all(map(math.isfinite, numbers)):
         raise BadNumber(f"{what}: {list(numbers)} holds a number that is not finite")
 
 
 def pose_numbers(pose: Pose) -> tuple[float, ...]:
-    """Position and orientation of a pose as seven numbers."""
+    """Returns position and orientation of a pose as seven numbers."""
     p, q = pose.position, pose.orientation
     return (p.x, p.y, p.z, q.x, q.y, q.z, q.w)

@@ -1,4 +1,4 @@
-"""Start and end the simulator. Part of `ros_gazebo`."""
+"""Starts and ends the simulator. Part of `ros_gazebo`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from ros_utils.readiness import Ready
 
 LABEL = "Gazebo"
 NODES = ("/gazebo", "/gazebo_gui")
-READY = "pause_physics"  # the last thing that a client needs before it can begin
+READY = "pause_physics"  # comes up last of what a client needs to begin
 
 
 def launch_Gazebo(
@@ -56,15 +56,14 @@ def launch_Gazebo(
     master_uri: str | None = None,
     ready: Ready | None = None,
 ) -> Started | bool:
-    """Run ``roslaunch gazebo_ros empty_world.launch`` and wait until the simulator answers. Starts
-    a master if needed.
+    """Runs ``roslaunch gazebo_ros empty_world.launch``, with a master if needed, and waits for the simulator.
 
-    If a simulator already answers under this master it is used as it is, with a warning. It is
-    ended by `close_Gazebo`, by `ros_node.ros_kill_all_processes`, and when this Python process
-    exits.
+    A simulator that already answers under this master is used unchanged, with a warning. The
+    simulator ends with `close_Gazebo`, with `ros_node.ros_kill_all_processes`, and when this Python
+    process exits.
 
     Args:
-        paused: begin with time standing still.
+        paused: start with the simulation paused.
         use_sim_time: let nodes use simulated time.
         gui: with a window; without a display the simulation goes on without one.
         recording: record the state log.
@@ -82,18 +81,18 @@ def launch_Gazebo(
             a log file.
         lockstep: time moves only on request (the stand-in's own argument; Gazebo has none).
         seed: seed of the simulator (the stand-in's own argument).
-        timeout: bound of the wait [s].
+        timeout: limit of the wait [s].
         extra_gazebo_args: further arguments for the server.
-        gazebo_ns: where its services are expected.
+        gazebo_ns: namespace of its services.
         log_file: the file for its output; None for the terminal or one of its own.
-        env: variables on top of this process's.
+        env: variables in addition to this process's.
         master_uri: the master to run under; None for this process's.
-        ready: see `ros_launch.ros_launch_from_pkg`, for a world that brings models along.
+        ready: for a world with models of its own; see `ros_launch.ros_launch_from_pkg`.
 
     Returns:
-        A handle that is true, once it answers and what `ready` names is there. False, with an error
-        in the log, if package or world are missing, no master can be used, the simulator ends, or
-        it doesn't answer or isn't ready in time (it is ended then, if it was started here).
+        A true handle once the simulator answers and everything in `ready` is there. False, with an
+        error in the log, if package or world are missing, no master can be used, or the simulator
+        ends, doesn't answer or isn't ready in time (it is ended then, if it was started here).
     """
     switches = {
         "paused": paused,
@@ -104,13 +103,12 @@ def launch_Gazebo(
         "verbose": verbose,
         "output": output,
         "respawn_gazebo": respawn_gazebo,
-        "use_clock_frequency": True,  # without it the rate has no effect
+        "use_clock_frequency": True,  # the rate has no effect without it
         "pub_clock_frequency": pub_clock_frequency,
         "server_required": server_required,
         "gui_required": gui_required,
     }
-    # A real gazebo_ros refuses arguments that it doesn't know, so what isn't asked for isn't
-    # mentioned.
+    # A real gazebo_ros rejects unknown arguments, so only those asked for are passed.
     asked = {
         "lockstep": lockstep or None,
         "seed": seed,
@@ -142,16 +140,15 @@ def launch_Gazebo(
 
 
 def close_Gazebo(*, master_uri: str | None = None) -> bool:
-    """End the simulator: the launch that `launch_Gazebo` started, and the nodes /gazebo and
-    /gazebo_gui.
+    """Ends the launch that `launch_Gazebo` started, and the nodes /gazebo and /gazebo_gui.
 
-    If the launch had brought up the master, the master ends with it.
+    A master that the launch brought up ends with it.
 
     Args:
-        master_uri: the master that it runs under; None for this process's.
+        master_uri: the simulator's master; None for this process's.
 
     Returns:
-        True if none of it is left.
+        True if nothing of it is left.
     """
     with _master.using(master_uri):
         nodes = {name: address for name in NODES if (address := _nodes.node_uri(name))}
@@ -163,13 +160,13 @@ def close_Gazebo(*, master_uri: str | None = None) -> bool:
 
 
 def _world(path: str | None, package: str | None, name: str | None) -> str | None:
-    """The world file to load, or None for the launch file's own.
+    """Returns the world file to load, or None for the launch file's own.
 
     Raises:
         NotFound: no such package or file.
     """
     if path:
-        # A relative path may also be one that the simulator looks up on its own resource path.
+        # The simulator may find a relative path on its own resource path.
         return (
             os.path.abspath(path)
             if os.path.isfile(path)

@@ -1,4 +1,4 @@
-"""Physics properties, and pausing, stepping and resetting the simulation. Part of `ros_gazebo`."""
+"""Reads and sets physics properties; pauses, steps and resets. Part of `ros_gazebo`."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ CHUNK = 1000  # steps in one call
 def gazebo_reset_sim(
     retries: int = 5, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> bool:
-    """Put all models back to where they began, and the time to 0.
+    """Puts all models back to where they began, and sets the time to 0.
 
     Args:
         retries: attempts.
@@ -45,36 +45,36 @@ def gazebo_reset_sim(
 def gazebo_reset_world(
     retries: int = 5, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> bool:
-    """Put all models back to where they began; the time goes on. See `gazebo_reset_sim`."""
+    """Puts all models back to where they began; time goes on. See `gazebo_reset_sim`."""
     return empty_call("reset_world", retries, timeout, gazebo_ns)
 
 
 def gazebo_pause_physics(
     retries: int = 5, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> bool:
-    """Stop simulated time. See `gazebo_reset_sim`."""
+    """Stops simulated time. See `gazebo_reset_sim`."""
     return empty_call("pause_physics", retries, timeout, gazebo_ns)
 
 
 def gazebo_unpause_physics(
     retries: int = 5, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> bool:
-    """Let simulated time run. See `gazebo_reset_sim`."""
+    """Lets simulated time run. See `gazebo_reset_sim`."""
     return empty_call("unpause_physics", retries, timeout, gazebo_ns)
 
 
 def gazebo_step_physics(
     steps: int = 1, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> bool:
-    """Pause the simulation and move it by `steps` physics steps, as ``gz world -m`` does.
+    """Pauses the simulation and advances it by `steps` physics steps, as ``gz world -m`` does.
 
     Args:
-        steps: how many; at least 1.
-        timeout: bound for every 1000 of them [s].
+        steps: number of steps, at least 1.
+        timeout: limit for each 1000 steps [s].
         gazebo_ns: the simulator's node.
 
     Returns:
-        True when the steps are done.
+        True once the steps are done.
     """
     node = str(rospy.resolve_name(gazebo_ns))
     try:
@@ -109,8 +109,7 @@ ODE = {
 
 
 def gazebo_get_physics_properties(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> Any:
-    """All properties, as gazebo_msgs/GetPhysicsProperties answers; None, with an error in the log,
-    without an answer."""
+    """Returns the answer of gazebo_msgs/GetPhysicsProperties, or None, with an error in the log."""
     kind = srv.GetPhysicsProperties
     answer = call("get_physics_properties", kind, timeout=timeout, gazebo_ns=gazebo_ns)
     return answer if succeeded(answer) else None
@@ -125,7 +124,7 @@ def gazebo_set_physics_properties(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
 ) -> bool:
-    """Change the properties that are given; the others stay as they are.
+    """Changes the given properties; the others stay unchanged.
 
     Args:
         time_step: of one physics step [s], above 0.
@@ -164,7 +163,7 @@ def gazebo_set_physics_properties(
 def gazebo_set_max_update_rate(
     max_update_rate: float, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> bool:
-    """Set how fast simulated time passes.
+    """Sets how fast simulated time passes.
 
     Args:
         max_update_rate: a FACTOR of real time, 1 for real time; 0 is as fast as possible. (The
@@ -182,7 +181,7 @@ def gazebo_set_max_update_rate(
 
 
 def gazebo_get_max_update_rate(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> float:
-    """Steps per second of wall time [Hz], not a factor; 0 is as fast as possible, NaN no answer."""
+    """Returns the steps per second of wall time [Hz], no factor; 0: unlimited, NaN: no answer."""
     now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
     return float("nan") if now is None else float(now.max_update_rate)
 
@@ -190,7 +189,7 @@ def gazebo_get_max_update_rate(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZ
 def gazebo_set_time_step(
     new_time_step: float, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> bool:
-    """Set the time of one physics step [s]; simulated time passes as fast as before.
+    """Sets the length of a physics step [s]; simulated time passes as fast as before.
 
     Returns:
         True if the simulator did it.
@@ -208,7 +207,7 @@ def gazebo_set_time_step(
 
 
 def gazebo_get_time_step(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> float:
-    """The time of one physics step [s]; NaN without an answer."""
+    """Returns the length of a physics step [s]; NaN without an answer."""
     now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
     return float("nan") if now is None else float(now.time_step)
 
@@ -216,12 +215,12 @@ def gazebo_get_time_step(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -
 def gazebo_set_gravity(
     x: float, y: float, z: float, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> bool:
-    """Set gravity [m/s²]; True if the simulator did it."""
+    """Sets gravity [m/s²]; returns True if the simulator did it."""
     return gazebo_set_physics_properties(gravity=(x, y, z), timeout=timeout, gazebo_ns=gazebo_ns)
 
 
 def gazebo_get_gravity(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> Vector3:
-    """Gravity [m/s²]; all NaN without an answer."""
+    """Returns gravity [m/s²]; all NaN without an answer."""
     now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
     return Vector3(*(float("nan"),) * 3) if now is None else now.gravity
 
@@ -241,7 +240,7 @@ def gazebo_set_ODE_physics(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
 ) -> bool:
-    """Set all of the solver's settings; the fields are those of gazebo_msgs/ODEPhysics.
+    """Sets all solver settings; the arguments are the fields of gazebo_msgs/ODEPhysics.
 
     Returns:
         True if the simulator did it.
@@ -262,13 +261,13 @@ def gazebo_set_ODE_physics(
 
 
 def gazebo_get_ODE_physics(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> ODEPhysics:
-    """The solver's settings; all zeros, with an error in the log, without an answer."""
+    """Returns the solver's settings; without an answer all zeros, with an error in the log."""
     now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
     return ODEPhysics() if now is None else now.ode_config
 
 
 def gazebo_set_default_properties(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> bool:
-    """Set a step of 1 ms, real time, gravity of 9.81 m/s² and the solver's usual settings, at once.
+    """Sets a step of 1 ms, real time, gravity of 9.81 m/s² and the solver's usual settings, at once.
 
     Returns:
         True if the simulator did it.

@@ -31,7 +31,7 @@ from ros_utils._internal.urdf import urdf_parse_from_path, urdf_parse_from_pkg
 
 
 class SpawnOptions(NamedTuple):
-    """What the spawn functions have in common: where the model goes, and how to call."""
+    """The common options of the spawn functions: the model's place, and how to call."""
 
     name: str
     namespace: str
@@ -43,10 +43,10 @@ class SpawnOptions(NamedTuple):
 
 
 def spawn(kind: str, xml: str, options: SpawnOptions) -> SpawnResult:
-    """Spawn a model from XML text; `kind` is "urdf" or "sdf".
+    """Spawns a model from XML text; `kind` is "urdf" or "sdf".
 
     Returns:
-        Whether it was spawned (and, with `verify`, is in the world's list), and why not.
+        Whether it was spawned (and with `verify` is in the world's list), and if not, why.
     """
     name = f"{options.gazebo_ns.rstrip('/')}/spawn_{kind}_model"
     try:
@@ -66,7 +66,7 @@ def spawn(kind: str, xml: str, options: SpawnOptions) -> SpawnResult:
 
 
 def spawn_param(kind: str, param_name: str, options: SpawnOptions) -> SpawnResult:
-    """Spawn a model from the text in parameter ``<namespace>/<param_name>``. See `spawn`."""
+    """Spawns a model from the text in parameter ``<namespace>/<param_name>``. See `spawn`."""
     name = rosgraph.names.ns_join(options.namespace or "/", param_name)
     try:
         xml = str(_params.get(name))
@@ -84,15 +84,15 @@ def gazebo_delete_model(
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
 ) -> bool:
-    """Remove a model.
+    """Deletes a model.
 
     Args:
-        model_name: the model.
+        model_name: the model's name.
         timeout, gazebo_ns: see `ros_gazebo`.
         verify: return only once the model is no longer in the world's list.
 
     Returns:
-        True if it was there and is gone.
+        True if the model existed and is gone.
     """
     answer = call("delete_model", srv.DeleteModel, model_name, timeout=timeout, gazebo_ns=gazebo_ns)
     if not succeeded(answer):
@@ -101,7 +101,7 @@ def gazebo_delete_model(
 
 
 def _appears(name: str, wanted: bool, timeout: float, gazebo_ns: str) -> bool:
-    """Waits until a model is in the world, or is not; False if that doesn't come in time."""
+    """Waits until a model is in the world, or isn't; returns False after the timeout."""
 
     def look() -> str | None:
         kind = srv.GetWorldProperties
@@ -114,7 +114,7 @@ def _appears(name: str, wanted: bool, timeout: float, gazebo_ns: str) -> bool:
 
 
 def _failed(text: str) -> SpawnResult:
-    """What a spawn function answers when something is wrong; the text is logged."""
+    """Logs an error and returns it as a spawn function's result."""
     _log.error(text)
     return SpawnResult(False, text)
 
@@ -137,7 +137,7 @@ def gazebo_spawn_urdf_path(
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
 ) -> SpawnResult:
-    """Spawn a URDF or xacro file, given by its path. See `gazebo_spawn_urdf_string`."""
+    """Spawns a URDF or xacro file, given by its path. See `gazebo_spawn_urdf_string`."""
     xml = urdf_parse_from_path(model_path, args_xacro)
     if xml is None:
         return SpawnResult(False, f"{model_path}: can't be read or expanded")
@@ -168,8 +168,7 @@ def gazebo_spawn_urdf_pkg(
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
 ) -> SpawnResult:
-    """Spawn a package's URDF or xacro file, ``<pkg_name><file_folder>/<file_name>``. See
-    `gazebo_spawn_urdf_string`."""
+    """Spawns URDF or xacro ``<pkg_name><file_folder>/<file_name>``. See `gazebo_spawn_urdf_string`."""
     xml = urdf_parse_from_pkg(pkg_name, file_name, file_folder, args_xacro)
     if xml is None:
         return SpawnResult(
@@ -199,10 +198,10 @@ def gazebo_spawn_urdf_string(
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
 ) -> SpawnResult:
-    """Spawn a model from URDF text.
+    """Spawns a model from URDF text.
 
     Args:
-        model_string: the URDF, xacro already expanded.
+        model_string: the URDF, with xacro already expanded.
         model_name: name of the new model.
         robot_namespace: namespace of its plugins, e.g. of its controller manager.
         reference_frame: model or link that the pose refers to; "world" for the origin.
@@ -212,8 +211,8 @@ def gazebo_spawn_urdf_string(
         verify: return only once the model is in the world's list.
 
     Returns:
-        Whether it was spawned, and the simulator's text or what went wrong before: a pair that is
-        false if it wasn't.
+        Whether it was spawned, and the simulator's text or an earlier error: a pair that is false
+        after a failure.
     """
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     options = SpawnOptions(
@@ -239,8 +238,7 @@ def gazebo_spawn_urdf_param(
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
 ) -> SpawnResult:
-    """Spawn the URDF text in parameter ``<robot_namespace>/<param_name>``. See
-    `gazebo_spawn_urdf_string`."""
+    """Spawns the URDF in parameter ``<robot_namespace>/<param_name>``. See `gazebo_spawn_urdf_string`."""
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     options = SpawnOptions(
         model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
@@ -265,7 +263,7 @@ def gazebo_spawn_sdf_path(
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
 ) -> bool:
-    """Spawn an SDF file, given by its path. See `gazebo_spawn_sdf_string`."""
+    """Spawns an SDF file, given by its path. See `gazebo_spawn_sdf_string`."""
     xml = _read_sdf(model_path)
     if xml is None:
         return False
@@ -295,8 +293,7 @@ def gazebo_spawn_sdf_pkg(
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
 ) -> bool:
-    """Spawn a package's SDF file, ``<pkg_name><file_folder>/<file_name>``. See
-    `gazebo_spawn_sdf_string`."""
+    """Spawns the SDF file ``<pkg_name><file_folder>/<file_name>``. See `gazebo_spawn_sdf_string`."""
     try:
         xml = _read_sdf(_packages.file(pkg_name, file_folder, file_name))
     except _packages.NotFound as fault:
@@ -328,7 +325,7 @@ def gazebo_spawn_sdf_string(
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
 ) -> bool:
-    """Spawn a model from SDF text.
+    """Spawns a model from SDF text.
 
     Args:
         model_string: the SDF.
@@ -341,7 +338,7 @@ def gazebo_spawn_sdf_string(
         verify: return only once the model is in the world's list.
 
     Returns:
-        True if it was spawned; one value here, two for a URDF.
+        True if it was spawned; a single value, unlike the pair for a URDF.
     """
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     options = SpawnOptions(
@@ -367,8 +364,7 @@ def gazebo_spawn_sdf_param(
     gazebo_ns: str = GAZEBO,
     verify: bool = False,
 ) -> bool:
-    """Spawn the SDF text in parameter ``<robot_namespace>/<param_name>``. See
-    `gazebo_spawn_sdf_string`."""
+    """Spawns the SDF in parameter ``<robot_namespace>/<param_name>``. See `gazebo_spawn_sdf_string`."""
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     options = SpawnOptions(
         model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
@@ -377,7 +373,7 @@ def gazebo_spawn_sdf_param(
 
 
 def _read_sdf(path: str) -> str | None:
-    """The text of a file, or None, with an error in the log."""
+    """Returns a file's text, or None with an error in the log."""
     try:
         return decode(read_file(Path(_packages.existing(path))))
     except (_packages.NotFound, FileError) as fault:

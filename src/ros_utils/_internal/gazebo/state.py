@@ -1,4 +1,4 @@
-"""Where models, links and joints are, and putting them elsewhere. Part of `ros_gazebo`."""
+"""Reads and sets the states of models, links and joints. Part of `ros_gazebo`."""
 
 from __future__ import annotations
 
@@ -38,8 +38,7 @@ def gazebo_get_model_state(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
 ) -> ModelStateResult:
-    """Ask for a model's pose [m, quaternion] and twist [m/s, rad/s] relative to a model, link or
-    "world".
+    """Reads a model's pose [m, quaternion] and twist [m/s, rad/s] relative to a model, link or "world".
 
     Returns:
         Header, pose, twist, and whether it succeeded; all zeros if not.
@@ -78,16 +77,16 @@ def gazebo_set_model_state(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
 ) -> bool:
-    """Move a model, joints unchanged. A zero twist also takes the velocity out of its joints.
+    """Moves a model and keeps its joint positions. A zero twist also stops its joints.
 
     Args:
-        model_name: the model.
+        model_name: the model's name.
         ref_frame: model or link that pose and twist refer to.
         pos_x, pos_y, pos_z: position [m].
         ori_x, ori_y, ori_z, ori_w: orientation, a quaternion; all zeros is no rotation.
         lin_vel_x, lin_vel_y, lin_vel_z: [m/s].
         ang_vel_x, ang_vel_y, ang_vel_z: [rad/s].
-        sleep_time: wait afterwards [s of wall time].
+        sleep_time: pause afterwards [s of wall time].
         timeout, gazebo_ns: see `ros_gazebo`.
 
     Returns:
@@ -109,8 +108,7 @@ def gazebo_get_link_state(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
 ) -> LinkStateResult:
-    """Ask for a link's pose [m, quaternion] and twist [m/s, rad/s]; `link_name` is best scoped,
-    ``model::link``.
+    """Reads a link's pose [m, quaternion] and twist [m/s, rad/s]; best name it ``model::link``.
 
     Returns:
         Pose, twist, and whether it succeeded; all zeros if not.
@@ -134,7 +132,7 @@ def gazebo_set_link_state(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
 ) -> bool:
-    """Move a link; without `twist` it is at rest then. See `gazebo_get_link_state`."""
+    """Moves a link; without `twist` it is then at rest. See `gazebo_get_link_state`."""
     orientation = pose.orientation
     turn = (orientation.x, orientation.y, orientation.z, orientation.w)
     pose = make_pose(pose.position.x, pose.position.y, pose.position.z, *turn)
@@ -152,12 +150,12 @@ def gazebo_set_model_configuration(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
 ) -> bool:
-    """Put joints of a model to positions [rad] or [m] at once.
+    """Moves a model's joints to positions [rad, m] at once.
 
     Args:
-        model_name: the model.
-        joint_names: its joints to move.
-        joint_positions: where to, one for each.
+        model_name: the model's name.
+        joint_names: the joints to move.
+        joint_positions: one for each joint [rad, m].
         urdf_param_name: parameter with its URDF; Gazebo doesn't use it.
         timeout, gazebo_ns: see `ros_gazebo`.
 
@@ -173,7 +171,7 @@ def gazebo_set_model_configuration(
 def gazebo_get_joint_properties(
     joint_name: str, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> JointPropertiesResult:
-    """Ask for a joint's position [rad, m] and velocity [rad/s, m/s].
+    """Reads a joint's position [rad, m] and velocity [rad/s, m/s].
 
     Returns:
         Position, velocity, and whether it succeeded; zeros if not.
@@ -194,8 +192,9 @@ def gazebo_apply_joint_effort(
     timeout: float = TIMEOUT,
     gazebo_ns: str = GAZEBO,
 ) -> bool:
-    """Apply an effort [N m, N] to a joint for `duration` [s] of simulated time, from `start_time` [s]
-    or now on; a negative duration is for ever.
+    """Applies an effort [N m, N] to a joint, from `start_time` or now on [s of simulated time].
+
+    It lasts for `duration` [s of simulated time]; a negative one is for ever.
 
     Returns:
         True if the simulator does it.
@@ -216,7 +215,7 @@ def gazebo_apply_joint_effort(
 def gazebo_get_world_properties(
     *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
 ) -> WorldPropertiesResult:
-    """Ask what is in the world.
+    """Reads the simulated time and the models in the world.
 
     Returns:
         Whether it succeeded, the simulated time [s], and the models' names.
@@ -230,7 +229,7 @@ def gazebo_get_world_properties(
 
 
 def gazebo_get_model_names(*, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> list[str]:
-    """The names of the models in the world; empty, with an error in the log, without an answer."""
+    """Returns the models' names; without an answer an empty list, with an error in the log."""
     return gazebo_get_world_properties(timeout=timeout, gazebo_ns=gazebo_ns)[2]
 
 

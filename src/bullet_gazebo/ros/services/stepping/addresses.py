@@ -41,7 +41,7 @@ class Commanded(NamedTuple):
         """Passes the commands to the controllers.
 
         Raises:
-            ControlError: if a controller of a user raises.
+            ControlError: if a user's controller raises.
         """
         topic = ""
         try:
@@ -52,7 +52,7 @@ class Commanded(NamedTuple):
             raise ControlError(f"the reader of '{topic}' raised {error!r}") from error
 
     def hold(self, commands: Sequence[float]) -> None:
-        """Commands the joints; due before each tick, because limits clip a command in place."""
+        """Commands the joints; call it before each tick, because limits clip a command in place."""
         for joint, command in zip(self.joints, commands, strict=True):
             joint.command = command
 
@@ -102,7 +102,7 @@ class Addresses:
         return Commanded(list(found.values()), ports, size, handles, list(rivals.values()))
 
     def movable_joints(self, names: Sequence[str]) -> list[tuple[Model, str]]:
-        """Finds models and plain names of the joints of those plain or scoped names.
+        """Returns the model and plain name of each joint, given plain or scoped names.
 
         Raises:
             ControlError: for the first name that is wrong or names a joint again.
@@ -138,7 +138,7 @@ class Addresses:
 
     @cached_property
     def _namesakes(self) -> Counter[str]:
-        """How many models have a movable joint of a name."""
+        """Counts the models that have a movable joint of each name."""
         models = self._sim.world.models.values()
         return Counter(joint for model in models for joint in model.joint_names)
 
@@ -194,5 +194,5 @@ def _command_port(controller: Controller) -> Input:
 
 
 def _rivals(robot: ControlledRobot, joint: JointHandle) -> list[Controller]:
-    """The controllers that claim a joint while they run."""
+    """Returns the controllers that claim a joint while they run."""
     return [each for each in robot.manager.loaded if joint.name in each.claimed]

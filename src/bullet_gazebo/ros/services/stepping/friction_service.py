@@ -1,4 +1,4 @@
-"""set_link_friction: other friction for the surfaces of a link (SetLinkFriction.srv), beside step_world."""
+"""set_link_friction: changes the friction of a link's surfaces (SetLinkFriction.srv), beside step_world."""
 
 import rospy
 from bullet_gazebo_msgs.srv import (
@@ -12,7 +12,7 @@ from bullet_gazebo.simulator import Simulator
 
 
 class FrictionService:
-    """What no service of Gazebo's does, for surfaces that differ from episode to episode; in lock-step."""
+    """Changes surfaces from episode to episode, which no Gazebo service does; in lock-step only."""
 
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim

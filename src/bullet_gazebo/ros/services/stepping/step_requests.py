@@ -1,4 +1,4 @@
-"""Checks a StepWorld request as a whole, before any of it is done."""
+"""Checks a StepWorld request as a whole, before any of it is carried out."""
 
 import math
 from collections.abc import Sequence

@@ -112,8 +112,8 @@ class StepService:
                 return PrepareStepResponse(status_message=f"PrepareStep: {error}")
             if len(self._prepared) >= MOST_HANDLES:
                 del self._prepared[next(iter(self._prepared))]
-            # Not drawn from the world's random numbers. A handle of a simulator that was here before
-            # must not mean anything in this one, so they aren't counted.
+            # Random rather than counted, so that a handle from an earlier simulator means nothing
+            # here; and not drawn from the world's own random numbers, which stay bit-identical.
             handle = secrets.randbits(64)
             self._prepared[handle] = prepared
             return PrepareStepResponse(
@@ -160,10 +160,7 @@ class StepService:
             return PreparedStepResponse(True, False, sim.now, "", numbers, contacts)
 
     def _check_layout(self, prepared: _Prepared) -> None:
-        """
-        Raises:
-            UnknownName: if the numbers would belong to other names now.
-        """
+        """Raises UnknownName if the numbers would belong to other names now."""
         models = list(prepared.reader.read(stepped=False).models)
         if (prepared.addresses.joint_names, prepared.models) != (
             self._addresses().joint_names,
@@ -181,7 +178,7 @@ class StepService:
                 # Everything is checked before anything is done.
                 plan = StepPlan(self._sim, request, self._addresses())
                 reader = self._reader_of(plan.query)
-                self._begin(request, plan)  # what is left to fail is a user's controller
+                self._begin(request, plan)  # from here on only a user's controller can fail
             except (ControlError, UnknownName) as error:
                 return self._answer(status_message=f"StepWorld: {error}")
             hold = None
@@ -205,7 +202,7 @@ class StepService:
             )
 
     def _addresses(self) -> Addresses:
-        """What names stand for now."""
+        """Returns what names stand for now."""
         if self._current.version != self._sim.version:
             self._current = Addresses(self._sim)
         return self._current
