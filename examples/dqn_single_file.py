@@ -105,9 +105,7 @@ class ReplayBuffer:
         self.observations[index], self.actions[index] = observation, action
         self.rewards[index], self.discounts[index] = reward, discount
         self.next_observations[index] = next_observation
-        self.position = (
-            index + 1
-        ) % self.capacity  # the oldest transition, once the buffer is full
+        self.position = (index + 1) % self.capacity  # of the oldest, in a full buffer
         self.size = max(self.size, index + 1)
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> tuple[np.ndarray, ...]:

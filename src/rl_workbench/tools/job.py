@@ -221,9 +221,7 @@ def _finish(process: subprocess.Popen[bytes], stop_within: StopWithin) -> tuple[
             if time.monotonic() > deadline:
                 os.killpg(process.pid, signal.SIGKILL)
     except BaseException:
-        os.killpg(
-            process.pid, signal.SIGKILL
-        )  # not waited for yet, so the id can't be another process's
+        os.killpg(process.pid, signal.SIGKILL)  # not waited for, so its id isn't reused
         raise
     finally:
         os.close(descriptor)

@@ -116,9 +116,7 @@ def _policy(
     except WorkbenchError:
         if not sized:
             raise
-    return load_any(
-        run, which, options, arguments.seed
-    )  # pictures of another size are scaled later
+    return load_any(run, which, options, arguments.seed)  # pictures are scaled later
 
 
 def _record(arguments: argparse.Namespace, which: str, policy: Any, view: Any, rate: float) -> Film:
