@@ -48,7 +48,10 @@ def start(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "number"),
-    [*((name, signal.SIGINT) for name in PROGRAMS), ("node.gazebo", signal.SIGTERM)],
+    [
+        *((name, signal.SIGINT) for name in PROGRAMS),
+        ("node.gzserver main_with_window", signal.SIGTERM),
+    ],
 )
 def test_a_signal_in_the_middle_of_a_registration_ends_it(start, name, number):
     with socket.create_server(("127.0.0.1", 0)) as mute_master:
@@ -61,7 +64,7 @@ def test_a_signal_in_the_middle_of_a_registration_ends_it(start, name, number):
     assert "Traceback" not in output
 
 
-@pytest.mark.parametrize("name", ["clients.controller_manager.spawner", "node.gazebo"])
+@pytest.mark.parametrize("name", ["clients.spawner main", "node.gzserver main_with_window"])
 def test_without_a_master_it_says_so_until_it_is_interrupted(start, name):
     with socket.socket() as reserved:  # bound, and nobody listens: connections are refused
         reserved.bind(("127.0.0.1", 0))

@@ -262,5 +262,5 @@ def test_ctrl_c_before_the_training(capsys, monkeypatch) -> None:
     def interrupted(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "train", interrupted)
+    monkeypatch.setattr(cli, "run_training", interrupted)
     assert failed(capsys, *DQN, code=130).endswith("interrupted before the training began")
