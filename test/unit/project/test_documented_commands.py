@@ -191,7 +191,7 @@ def test_the_workbench_takes_it(command: Command, only_parsing: None, monkeypatc
         def begin(*_: object) -> NoReturn:
             raise Parsed
 
-        monkeypatch.setattr(training_cli, "train", begin)
+        monkeypatch.setattr(training_cli, "run_training", begin)
     if name == "benchmark" and arguments and not arguments[0].startswith("-"):
         suites = yaml.safe_load((ROOT / "config/benchmark.yaml").read_text(encoding="utf-8"))
         assert arguments[0] in suites or arguments[0] == "SUITE"

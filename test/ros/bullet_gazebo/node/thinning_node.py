@@ -115,7 +115,7 @@ class ThinningTest(unittest.TestCase):
     def test_the_step_service_is_not_there(self):
         self.assertNotIn("/gazebo/step_world", rosservice.get_service_list())
         with self.assertRaisesRegex(
-            ServiceGone, "/gazebo/step_world: the simulator isn't in lock-step"
+            ServiceGone, "/gazebo/prepare_step: the simulator isn't in lock-step"
         ):
             StepClient().step(1)
 

@@ -7,7 +7,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-import torch
 from support.training.goal_environments import REACH, Reach
 from support.training.learning_fakes import POLE, register_with
 from support.training.training_runs import (
@@ -85,17 +84,6 @@ def test_an_environment_that_says_nothing_of_successes(tmp_path: Path, name: str
     told = summary(train(tmp_path, name, env_id=POLE, env_kwargs=None))
     assert told["successes"] == [] and told["success_rate_last_100"] is None
     assert not [row for row in rows(tmp_path) if "success" in row[1]]
-
-
-def test_a_checkpoint_of_a_version_that_counted_none_is_gone_on_with(tmp_path: Path) -> None:
-    folder = made(tmp_path, "reinforce", episodes=5)
-    for path in {*folder.glob("*.pt"), *folder.glob("checkpoints/*.pt")}:
-        content = torch.load(path, weights_only=True)
-        del content["history"]["successes"]
-        path.unlink()
-        torch.save(content, path)
-    told = summary(resume(folder, episodes=8))
-    assert told["complete"] and len(told["returns"]) == 8 and len(told["successes"]) == 3
 
 
 def test_progress_and_summary_tell_the_rate(tmp_path: Path, capsys) -> None:

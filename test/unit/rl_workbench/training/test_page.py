@@ -145,7 +145,7 @@ def page_that_is_up(
 def test_the_bits_are_the_same_and_a_resumed_training_may_have_it(
     tmp_path, capsys, monkeypatch
 ) -> None:
-    monkeypatch.setattr(cli, "page_beside", page_that_is_up)
+    monkeypatch.setattr("rl_workbench.training.page.page_beside", page_that_is_up)
     plain, shown = tmp_path / "plain", tmp_path / "shown"
     assert cli.main([*SHORT, f"--run-dir={plain}"]) == 0
     assert "is the page" not in capsys.readouterr().out

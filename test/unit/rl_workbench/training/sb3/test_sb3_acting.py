@@ -38,10 +38,5 @@ def test_numbers_that_no_record_can_hold(value: float) -> None:
         options_of("ppo", {"target_kl": value})
 
 
-def test_a_date_is_none_either() -> None:
-    with pytest.raises(WorkbenchError, match="^sde_sample_freq has a value that JSON can't hold"):
-        options_of("ppo", {"sde_sample_freq": "2020-01-01"})
-
-
 def test_all_defaults_can_be_held(whole: Callable[[str], Path]) -> None:
     assert record(whole("sac"))["hyperparameters"]["target_entropy"] == "auto"
