@@ -148,7 +148,8 @@ def _note(
     if ended is not None:
         for name, seconds in (("command_seconds", ended - began), ("cpu_seconds", cpu)):
             cost[name] = round(cost.get(name, 0.0) + seconds, 1)
-    cost |= {"spans": [*spans, [round(began, 1), round(ended or began, 1)]]}
+    # Unrounded: attempts are compared with the moments of the command and of the checkpoint.
+    cost |= {"spans": [*spans, [began, ended or began]]}
     write_file(cost_file(job.folder), as_json({**cost, "node": socket.gethostname()}))
 
 
