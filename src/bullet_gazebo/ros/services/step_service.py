@@ -146,7 +146,6 @@ class StepService:
                 or prepared.addresses.version != sim.version
                 or not prepared.commanded.is_ready
             ):
-                self._prepared.pop(request.handle, None)
                 return PreparedStepResponse(False, True, sim.now, "PreparedStep: stale", [], [])
             commanded = prepared.commanded
             of_joints = request.commands[commanded.size :]
