@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
+from file_access.expansion import CannotExpand, expand
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
+from ros_utils._internal import packages as _packages
 from ros_utils._internal import params as _params
-from ros_utils._internal import urdf as _urdf
-from ros_utils._internal.urdf import urdf_parse_from_path, urdf_parse_from_pkg
 
 __all__ = [
     "urdf_load_from_path",
@@ -41,8 +42,8 @@ def urdf_load_from_pkg(
         True if the parameter was set. False, with an error in the log, if the package or file is
         missing, the file is broken, or no master answers.
     """
-    path = _urdf.find("urdf_load_from_pkg", pkg_name, folder, model_name)
-    return path is not None and urdf_load_from_path(path, param_name, ns, args_xacro)
+    xml = urdf_parse_from_pkg(pkg_name, model_name, folder, args_xacro)
+    return xml is not None and _load(xml, param_name, ns)
 
 
 def urdf_load_from_path(
@@ -50,8 +51,10 @@ def urdf_load_from_path(
 ) -> bool:
     """Expands a URDF or xacro file and sets it as a parameter. See `urdf_load_from_pkg`."""
     xml = urdf_parse_from_path(model_path, args_xacro)
-    if xml is None:
-        return False
+    return xml is not None and _load(xml, param_name, ns)
+
+
+def _load(xml: str, param_name: str, ns: str | None) -> bool:
     name = param_name if ns in (None, "", "/") else f"{ns}/{param_name}"
     try:
         _params.put(name, xml)
@@ -59,3 +62,36 @@ def urdf_load_from_path(
         _log.error(f"parameter {name}: {fault}")
         return False
     return True
+
+
+def urdf_parse_from_pkg(
+    pkg_name: str, model_name: str, folder: str = "/urdf", args_xacro: Sequence[str] | None = None
+) -> str | None:
+    """Expands a package's URDF or xacro file.
+
+    Returns:
+        The XML text, or None, with an error in the log, if the package or file is missing or the
+        file is broken.
+    """
+    try:
+        path = _packages.file(pkg_name, folder, model_name)
+    except _packages.NotFound as fault:
+        _log.error(f"urdf: {fault}")
+        return None
+    return urdf_parse_from_path(path, args_xacro)
+
+
+def urdf_parse_from_path(model_path: str, args_xacro: Sequence[str] | None = None) -> str | None:
+    """Expands a URDF or xacro file, given by its path. See `urdf_parse_from_pkg`."""
+    mappings = {}
+    for argument in args_xacro or []:
+        name, sign, value = argument.partition(":=")
+        if not sign or not re.fullmatch(r"\w+", name):
+            _log.error(f"urdf: xacro argument {argument!r}: expected 'name:=value'")
+            return None
+        mappings[name] = value
+    try:
+        return expand(_packages.existing(model_path), mappings)
+    except (_packages.NotFound, CannotExpand) as fault:
+        _log.error(f"urdf: {fault}")
+        return None

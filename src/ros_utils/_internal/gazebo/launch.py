@@ -22,6 +22,11 @@ from ros_utils._internal.programs import (
 )
 from ros_utils.readiness import Ready
 
+__all__ = [
+    "close_Gazebo",
+    "launch_Gazebo",
+]
+
 LABEL = "Gazebo"
 NODES = ("/gazebo", "/gazebo_gui")
 READY = "pause_physics"  # comes up last of what a client needs to begin

@@ -27,7 +27,19 @@ from ros_utils._internal.gazebo.calls import (
     make_pose,
     succeeded,
 )
-from ros_utils._internal.urdf import urdf_parse_from_path, urdf_parse_from_pkg
+from ros_utils.ros_urdf import urdf_parse_from_path, urdf_parse_from_pkg
+
+__all__ = [
+    "gazebo_delete_model",
+    "gazebo_spawn_sdf_param",
+    "gazebo_spawn_sdf_path",
+    "gazebo_spawn_sdf_pkg",
+    "gazebo_spawn_sdf_string",
+    "gazebo_spawn_urdf_param",
+    "gazebo_spawn_urdf_path",
+    "gazebo_spawn_urdf_pkg",
+    "gazebo_spawn_urdf_string",
+]
 
 Pose = tuple[float, float, float, float, float, float, float]  # x, y, z [m] and a quaternion
 
