@@ -179,7 +179,7 @@ def with_extras(command: Command) -> object:
     return pytest.param(command, marks=[pytest.mark.extras(package[0])] if package else [])
 
 
-@pytest.mark.parametrize("command", map(with_extras, GROUPS["workbench"]), ids=str)
+@pytest.mark.parametrize("command", [*map(with_extras, GROUPS["workbench"])], ids=str)
 def test_the_workbench_takes_it(command: Command, only_parsing: None, monkeypatch) -> None:
     name, *arguments = command.words[3:]
     if name == "--help":
