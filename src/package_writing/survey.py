@@ -15,8 +15,8 @@ from bullet_gazebo.physics.dynamics import poses_at_zero
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, conjugate, rotate
-from bullet_gazebo.state import did_you_mean
 from file_access.content import FileError
+from file_access.text import did_you_mean
 from file_access.xml_text import parse
 from package_writing import CannotWrite
 

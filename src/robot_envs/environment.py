@@ -9,7 +9,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import data_equivalence
 
 from bullet_gazebo.pictures.camera import Camera
-from bullet_gazebo.state import did_you_mean
+from file_access.text import did_you_mean
 from robot_envs import checks
 from robot_envs.backends import OWN, make_backend
 from robot_envs.backends.backend import RobotBackend, side_by_side

@@ -17,7 +17,7 @@ from bullet_gazebo.control.manager import RUNNING
 from bullet_gazebo.physics.model import Model
 from bullet_gazebo.robot import ControlledRobot
 from bullet_gazebo.simulator import Simulator
-from bullet_gazebo.state import did_you_mean
+from file_access.text import did_you_mean
 
 
 class Commanded(NamedTuple):
