@@ -20,7 +20,7 @@ from typing import Any
 
 from lockstep_runner import originals
 from lockstep_runner.clock import Others
-from lockstep_runner.following import ADDRESS, Line, LineEnded
+from lockstep_runner.line import ADDRESS, Line, LineEnded
 from lockstep_runner.looks import LOOK, QUIET, WORKING, Seen, look_at
 from lockstep_runner.notices import tell_once
 

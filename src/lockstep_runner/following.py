@@ -1,62 +1,15 @@
-"""A node under the clock of the script that started it (or started what started it).
-
-Script and node exchange one JSON object per line over a socket.
-"""
+"""A node under the clock of the script that started it (or started what started it)."""
 
 from __future__ import annotations
 
 import argparse
-import contextlib
-import json
 import os
 import socket
 import sys
 from typing import Any
 
+from lockstep_runner.line import ADDRESS, Line, LineEnded
 from lockstep_runner.script import AfterImport
-
-ADDRESS = "LOCKSTEP_CLOCK"  # environment variable: path of the script process's socket
-
-
-class LineEnded(Exception):
-    """The other side has closed the connection."""
-
-
-class Line:
-    """A connection that carries JSON objects."""
-
-    def __init__(self, connection: socket.socket) -> None:
-        self._connection = connection
-        self._reader = connection.makefile("r", encoding="utf-8")
-
-    def send(self, **content: Any) -> None:
-        """Sends an object; raises LineEnded if the other side has gone."""
-        try:
-            self._connection.sendall(json.dumps(content).encode() + b"\n")
-        except OSError as fault:
-            raise LineEnded from fault
-
-    def receive(self) -> dict[str, Any]:
-        """Waits for the next object and returns it.
-
-        Raises:
-            LineEnded: the other side has gone, or sent no JSON object.
-        """
-        try:
-            line = self._reader.readline()
-            content = json.loads(line) if line.endswith("\n") else None
-        except (OSError, ValueError) as fault:
-            raise LineEnded from fault
-        if not isinstance(content, dict):
-            raise LineEnded
-        return content
-
-    def close(self) -> None:
-        """Closes the connection for both sides."""
-        with contextlib.suppress(OSError):
-            self._connection.shutdown(socket.SHUT_RDWR)
-        self._connection.close()
-
 
 # These make up the simulation and the ROS graph.
 NOT_FOLLOWING = frozenset(

@@ -12,7 +12,7 @@ from bullet_gazebo_msgs.msg import TopicMessage
 from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldRequest, AdvanceWorldResponse
 
 from lockstep_runner import originals
-from lockstep_runner.following import Line, LineEnded
+from lockstep_runner.line import Line, LineEnded
 from ros_calls import master
 from ros_calls.service import ServiceClient, ServiceGone, ServiceHangs
 
