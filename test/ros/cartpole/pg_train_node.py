@@ -12,6 +12,8 @@ import torch
 from support.ros.pg_train_runs import NETWORKS, Place
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from cartpole import pg_train
+
 TAGS = {
     "Reward",
     "Value Loss",
@@ -67,8 +69,7 @@ class PgTrain(unittest.TestCase):
         flags = ("--start-noise=0.05", "--episodes=30", "--eval-episodes=1", "--num-envs=2", "--seed=4",
                  "--checkpoint-frequency=60")  # fmt: skip
         inside = self.place()
-        self.trained(inside, *flags, "--backend=bullet")
-        self.assertEqual(inside.processes(), {})
+        self.assertEqual(pg_train.main([f"--run-dir={inside.run}", *flags, "--backend=bullet"]), 0)
         killed = self.place()
         training = killed.train(*flags)
         training.wait_for("Episode   20 |")
@@ -89,42 +90,25 @@ class PgTrain(unittest.TestCase):
         self.assertGreater(min(lengths), 1)
         self.assertEqual(place.left_after(), {})
 
-    def test_a_simulator_already_there_is_used_and_left_as_it_was(self):
-        place = self.place()
-        world = place.start("roslaunch", "gazebo_ros", "empty_world.launch", "lockstep:=true",
-                            "paused:=true", "gui:=false")  # fmt: skip
-        world.wait_for("process[gazebo-2]: started")
-        self.wait_for_service(place, "/gazebo/step_world")
-        before = set(place.processes())
-        output = self.trained(place, "--episodes=2", "--gui")  # it has no window: one is opened
-        self.assertIn("opening the simulator's window", output)
-        self.assertIn("the window is the page http://127.0.0.1:", output)
-        self.assertEqual(set(place.processes()), before)
-        self.assertNotIn("cartpole", self.models(place))
-        world.interrupt()
-        world.end()
-        self.assertEqual(place.left_after(), {})
-
-    def test_a_robot_already_there_is_used_and_stays(self):
+    def test_a_simulator_and_a_robot_that_are_there_are_used_and_left_as_they_were(self):
         place = self.place()
         world = place.start("roslaunch", "cartpole", "simulation.launch")
         world.wait_for("starting joint_state_controller")
         world.wait_for("process has finished cleanly")
+        before = set(place.processes())
         output = self.trained(place, "--episodes=2")
         self.assertNotIn("starting", output)
         self.assertNotIn("spawning", output)
-        self.assertIn("cartpole", self.models(place))
-
-    def test_a_world_that_is_not_in_lockstep_is_refused_with_the_remedy(self):
-        place = self.place()
-        world = place.start("roslaunch", "gazebo_ros", "empty_world.launch", "gui:=false")
-        world.wait_for("process[gazebo-2]: started")
-        self.wait_for_service(place, "/gazebo/get_world_properties")
-        training = place.train("--episodes=2")
-        self.assertEqual(training.end(), 1)
-        self.assertIn("lockstep:=true", training.output)
-        self.assertIn("--realtime", training.output)
-        self.assertFalse(place.run.exists())
+        self.assertIn("cartpole", self.ask(place, "/gazebo/get_world_properties"))
+        self.assertIn("True", self.ask(place, "/gazebo/delete_model", "cartpole"))
+        output = self.trained(place, "--episodes=2", "--gui")  # it has no window: one is opened
+        self.assertIn("opening the simulator's window", output)
+        self.assertIn("the window is the page http://127.0.0.1:", output)
+        self.assertEqual(set(place.processes()), before)
+        self.assertNotIn("cartpole", self.ask(place, "/gazebo/get_world_properties"))
+        world.interrupt()
+        world.end()
+        self.assertEqual(place.left_after(), {})
 
     def test_parameters_of_the_launch_file(self):
         place = self.place()
@@ -138,12 +122,8 @@ class PgTrain(unittest.TestCase):
         self.assertEqual((record["run"]["episodes"], record["run"]["seed"]), (3, 2))
         self.assertEqual(record["hyperparameters"]["batch_episodes"], 2)
 
-    def wait_for_service(self, place: Place, name: str) -> None:
-        script = f"import rospy; rospy.wait_for_service('{name}', 180)"
-        self.assertEqual(place.start("python3", "-c", script).end(), 0)
-
-    def models(self, place: Place) -> str:
-        asked = place.start("rosservice", "call", "/gazebo/get_world_properties")
+    def ask(self, place: Place, service: str, *request: str) -> str:
+        asked = place.start("rosservice", "call", service, *request)
         self.assertEqual(asked.end(), 0, asked.output)
         return asked.output
 

@@ -23,6 +23,25 @@ from ros_utils._internal.gazebo.calls import (
     succeeded,
 )
 
+__all__ = [
+    "gazebo_get_ODE_physics",
+    "gazebo_get_gravity",
+    "gazebo_get_max_update_rate",
+    "gazebo_get_physics_properties",
+    "gazebo_get_time_step",
+    "gazebo_pause_physics",
+    "gazebo_reset_sim",
+    "gazebo_reset_world",
+    "gazebo_set_ODE_physics",
+    "gazebo_set_default_properties",
+    "gazebo_set_gravity",
+    "gazebo_set_max_update_rate",
+    "gazebo_set_physics_properties",
+    "gazebo_set_time_step",
+    "gazebo_step_physics",
+    "gazebo_unpause_physics",
+]
+
 STEP = "gazeboWorld"  # XML-RPC method of the stand-in's node; Gazebo has no service for steps
 CHUNK = 1000  # steps in one call
 

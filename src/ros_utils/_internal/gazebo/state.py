@@ -30,6 +30,18 @@ from ros_utils._internal.gazebo.calls import (
     succeeded,
 )
 
+__all__ = [
+    "gazebo_apply_joint_effort",
+    "gazebo_get_joint_properties",
+    "gazebo_get_link_state",
+    "gazebo_get_model_names",
+    "gazebo_get_model_state",
+    "gazebo_get_world_properties",
+    "gazebo_set_link_state",
+    "gazebo_set_model_configuration",
+    "gazebo_set_model_state",
+]
+
 
 def gazebo_get_model_state(
     model_name: str,

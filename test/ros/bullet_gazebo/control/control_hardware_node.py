@@ -11,6 +11,7 @@ from control_msgs.msg import JointControllerState
 from sensor_msgs.msg import JointState
 from slides_client import SlidesTest, listen
 from std_msgs.msg import Float64
+from std_srvs.srv import Empty
 from support.ros.calls import call
 
 DESCRIPTION, LIMITS = "/slides/robot_description", "/slides/joint_limits"
@@ -55,6 +56,11 @@ class HardwareTest(SlidesTest):
         first, second = topic.messages
         self.assertEqual((first.time_step, second.time_step), (0.003, 0.003))
         self.assertEqual((second.header.stamp - first.header.stamp).to_nsec(), 30_000_000)
+        self.step(1)  # in the midst of a period
+        call("/gazebo/reset_simulation", Empty)
+        topic.messages.clear()
+        self.step(1)
+        self.assertTrue(topic.wait_for(len), "a reset begins a period")
         topic.close()
 
     def test_each_field_of_a_controllers_state(self):

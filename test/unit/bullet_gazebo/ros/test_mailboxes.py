@@ -95,6 +95,12 @@ def test_connecting_waits_for_topics_of_this_process_only(boxes, monkeypatch):
     assert len(looks) > 10
 
 
+def test_connecting_ends_although_nobody_comes(boxes, monkeypatch):
+    monkeypatch.setattr(module, "CONNECTING", 0.05)
+    monkeypatch.setattr(module, "is_connected", lambda *_: False)
+    assert boxes.connect("/script", ["/states"], []) == (["/states"], [])
+
+
 def test_publishing_gives_the_processor_away_no_more(monkeypatch):
     slept = []
     monkeypatch.setattr(tcpros_pubsub, "time", time)  # so that it is put back
