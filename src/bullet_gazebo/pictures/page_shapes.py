@@ -10,8 +10,8 @@ from trimesh import creation
 
 from bullet_gazebo.physics.description import Color, DescriptionError, Joint, Shape
 from bullet_gazebo.physics.files.elements import shown
+from bullet_gazebo.physics.files.meshes import MeshLook, read_look
 from bullet_gazebo.physics.pose import Pose, Vector, rotate
-from bullet_gazebo.pictures.looks import MeshLook, read_look
 from bullet_gazebo.pictures.page_batches import (
     Appearance,
     Batches,
@@ -124,20 +124,20 @@ class ShapeMaker:
         self, where: Where, shape: Shape, what: str, rgba: Color, collision: bool
     ) -> None:
         try:
-            mesh = read_look(shape.mesh)
+            look = read_look(shape.mesh)
         except DescriptionError as error:
             self._add_unshown(where, f"{what}: {error}", shape.pose)
             return
         x, y, z = shape.size if len(shape.size) == 3 else (1.0, 1.0, 1.0)
-        if mesh.glb is not None and not collision:
+        if look.glb is not None and not collision:
             if x * y * z < 0.0:  # mirrored: in a batch it would show its back
-                whole = self._scene.add_glb(self._singles.name(), mesh.glb, scale=(x, y, z))
+                whole = self._scene.add_glb(self._singles.name(), look.glb, scale=(x, y, z))
                 self._singles.add(*where, _numbers(shape.pose), whole)
             else:
                 part = Instance(shape.pose, (x, y, z), color_bytes(rgba))
-                self._batches.add(*where, Appearance(self._glb_of(mesh)), part)
+                self._batches.add(*where, Appearance(self._glb_of(look)), part)
             return
-        self._add_part(where, self._geometry_of(mesh), shape.pose, (x, y, z), rgba, collision)
+        self._add_part(where, self._geometry_of(look), shape.pose, (x, y, z), rgba, collision)
 
     def _add_unshown(self, where: Where, complaint: str, pose: Pose) -> None:
         if complaint not in self._complained:
@@ -161,9 +161,9 @@ class ShapeMaker:
         self._batches.add(*where, Appearance(_cylinder(), shadow=False), part)
 
 
-def _glb_of(mesh: MeshLook) -> GlbFile:
-    assert mesh.glb is not None
-    return GlbFile(mesh.glb)
+def _glb_of(look: MeshLook) -> GlbFile:
+    assert look.glb is not None
+    return GlbFile(look.glb)
 
 
 @cache
@@ -200,9 +200,9 @@ def _cylinder() -> Geometry:
     return Geometry(_singles(vertices), _indices(faces), flat=False)
 
 
-def _geometry_of(mesh: MeshLook) -> Geometry:
+def _geometry_of(look: MeshLook) -> Geometry:
     """Returns the triangles of a file, visible from both sides."""
-    return Geometry(_singles(mesh.vertices), _indices(mesh.faces), side="double")
+    return Geometry(_singles(look.mesh.vertices), _indices(look.mesh.faces), side="double")
 
 
 def _singles(vertices: np.ndarray) -> np.ndarray:

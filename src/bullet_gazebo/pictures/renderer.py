@@ -40,13 +40,13 @@ class Textures:
         self._client = client
         self._numbers: dict[bytes, int] = {}
 
-    def number(self, image: Image.Image) -> int:
-        """Returns PyBullet's number of an RGB image."""
-        digest = hashlib.sha256(repr(image.size).encode() + image.tobytes()).digest()
+    def number(self, image: np.ndarray) -> int:
+        """Returns PyBullet's number of an RGB image (h, w, 3) of uint8."""
+        digest = hashlib.sha256(repr(image.shape).encode() + image.tobytes()).digest()
         if digest not in self._numbers:
             with TemporaryDirectory() as folder:
                 path = Path(folder, "texture.png")
-                image.save(path, compress_level=1)
+                Image.fromarray(image).save(path, compress_level=1)
                 self._numbers[digest] = pybullet.loadTexture(
                     str(path), physicsClientId=self._client
                 )
