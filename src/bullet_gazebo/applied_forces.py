@@ -51,12 +51,6 @@ class AppliedForces:
         self.efforts: list[AppliedEffort] = []
         self.wrenches: list[AppliedWrench] = []
 
-    def add_effort(self, effort: AppliedEffort) -> None:
-        self.efforts.append(effort)
-
-    def add_wrench(self, wrench: AppliedWrench) -> None:
-        self.wrenches.append(wrench)
-
     def clear_efforts(self, joint: str) -> None:
         """Drops all efforts on joints of that plain name, whatever their model."""
         self.efforts = [each for each in self.efforts if each.joint != joint]
