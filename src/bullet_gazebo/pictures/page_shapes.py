@@ -19,6 +19,7 @@ from bullet_gazebo.pictures.page_batches import (
     GlbFile,
     Instance,
     Singles,
+    Where,
 )
 from bullet_gazebo.pictures.visuals import GREY, ROUNDS, SIDES
 
@@ -32,9 +33,6 @@ OWN_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 AXES_COLORS = ((225, 0, 0), (0, 190, 0), (0, 0, 225))
 MOST_NAMES = 200  # of joints; each is a node of its own
 MOST_FILES = 32
-
-Where = tuple[int, int]
-"""A model's number and the index of one of its links."""
 
 
 class ShapeMaker:
@@ -93,7 +91,7 @@ class ShapeMaker:
         if self._names <= MOST_NAMES:
             end = np.array(corner) + 2.0 * AXES * np.array(axis)
             label = self._scene.add_label(self._singles.name(), shown(joint.name))
-            self._singles.add(*where, np.array([*end, 0.0, 0.0, 0.0, 1.0]), label)
+            self._singles.add(where, np.array([*end, 0.0, 0.0, 0.0, 1.0]), label)
 
     def clear(self) -> None:
         """Counts names from 0 again, after everything was removed."""
@@ -110,7 +108,7 @@ class ShapeMaker:
     ) -> None:
         opacity = min(max(rgba[3], 0.0), 1.0)
         look = Appearance(solid, math.prod(scale) < 0.0, opacity < 1.0, not collision)
-        self._batches.add(*where, look, Instance(pose, scale, color_bytes(rgba), opacity))
+        self._batches.add(look, Instance(where, pose, scale, color_bytes(rgba), opacity))
 
     def _add_plane(self, where: Where, pose: Pose) -> None:
         plane = self._scene.add_grid(
@@ -118,7 +116,7 @@ class ShapeMaker:
             cell_color=(205, 205, 205), section_color=(170, 170, 170), plane_color=(235, 235, 235),
             plane_opacity=1.0,
         )  # fmt: skip
-        self._singles.add(*where, _numbers(pose), plane)
+        self._singles.add(where, _numbers(pose), plane)
 
     def _add_mesh(
         self, where: Where, shape: Shape, what: str, rgba: Color, collision: bool
@@ -132,10 +130,10 @@ class ShapeMaker:
         if look.glb is not None and not collision:
             if x * y * z < 0.0:  # mirrored: in a batch it would show its back
                 whole = self._scene.add_glb(self._singles.name(), look.glb, scale=(x, y, z))
-                self._singles.add(*where, _numbers(shape.pose), whole)
+                self._singles.add(where, _numbers(shape.pose), whole)
             else:
-                part = Instance(shape.pose, (x, y, z), color_bytes(rgba))
-                self._batches.add(*where, Appearance(self._glb_of(look)), part)
+                part = Instance(where, shape.pose, (x, y, z), color_bytes(rgba))
+                self._batches.add(Appearance(self._glb_of(look)), part)
             return
         self._add_part(where, self._geometry_of(look), shape.pose, (x, y, z), rgba, collision)
 
@@ -157,8 +155,8 @@ class ShapeMaker:
         """Adds a thin cylinder along `way`, between two distances [m] from `corner`."""
         low, high = ends
         x, y, z = np.array(corner) + (low + high) / 2.0 * np.array(way)
-        part = Instance(Pose((x, y, z), _turned(way)), (radius, radius, high - low), color)
-        self._batches.add(*where, Appearance(_cylinder(), shadow=False), part)
+        part = Instance(where, Pose((x, y, z), _turned(way)), (radius, radius, high - low), color)
+        self._batches.add(Appearance(_cylinder(), shadow=False), part)
 
 
 def _glb_of(look: MeshLook) -> GlbFile:
