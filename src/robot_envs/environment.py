@@ -235,7 +235,8 @@ class RobotEnv(DrawnEnv):
         measured = state if self._sensor is None else self._sensor.begin(state, self.np_random)
         observation = self._observe(measured)
         self._steps = 0
-        self._show()
+        if self.render_mode == "human":
+            self._show()
         return observation, {**checks.checked_info(self.task, self.task.info(state)), **info}
 
     def _checked_options(self, options: dict[str, Any]) -> dict[str, Any]:
@@ -318,7 +319,8 @@ class RobotEnv(DrawnEnv):
         if terminated or truncated:
             self._steps = None
         measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)
-        self._show()
+        if self.render_mode == "human":
+            self._show()
         reward: Any = task.reward(state, action)
         if type(reward) is not float or not math.isfinite(reward):
             reward = checks.checked_number(task, "reward", reward)

@@ -123,7 +123,7 @@ class OwnWorld:
         self._failed = self._closed = False
         self._simulator = self._start()
         try:
-            backend.connect_in_turn(self)
+            backend.connect_in_turn(self.connect, self.close)
         except BaseException:  # Ctrl-C, too
             self.close()
             raise

@@ -93,7 +93,7 @@ class World:
     def __init__(self, events: list[str], fails: bool = False) -> None:
         self.slot, self._events, self._fails = next_slot(), events, fails
         events.append(f"start {self.slot.number}")
-        connect_in_turn(self)
+        connect_in_turn(self.connect, self.close)
 
     def connect(self) -> None:
         self._events.append(f"connect {self.slot.number}")
