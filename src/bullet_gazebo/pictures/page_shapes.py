@@ -8,7 +8,7 @@ import numpy as np
 import viser
 from trimesh import creation
 
-from bullet_gazebo.physics.description import Color, DescriptionError, Shape
+from bullet_gazebo.physics.description import Color, DescriptionError, Joint, Shape
 from bullet_gazebo.physics.files.elements import shown
 from bullet_gazebo.physics.pose import Pose, Vector, rotate
 from bullet_gazebo.pictures.looks import MeshLook, read_look
@@ -20,7 +20,7 @@ from bullet_gazebo.pictures.page_batches import (
     Instance,
     Singles,
 )
-from bullet_gazebo.pictures.visuals import GREY, ROUNDS, SIDES, VisibleJoint
+from bullet_gazebo.pictures.visuals import GREY, ROUNDS, SIDES
 
 COLLISION = (1.0, 0.5, 0.0, 0.35)
 UNSHOWN = (1.0, 0.0, 1.0, 1.0)  # a box in place of a shape that can't be shown
@@ -82,10 +82,10 @@ class ShapeMaker:
             complaint = f"{what}: a shape '{shown(shape.kind)}' is not known"
             self._add_unshown(where, complaint, shape.pose)
 
-    def add_joint(self, where: Where, joint: VisibleJoint) -> None:
+    def add_joint(self, where: Where, joint: Joint) -> None:
         """Adds a joint's frame, axis and name; `where` is the link that it moves."""
         self._names += 1
-        corner, turn = joint.frame
+        corner, turn = joint.anchor
         for own, color in zip(OWN_AXES, AXES_COLORS, strict=True):
             self._add_rod(where, corner, rotate(turn, own), (0.0, AXES), AXES / 25, color)
         axis = rotate(turn, joint.axis)

@@ -1,6 +1,6 @@
 """What the script controller_manager does, under the name that clients import."""
 
-from bullet_gazebo.ros.clients.manager_interface import (
+from bullet_gazebo.ros.clients.manager_commands import (
     list_controller_types,
     list_controllers,
     load_controller,

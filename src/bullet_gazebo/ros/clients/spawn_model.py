@@ -1,4 +1,7 @@
-"""Executable `spawn_model` of package gazebo_ros (docs/contract/gazebo_launch.md 4.3)."""
+"""Package gazebo_ros: its Python module `gazebo_interface`, and the executable `spawn_model`.
+
+See docs/contract/gazebo_launch.md 4.2 and 4.3.
+"""
 
 import argparse
 import contextlib
@@ -11,22 +14,87 @@ from typing import Any
 from xml.etree import ElementTree
 
 import rospy
-from gazebo_msgs.srv import DeleteModel, GetWorldProperties
+from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SetModelConfiguration, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import Empty
 
-from bullet_gazebo.ros.clients import gazebo_interface
 from bullet_gazebo.ros.common.node_process import SignalHandler, init_node
 from file_access.content import MAX_BYTES, FileError, read_file
 from file_access.xml_text import decode
 from file_access.xml_text import parse as parse_xml
 from ros_calls.service import ServiceClient, ServiceFailed
-from ros_calls.waiting import wait_until
+from ros_calls.waiting import service_comes_up, wait_until
 
-REMIND = 10.0  # [s of wall time]
 FAREWELL = 3.0  # [s] for the end of spawning and for a call during shutdown
 INTERRUPTED = -1
 INCLUDE = '<sdf version="1.6"><world name="default"><include><uri>model://{}</uri></include></world></sdf>'
+REMIND = 10.0  # [s of wall time]
+
+
+def spawn_sdf_model_client(
+    model_name: str,
+    model_xml: str,
+    robot_namespace: str,
+    initial_pose: Pose,
+    reference_frame: str,
+    gazebo_namespace: str,
+) -> bool | None:
+    """Spawns a model from SDF text; waits for the simulator without limit.
+
+    Returns:
+        Whether the model was spawned; None, after a message, if the call failed.
+    """
+    request = (model_name, model_xml, robot_namespace, initial_pose, reference_frame)
+    return _try(f"{gazebo_namespace}/spawn_sdf_model", SpawnModel, request)
+
+
+def spawn_urdf_model_client(
+    model_name: str,
+    model_xml: str,
+    robot_namespace: str,
+    initial_pose: Pose,
+    reference_frame: str,
+    gazebo_namespace: str,
+) -> bool | None:
+    """Spawns a model from URDF text. See `spawn_sdf_model_client`."""
+    request = (model_name, model_xml, robot_namespace, initial_pose, reference_frame)
+    return _try(f"{gazebo_namespace}/spawn_urdf_model", SpawnModel, request)
+
+
+def set_model_configuration_client(
+    model_name: str,
+    model_param_name: str,
+    joint_names: Sequence[str],
+    joint_positions: Sequence[float],
+    gazebo_namespace: str,
+) -> bool | None:
+    """Puts joints at positions [rad, m]. See `spawn_sdf_model_client`."""
+    request = (model_name, model_param_name, joint_names, joint_positions)
+    return _try(f"{gazebo_namespace}/set_model_configuration", SetModelConfiguration, request)
+
+
+def wait_for_service(name: str) -> None:
+    """Waits without limit, with a message every 10 s.
+
+    Raises:
+        rospy.ROSInterruptException: the node was shut down meanwhile.
+    """
+    while not service_comes_up(name, REMIND):
+        rospy.logwarn("Still waiting for service %s: is the simulator running?", name)
+
+
+def _try(name: str, kind: Any, request: tuple[Any, ...]) -> bool | None:
+    wait_for_service(name)
+    try:
+        answer = rospy.ServiceProxy(name, kind)(*request)
+    except rospy.ServiceException as fault:
+        print(f"Service call failed: {fault}")
+        return None
+    if not answer.success:
+        rospy.logerr("%s", answer.status_message)
+    elif kind is SpawnModel:
+        rospy.loginfo("Spawn status: %s", answer.status_message)
+    return bool(answer.success)
 
 
 class CannotSpawn(Exception):
@@ -113,10 +181,13 @@ def _run(options: argparse.Namespace, piped: bytes) -> int:
     if options.wait:
         _wait_for_model(gazebo, options.wait)
     xml = _prepared(_read(options, piped), options.package_to_model)
-    gazebo_interface.wait_for_service(f"{gazebo}/spawn_{'urdf' if options.urdf else 'sdf'}_model")
+    wait_for_service(f"{gazebo}/spawn_{'urdf' if options.urdf else 'sdf'}_model")
     with _Bond(gazebo, options.model) if options.bond else contextlib.nullcontext():
         _spawn(options, xml, gazebo)
-    placed = _place_joints(options, gazebo)
+    placed = True
+    if options.joints:
+        names, positions = zip(*options.joints, strict=True)
+        placed = bool(set_model_configuration_client(options.model, "", names, positions, gazebo))
     if options.unpause:
         _call(f"{gazebo}/unpause_physics", Empty)
     if options.bond:
@@ -126,11 +197,7 @@ def _run(options: argparse.Namespace, piped: bytes) -> int:
 
 
 def _spawn(options: argparse.Namespace, xml: str, gazebo: str) -> None:
-    spawn = (
-        gazebo_interface.spawn_urdf_model_client
-        if options.urdf
-        else gazebo_interface.spawn_sdf_model_client
-    )
+    spawn = spawn_urdf_model_client if options.urdf else spawn_sdf_model_client
     namespace = options.robot_namespace
     if namespace is None:
         namespace = rospy.get_namespace()
@@ -163,20 +230,10 @@ class _Bond:
             print(f"spawn_model: '{self._model}' was not deleted: {fault}", file=sys.stderr)
 
 
-def _place_joints(options: argparse.Namespace, gazebo: str) -> bool:
-    if not options.joints:
-        return True
-    names = [name for name, _ in options.joints]
-    positions = [position for _, position in options.joints]
-    return bool(
-        gazebo_interface.set_model_configuration_client(options.model, "", names, positions, gazebo)
-    )
-
-
 def _wait_for_model(gazebo: str, name: str) -> None:
     """Waits for a model, also in a paused world, whose state topics are silent."""
     service = f"{gazebo}/get_world_properties"
-    gazebo_interface.wait_for_service(service)
+    wait_for_service(service)
     rospy.loginfo("spawn_model: waiting for model '%s'", name)
 
     def is_there() -> bool:

@@ -1,6 +1,10 @@
-"""Time, physics and lights of the world (docs/contract/gazebo.md 1.5, 2.1, 2.2, 2.6, 2.9, 2.20 and 2.21)."""
+"""Time, physics and lights of the world: Gazebo's services, and the call that `gz world` makes.
+
+See docs/contract/gazebo.md 1.5, 2.1, 2.2, 2.6, 2.9, 2.20 and 2.21.
+"""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any
 
 import rospy
@@ -12,8 +16,10 @@ from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from bullet_gazebo.physics.world import SolverSettings
+from bullet_gazebo.ros.clients.gz import CHUNK, METHOD
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import bad_number, from_pose_msg, to_vector
+from bullet_gazebo.ros.common.rospy_internals import answer_xmlrpc
 from bullet_gazebo.ros.services.joint_services import ForceServices, JointServices
 from bullet_gazebo.ros.services.model_services import LinkServices, ModelServices
 from bullet_gazebo.simulator import Simulator
@@ -49,6 +55,8 @@ PARAMETERS = [
 ]
 ODE = list(ODEPhysics.__slots__)
 AXES = ("x", "y", "z")
+Answer = tuple[int, str, int]
+LONGEST = 80  # of an unknown command in an answer
 
 
 def advertise_world_services(sim: Simulator) -> list[object]:
@@ -231,3 +239,64 @@ class LightServices:
 
 def _color(msg: ColorRGBA) -> tuple[float, float, float, float]:
     return (msg.r, msg.g, msg.b, msg.a)
+
+
+class WorldControl:
+    """The XML-RPC call `gazeboWorld` of the node: the other side of `clients.gz.RemoteWorld`.
+
+    Every ROS node answers XML-RPC calls of master and tools. The simulator answers one more: any machine
+    finds it by the node's name, and it is neither a topic nor a service, of which there must be only
+    Gazebo's own (docs/contract/gazebo.md 7).
+    """
+
+    def __init__(
+        self,
+        sim: Simulator,
+        watchdog: AbstractContextManager[object],
+        show: Callable[[], None] | None = None,
+    ) -> None:
+        """A fault in a block of `watchdog` ends the node. `show` opens the scene for a window."""
+        self._sim = sim
+        self._watchdog = watchdog
+        self._commands = {
+            "pause": sim.pause,
+            "unpause": sim.unpause,
+            "reset": sim.reset_simulation,
+            "reset_models": sim.reset_world,
+            "reset_time": sim.reset_time,
+        }
+        if show is not None:
+            self._commands["show"] = show
+        answer_xmlrpc(METHOD, self.answer)
+
+    def answer(self, *arguments: object) -> Answer:
+        """Runs a command; returns code (1 is success), text, ticks done.
+
+        Args:
+            arguments: the command; for "step" also the number of ticks, 1 by default. XML-RPC has no
+                signatures: any number of arguments may come, of any of its types.
+        """
+        if not 1 <= len(arguments) <= 2:
+            return _refused(
+                f"{len(arguments)} arguments: a command, and for step a number of steps"
+            )
+        command, count = (*arguments, 1)[:2]
+        # A bool is an int in Python, and no number here.
+        if not isinstance(command, str) or type(count) is not int:
+            kinds = " and ".join(type(each).__name__ for each in arguments)
+            return _refused(f"{kinds}: a command is a string, a number of steps an integer")
+        if command == "step":
+            if not 1 <= count <= CHUNK:
+                return _refused(f"{count} steps: one call does 1 to {CHUNK}")
+            with self._watchdog:
+                self._sim.step(count)
+            return 1, "step", count
+        if command not in self._commands:
+            return _refused(f"unknown command {command[:LONGEST]!a}")
+        with self._watchdog:
+            self._commands[command]()
+        return 1, command, 0
+
+
+def _refused(reason: str) -> Answer:
+    return -1, reason, 0
