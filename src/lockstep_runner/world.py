@@ -131,16 +131,7 @@ class ScriptWorld:
             if not self._seeded:
                 request.reseed, request.seed = True, self._seed
                 self._seeded = True
-            try:
-                response: AdvanceWorldResponse = self._call(request)
-            except (ServiceGone, ServiceHangs) as fault:
-                raised = _raised_elsewhere(fault)
-                if raised is not None:
-                    raise raised  # noqa: B904 - as if nobody had taken it for the connection's
-                self.forget()
-                if isinstance(fault, ServiceGone) and not _is_registered():
-                    raise WorldGone("the simulator has been ended") from fault
-                raise WorldFailed(f"the simulator has died, or hangs: {fault}") from fault
+            response = self._answer(self._call, request)
             if not response.success:
                 rospy.logerr("%s", response.status_message)
             self.now = response.now.to_nsec()
@@ -148,6 +139,18 @@ class ScriptWorld:
             self.paused = response.paused
             self.topics_changed = response.topics_changed
         return response
+
+    def _answer(self, call: ServiceClient, request: AdvanceWorldRequest) -> AdvanceWorldResponse:
+        try:
+            return call(request)
+        except (ServiceGone, ServiceHangs) as fault:
+            raised = _raised_elsewhere(fault)
+            if raised is not None:
+                raise raised  # noqa: B904 - as if nobody had taken it for the connection's
+            self.forget()
+            if isinstance(fault, ServiceGone) and not _is_registered():
+                raise WorldGone("the simulator has been ended") from fault
+            raise WorldFailed(f"the simulator has died, or hangs: {fault}") from fault
 
     def forget_mail(self, node: str) -> None:
         """Makes the simulator drop the messages that it keeps for a node that has ended."""

@@ -238,14 +238,7 @@ def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
         ):
             originals.sleep(seconds)
         elif _is_wall_time(runner):
-            tell_once(
-                f"sleep {threading.current_thread().name}",
-                f"thread '{threading.current_thread().name}' sleeps by time.sleep, outside the main"
-                " thread: its sleeps are wall time, so that what it does isn't repeatable; rospy.sleep,"
-                " rospy.Rate and rospy.Timer are covered",
-            )
-            runner.clock.ended(threading.current_thread())  # time doesn't wait for this thread
-            originals.sleep(seconds)
+            _sleep_in_wall_time(runner, seconds)
         elif runner.is_connected():
             if seconds < 0:
                 raise ValueError("sleep length must be non-negative")
@@ -262,6 +255,17 @@ def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
 
         time.time = lambda: start + simulated()
         time.monotonic = time.perf_counter = simulated
+
+
+def _sleep_in_wall_time(runner: ScriptRunner, seconds: float) -> None:
+    thread = threading.current_thread()
+    tell_once(
+        f"sleep {thread.name}",
+        f"thread '{thread.name}' sleeps by time.sleep, outside the main thread: its sleeps are wall time,"
+        " so that what it does isn't repeatable; rospy.sleep, rospy.Rate and rospy.Timer are covered",
+    )
+    runner.clock.ended(thread)  # time doesn't wait for this thread
+    originals.sleep(seconds)
 
 
 def _is_wall_time(runner: ScriptRunner) -> bool:

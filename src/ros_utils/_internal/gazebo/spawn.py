@@ -20,11 +20,10 @@ from ros_utils._internal import params as _params
 from ros_utils._internal.gazebo.calls import (
     GAZEBO,
     TIMEOUT,
-    BadNumber,
     SpawnResult,
     call,
-    check_finite,
     make_pose,
+    not_finite,
     succeeded,
 )
 from ros_utils._internal.packages import urdf_parse_from_path, urdf_parse_from_pkg
@@ -61,12 +60,13 @@ def spawn(
         Whether it was spawned (and with `verify` is in the world's list), and if not, why.
     """
     service = f"{gazebo_ns.rstrip('/')}/spawn_{kind}_model"
+    if fault := not_finite(f"spawn {name}: its pose", *pose):
+        return _failed(fault)
     try:
-        check_finite(f"spawn {name}: its pose", *pose)
         request = (name, xml, namespace, make_pose(*pose), frame)
         answer = wait_and_call(service, srv.SpawnModel, *request, timeout=timeout)
-    except (ServiceFailed, BadNumber) as fault:
-        return _failed(str(fault))
+    except ServiceFailed as failure:
+        return _failed(str(failure))
     if not answer.success:
         return _failed(str(answer.status_message))
     if verify and not _appears(name, True, timeout, gazebo_ns):
