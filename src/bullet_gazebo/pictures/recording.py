@@ -120,7 +120,16 @@ class SimulationRecorder:
         recorded = None
         if models != self._models:
             self._models = models
-            recorded = [_recorded(model) for model in models]
+            recorded = [
+                RecordedModel(
+                    model.name,
+                    model.description.root,
+                    model.description.static,
+                    model.link_names,
+                    visible_shapes(model.description),
+                )
+                for model in models
+            ]
         elif self._size > MOST_WAITING:
             self._dropped += 1
             return
@@ -166,17 +175,6 @@ class SimulationRecorder:
         self._thread.join(patience)
 
 
-def _recorded(model: Model) -> RecordedModel:
-    description = model.description
-    return RecordedModel(
-        model.name,
-        description.root,
-        description.static,
-        list(model.link_names),
-        visible_shapes(description),
-    )
-
-
 def _start(options: RecordingOptions) -> subprocess.Popen[bytes]:
     words = [
         str(options.path), f"{options.rate!r}", str(options.width), str(options.height), options.model
@@ -211,7 +209,10 @@ class FrameDrawer:
         rows = iter(np.reshape(np.asarray(poses), (-1, NUMBERS)).tolist())
         places: dict[str, Vector] = {}
         for model in self._models:
-            found = {link: _pose(*next(rows)) for link in model.links}
+            found = {}
+            for link in model.links:
+                x, y, z, *turn = next(rows)
+                found[link] = Pose((x, y, z), (turn[0], turn[1], turn[2], turn[3]))
             self._renderer.place(model.name, found)
             places[model.name] = found[model.root].position if model.root in found else ZERO
         width, height = self._options.width, self._options.height
@@ -231,10 +232,6 @@ class FrameDrawer:
         if self._followed:
             self._offset = subtract(camera.target, places[self._followed])
         return Camera(camera.target, ROOM * camera.distance, camera.yaw, camera.pitch, camera.view)
-
-
-def _pose(x: float, y: float, z: float, qx: float, qy: float, qz: float, qw: float) -> Pose:
-    return Pose((x, y, z), (qx, qy, qz, qw))
 
 
 def main(arguments: Sequence[str]) -> int:
