@@ -120,16 +120,7 @@ class SimulationRecorder:
         recorded = None
         if models != self._models:
             self._models = models
-            recorded = [
-                RecordedModel(
-                    model.name,
-                    model.description.root,
-                    model.description.static,
-                    model.link_names,
-                    visible_shapes(model.description),
-                )
-                for model in models
-            ]
+            recorded = [_recorded(model) for model in models]
         elif self._size > MOST_WAITING:
             self._dropped += 1
             return
@@ -173,6 +164,12 @@ class SimulationRecorder:
             self._ending = True
             self._news.notify()
         self._thread.join(patience)
+
+
+def _recorded(model: Model) -> RecordedModel:
+    made = model.description
+    shapes = visible_shapes(made)
+    return RecordedModel(model.name, made.root, made.static, model.link_names, shapes)
 
 
 def _start(options: RecordingOptions) -> subprocess.Popen[bytes]:
@@ -236,12 +233,26 @@ class FrameDrawer:
 
 def main(arguments: Sequence[str]) -> int:
     """Draws until standard input ends; SIGTERM drops the frames that aren't drawn yet."""
-    from bullet_gazebo.pictures.renderer import Renderer
-    from web_viewer.video import EncoderFailed, Mp4Writer
+    from web_viewer.video import EncoderFailed
 
     logging.basicConfig(format="recording: %(message)s")
     path, rate, width, height, model = arguments
     options = RecordingOptions(Path(path), float(rate), int(width), int(height), model)
+    try:
+        count = _draw(options)
+    except EncoderFailed as error:
+        print(f"recording: {path}: {error}", file=sys.stderr, flush=True)
+        return 1
+    length = f"{count} frames, {count / options.rate:.1f} s" if count else "no time has passed"
+    print(f"recording: {path}: {length}", flush=True)
+    return 0
+
+
+def _draw(options: RecordingOptions) -> int:
+    """Draws what comes by standard input; returns the number of frames."""
+    from bullet_gazebo.pictures.renderer import Renderer
+    from web_viewer.video import Mp4Writer
+
     inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
     stopping = False
 
@@ -253,25 +264,16 @@ def main(arguments: Sequence[str]) -> int:
     signal.signal(signal.SIGTERM, stop)
     # In a thread, so that the simulator never waits for a frame.
     threading.Thread(target=_read, args=(sys.stdin.buffer, inbox), daemon=True).start()
-    drawer, writer, count = (
-        FrameDrawer(options, Renderer()),
-        Mp4Writer(options.path, options.rate),
-        0,
-    )
-    try:
-        while (message := inbox.get()) is not None and not stopping:
-            models, poses = message
-            if models is not None:
-                drawer.change(models)
-            writer.add(drawer.frame(poses))
-            count += 1
-        writer.close()
-    except EncoderFailed as error:
-        print(f"recording: {path}: {error}", file=sys.stderr, flush=True)
-        return 1
-    length = f"{count} frames, {count / options.rate:.1f} s" if count else "no time has passed"
-    print(f"recording: {path}: {length}", flush=True)
-    return 0
+    drawer, writer = FrameDrawer(options, Renderer()), Mp4Writer(options.path, options.rate)
+    count = 0
+    while (message := inbox.get()) is not None and not stopping:
+        models, poses = message
+        if models is not None:
+            drawer.change(models)
+        writer.add(drawer.frame(poses))
+        count += 1
+    writer.close()
+    return count
 
 
 def _read(stream: BinaryIO, inbox: "queue.SimpleQueue[Any]") -> None:

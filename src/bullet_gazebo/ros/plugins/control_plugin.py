@@ -113,13 +113,7 @@ class ControlPlugin:
                 _log,
             )
         thinner = self._context.thinner
-        try:
-            self._services = ControllerServices(self._sim, thinner, manager, self._namespace)
-        except rospy.service.ServiceException as error:
-            raise ControlError(
-                f"there is a controller manager in the namespace '{self._namespace}' already; "
-                "give each robot a robot_namespace of its own"
-            ) from error
+        self._services = self._offer(manager)
         for place, pid in hardware.pids.items():
             full = rospy.names.ns_join(self._namespace, place)
             self._pids.append(PidTopics(self._sim, thinner, pid, full, manager.loops_changed))
@@ -157,6 +151,15 @@ class ControlPlugin:
 
         full = rospy.names.ns_join(self._namespace, topic)
         self._emergency_stop = rospy.Subscriber(full, Bool, receive, queue_size=1)
+
+    def _offer(self, manager: ControllerManager) -> ControllerServices:
+        try:
+            return ControllerServices(self._sim, self._context.thinner, manager, self._namespace)
+        except rospy.service.ServiceException as error:
+            raise ControlError(
+                f"there is a controller manager in the namespace '{self._namespace}' already; "
+                "give each robot a robot_namespace of its own"
+            ) from error
 
 
 def _log(level: int, text: str) -> None:
