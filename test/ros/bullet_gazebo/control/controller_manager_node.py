@@ -140,7 +140,7 @@ class ControllerManagerTest(PausedRobot, unittest.TestCase):
 
         def work(name):
             try:
-                for _ in range(20):
+                for _ in range(5):
                     self.manager.switch([name], [], BEST_EFFORT)
                     self.manager.load(name)
                     self.manager.switch([], [name], BEST_EFFORT)
