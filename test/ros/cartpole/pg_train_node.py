@@ -103,6 +103,7 @@ class PgTrain(unittest.TestCase):
         self.assertNotIn("spawning", output)
         self.assertIn("cartpole", self.ask(place, "/gazebo/get_world_properties"))
         self.assertIn("True", self.ask(place, "/gazebo/delete_model", "cartpole"))
+        place.run = place.folder / "another"
         output = self.trained(place, "--episodes=2", "--gui")  # it has no window: one is opened
         self.assertIn("opening the simulator's window", output)
         self.assertIn("the window is the page http://127.0.0.1:", output)
