@@ -22,7 +22,7 @@ from lockstep_runner import originals
 from lockstep_runner.clock import Others
 from lockstep_runner.line import ADDRESS, Line, LineEnded
 from lockstep_runner.looks import LOOK, QUIET, WORKING, Seen, look_at
-from lockstep_runner.notices import Notices
+from lockstep_runner.notices import tell_once
 
 SITE = Path(__file__).with_name("site")
 STARTING_PATIENCE = 30.0  # [s of wall time]
@@ -31,9 +31,8 @@ STARTING_PATIENCE = 30.0  # [s of wall time]
 class StartedProcesses:
     """Detects when the script starts processes, and when they stop working."""
 
-    def __init__(self, notices: Notices) -> None:
+    def __init__(self) -> None:
         self.is_going_on = False
-        self._notices = notices
         self._known: set[int] = set()  # already reported: these compute on their own
         paths = [str(SITE), *filter(None, [os.environ.get("PYTHONPATH")])]
         os.environ["PYTHONPATH"] = os.pathsep.join(paths)
@@ -69,7 +68,7 @@ class StartedProcesses:
             if busy and originals.monotonic() > deadline:
                 self._known |= busy
                 for pid in busy:
-                    self._notices.once(
+                    tell_once(
                         f"process {pid}",
                         f"process {pid} ({_name(pid)}) computes on its own: it isn't waited for, so that"
                         " what it tells the script isn't repeatable",
@@ -124,11 +123,10 @@ class _Node:
 class Followers(Others):
     """All nodes that follow the clock."""
 
-    def __init__(self, notices: Notices) -> None:
+    def __init__(self) -> None:
         self.passed = lambda: 0  # [ns] Clock.passed
         self.forget_mail = lambda node: None
-        self.starting = StartedProcesses(notices)
-        self._notices = notices
+        self.starting = StartedProcesses()
         self._guard = originals.Condition()
         self._nodes: dict[str, _Node] = {}
         self._folder = tempfile.TemporaryDirectory(prefix="lockstep_")
@@ -194,7 +192,7 @@ class Followers(Others):
                         node.covered = False  # it waits for something other than time
                     elif originals.monotonic() > deadline:
                         node.covered = False
-                        self._notices.once(
+                        tell_once(
                             f"busy {node.name}",
                             f"node {node.name} has computed for {PATIENCE:g} s; time goes on without it,"
                             " so that what it does meanwhile isn't repeatable",

@@ -15,7 +15,7 @@ import rospy
 
 from lockstep_runner import originals
 from lockstep_runner.clock import NANOSECONDS, Clock, Condition
-from lockstep_runner.notices import Notices, tell
+from lockstep_runner.notices import tell, tell_once
 from lockstep_runner.topics import Topics
 from lockstep_runner.triggers import Triggers
 from lockstep_runner.world import NODE, RunsByItself, ScriptWorld, WorldFailed, WorldGone
@@ -52,7 +52,7 @@ def _ends_with_the_world(
                 return method(self, *args, **kwds)
             except WorldGone as gone:
                 if not self.is_over:  # Ctrl-C ends both
-                    self.notices.once("gone", f"{gone}: without another one, sleeps are wall time")
+                    tell_once("gone", f"{gone}: without another one, sleeps are wall time")
                 return instead
             except BadPeriod as fault:
                 self.fail(fault, USAGE)
@@ -75,10 +75,9 @@ class ScriptRunner:
             triggers: topics and services; None for the commands to controllers.
             world: the simulator, and the source of time.
         """
-        self.notices = Notices()
         self.world = world
-        self.topics = Topics(self.world, self.notices)
-        self.clock = Clock(self.world, self.notices)
+        self.topics = Topics(self.world)
+        self.clock = Clock(self.world)
         self.triggers = Triggers(triggers)
         self._period = period
         self._looks = 0

@@ -8,10 +8,10 @@ import numpy as np
 import viser
 from trimesh import creation
 
-from bullet_gazebo.physics.description import Color, DescriptionError, Shape
+from bullet_gazebo.physics.description import Color, DescriptionError, Joint, Shape
 from bullet_gazebo.physics.files.elements import shown
+from bullet_gazebo.physics.files.meshes import MeshLook, read_look
 from bullet_gazebo.physics.pose import Pose, Vector, rotate
-from bullet_gazebo.pictures.looks import MeshLook, read_look
 from bullet_gazebo.pictures.page_batches import (
     Appearance,
     Batches,
@@ -19,8 +19,9 @@ from bullet_gazebo.pictures.page_batches import (
     GlbFile,
     Instance,
     Singles,
+    Where,
 )
-from bullet_gazebo.pictures.visuals import GREY, ROUNDS, SIDES, VisibleJoint
+from bullet_gazebo.pictures.visuals import GREY, ROUNDS, SIDES
 
 COLLISION = (1.0, 0.5, 0.0, 0.35)
 UNSHOWN = (1.0, 0.0, 1.0, 1.0)  # a box in place of a shape that can't be shown
@@ -32,9 +33,6 @@ OWN_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 AXES_COLORS = ((225, 0, 0), (0, 190, 0), (0, 0, 225))
 MOST_NAMES = 200  # of joints; each is a node of its own
 MOST_FILES = 32
-
-Where = tuple[int, int]
-"""A model's number and the index of one of its links."""
 
 
 class ShapeMaker:
@@ -82,10 +80,10 @@ class ShapeMaker:
             complaint = f"{what}: a shape '{shown(shape.kind)}' is not known"
             self._add_unshown(where, complaint, shape.pose)
 
-    def add_joint(self, where: Where, joint: VisibleJoint) -> None:
+    def add_joint(self, where: Where, joint: Joint) -> None:
         """Adds a joint's frame, axis and name; `where` is the link that it moves."""
         self._names += 1
-        corner, turn = joint.frame
+        corner, turn = joint.anchor
         for own, color in zip(OWN_AXES, AXES_COLORS, strict=True):
             self._add_rod(where, corner, rotate(turn, own), (0.0, AXES), AXES / 25, color)
         axis = rotate(turn, joint.axis)
@@ -93,7 +91,7 @@ class ShapeMaker:
         if self._names <= MOST_NAMES:
             end = np.array(corner) + 2.0 * AXES * np.array(axis)
             label = self._scene.add_label(self._singles.name(), shown(joint.name))
-            self._singles.add(*where, np.array([*end, 0.0, 0.0, 0.0, 1.0]), label)
+            self._singles.add(where, np.array([*end, 0.0, 0.0, 0.0, 1.0]), label)
 
     def clear(self) -> None:
         """Counts names from 0 again, after everything was removed."""
@@ -110,7 +108,7 @@ class ShapeMaker:
     ) -> None:
         opacity = min(max(rgba[3], 0.0), 1.0)
         look = Appearance(solid, math.prod(scale) < 0.0, opacity < 1.0, not collision)
-        self._batches.add(*where, look, Instance(pose, scale, color_bytes(rgba), opacity))
+        self._batches.add(look, Instance(where, pose, scale, color_bytes(rgba), opacity))
 
     def _add_plane(self, where: Where, pose: Pose) -> None:
         plane = self._scene.add_grid(
@@ -118,26 +116,26 @@ class ShapeMaker:
             cell_color=(205, 205, 205), section_color=(170, 170, 170), plane_color=(235, 235, 235),
             plane_opacity=1.0,
         )  # fmt: skip
-        self._singles.add(*where, _numbers(pose), plane)
+        self._singles.add(where, _numbers(pose), plane)
 
     def _add_mesh(
         self, where: Where, shape: Shape, what: str, rgba: Color, collision: bool
     ) -> None:
         try:
-            mesh = read_look(shape.mesh)
+            look = read_look(shape.mesh)
         except DescriptionError as error:
             self._add_unshown(where, f"{what}: {error}", shape.pose)
             return
         x, y, z = shape.size if len(shape.size) == 3 else (1.0, 1.0, 1.0)
-        if mesh.glb is not None and not collision:
+        if look.glb is not None and not collision:
             if x * y * z < 0.0:  # mirrored: in a batch it would show its back
-                whole = self._scene.add_glb(self._singles.name(), mesh.glb, scale=(x, y, z))
-                self._singles.add(*where, _numbers(shape.pose), whole)
+                whole = self._scene.add_glb(self._singles.name(), look.glb, scale=(x, y, z))
+                self._singles.add(where, _numbers(shape.pose), whole)
             else:
-                part = Instance(shape.pose, (x, y, z), color_bytes(rgba))
-                self._batches.add(*where, Appearance(self._glb_of(mesh)), part)
+                part = Instance(where, shape.pose, (x, y, z), color_bytes(rgba))
+                self._batches.add(Appearance(self._glb_of(look)), part)
             return
-        self._add_part(where, self._geometry_of(mesh), shape.pose, (x, y, z), rgba, collision)
+        self._add_part(where, self._geometry_of(look), shape.pose, (x, y, z), rgba, collision)
 
     def _add_unshown(self, where: Where, complaint: str, pose: Pose) -> None:
         if complaint not in self._complained:
@@ -157,13 +155,13 @@ class ShapeMaker:
         """Adds a thin cylinder along `way`, between two distances [m] from `corner`."""
         low, high = ends
         x, y, z = np.array(corner) + (low + high) / 2.0 * np.array(way)
-        part = Instance(Pose((x, y, z), _turned(way)), (radius, radius, high - low), color)
-        self._batches.add(*where, Appearance(_cylinder(), shadow=False), part)
+        part = Instance(where, Pose((x, y, z), _turned(way)), (radius, radius, high - low), color)
+        self._batches.add(Appearance(_cylinder(), shadow=False), part)
 
 
-def _glb_of(mesh: MeshLook) -> GlbFile:
-    assert mesh.glb is not None
-    return GlbFile(mesh.glb)
+def _glb_of(look: MeshLook) -> GlbFile:
+    assert look.glb is not None
+    return GlbFile(look.glb)
 
 
 @cache
@@ -200,9 +198,9 @@ def _cylinder() -> Geometry:
     return Geometry(_singles(vertices), _indices(faces), flat=False)
 
 
-def _geometry_of(mesh: MeshLook) -> Geometry:
+def _geometry_of(look: MeshLook) -> Geometry:
     """Returns the triangles of a file, visible from both sides."""
-    return Geometry(_singles(mesh.vertices), _indices(mesh.faces), side="double")
+    return Geometry(_singles(look.mesh.vertices), _indices(look.mesh.faces), side="double")
 
 
 def _singles(vertices: np.ndarray) -> np.ndarray:

@@ -314,7 +314,7 @@ class LockstepTest(unittest.TestCase):
         self.assertEqual((run.returncode, run.stderr.count("\n")), (2, 1), run.stderr)
         run = lockstep(written("print 'two'\n"))
         self.assertEqual(run.returncode, 2)
-        self.assertIn("Python 2", run.stderr)
+        self.assertIn("line 1", run.stderr)
         run = lockstep("--dt", 0.0085, written(HEAD))
         self.assertEqual(run.returncode, 2, run.stderr)
         self.assertIn("0.0085", run.stderr)

@@ -1,7 +1,6 @@
 """What docs/security.md promises about files, imports and folders."""
 
 import ast
-import stat
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import pytest
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.reading import Reading, Resources
 from bullet_gazebo.physics.files.world_file import read_entity
-from bullet_gazebo.scratch import scratch_folder
 
 ROOT = Path(__file__).resolve().parents[3]
 MODULES = sorted(
@@ -69,8 +67,3 @@ def test_the_contents_of_a_file_are_not_given_back(entity: str, name: str, tmp_p
         spawn(entity.format(f"file://{tmp_path}/{name}"))
     assert name in str(raised.value)
     assert "s3same" not in str(raised.value) and "hunter2" not in str(raised.value)
-
-
-def test_temporary_folders_are_the_users_own() -> None:
-    with scratch_folder() as path:
-        assert stat.S_IMODE(path.stat().st_mode) == 0o700

@@ -3,7 +3,6 @@
 import contextlib
 import io
 import os
-import re
 import secrets
 import select
 import signal
@@ -13,6 +12,7 @@ import time
 import weakref
 from pathlib import Path
 
+import psutil
 import rospkg
 
 import bullet_gazebo
@@ -35,15 +35,9 @@ SOURCES = Path(bullet_gazebo.__file__).parents[1]
 NOT_INHERITED = ("ROS_HOSTNAME", "ROS_IPV6", "ROS_NAMESPACE")
 
 
-def free_memory() -> int:
-    """Returns how much memory new processes may take [bytes]."""
-    found = re.search(r"MemAvailable:\s*(\d+) kB", Path("/proc/meminfo").read_text("ascii"))
-    return int(found[1]) * 1024 if found else sys.maxsize
-
-
 def check_memory(count: int) -> None:
     """Raises RobotEnvError if there isn't the memory for so many simulators."""
-    needed, free = count * MEMORY, free_memory()
+    needed, free = count * MEMORY, psutil.virtual_memory().available
     if needed > free:
         raise RobotEnvError(
             f"{count} simulators need about {needed / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are "

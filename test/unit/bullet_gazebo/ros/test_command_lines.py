@@ -9,7 +9,7 @@ from bullet_gazebo.ros.clients import gz, gzclient
 from bullet_gazebo.ros.clients.spawn_model import parse
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
 from bullet_gazebo.ros.node.gzserver import parse_args
-from bullet_gazebo.ros.services.resource_paths import model_paths
+from bullet_gazebo.ros.services.spawn_services import model_paths
 
 
 def test_options_stand_in_any_order():

@@ -5,9 +5,9 @@ import time
 import pytest
 from rospy.impl import tcpros_pubsub
 
-from bullet_gazebo.ros.common import mailboxes as module
-from bullet_gazebo.ros.common.mailboxes import Mailbox, Mailboxes
-from bullet_gazebo.ros.common.rospy_topics import publish_without_yielding
+from bullet_gazebo.ros.common.rospy_internals import publish_without_yielding
+from bullet_gazebo.ros.services import advance_service as module
+from bullet_gazebo.ros.services.advance_service import Mailbox, Mailboxes
 
 
 @pytest.fixture

@@ -21,8 +21,8 @@ from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import World, ground_plane
 from bullet_gazebo.robot import ControlledRobot
-from bullet_gazebo.ros.services.stepping import step_service
-from bullet_gazebo.ros.services.stepping.step_service import StepService
+from bullet_gazebo.ros.services import step_service
+from bullet_gazebo.ros.services.step_service import StepService
 from bullet_gazebo.simulator import Simulator
 
 WORLD = StepWorldRequest.WORLD
