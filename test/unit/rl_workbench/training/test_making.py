@@ -12,6 +12,7 @@ from rl_workbench.errors import WorkbenchError
 from rl_workbench.training.environments import (
     discrete_actions,
     make_environment,
+    robot_options,
     shares_robot,
 )
 
@@ -129,3 +130,13 @@ def test_a_wrapper_may_say_that_there_is_one_robot() -> None:
 
     env = Connected(gymnasium.make(POLE))
     assert shares_robot(gymnasium.wrappers.TimeLimit(env, 5))
+
+
+def test_which_options_name_a_robot_that_is_shared(monkeypatch) -> None:
+    env, given = make_environment(POLE), {"backend": "ros", "noise": 0.1}
+    assert robot_options(env, given) is None
+    monkeypatch.setattr(env.unwrapped, "shares_robot", True, raising=False)
+    assert robot_options(env, given) == given, "whatever it was made with"
+    own = {"backend": "ros-own"}
+    monkeypatch.setattr(env.unwrapped, "own_robot_options", own, raising=False)
+    assert robot_options(env, given) == {"backend": "ros"}
