@@ -1,4 +1,4 @@
-"""Locks between processes, on a folder or a file; the kernel releases them when their process ends."""
+"""Locks between processes, on a folder; the kernel releases them when their process ends."""
 
 import fcntl
 import os
@@ -22,7 +22,7 @@ def locked_folder(folder: Path, *, wait: bool = True) -> Iterator[None]:
     """
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
-        _lock(descriptor, wait)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
         # Its last holder may have removed it, and somebody else made another one, while we waited.
         if not os.path.samestat(os.fstat(descriptor), os.stat(folder)):
             raise FileNotFoundError(f"{folder} was replaced just now")
@@ -31,29 +31,13 @@ def locked_folder(folder: Path, *, wait: bool = True) -> Iterator[None]:
         os.close(descriptor)
 
 
-@contextmanager
-def locked_file(file: Path, *, wait: bool = True) -> Iterator[None]:
-    """Holds the lock of a file for the block; makes the file if it is missing. Nobody may remove it.
-
-    Raises:
-        BlockingIOError: if another one holds it and `wait` is false.
-        OSError: if it can't be opened, or its file system has no locks.
-    """
-    descriptor = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-    try:
-        _lock(descriptor, wait)
-        yield
-    finally:
-        os.close(descriptor)
-
-
-def is_locked(path: Path) -> bool:
-    """Returns whether somebody holds the lock of an existing folder or file.
+def is_locked(folder: Path) -> bool:
+    """Returns whether somebody holds the lock of an existing folder.
 
     It takes a shared lock for a moment, so it may refuse somebody who doesn't wait: call it seldom.
     """
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+        descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
     except OSError:
         return False
     try:
@@ -63,7 +47,3 @@ def is_locked(path: Path) -> bool:
     finally:
         os.close(descriptor)
     return False
-
-
-def _lock(descriptor: int, wait: bool) -> None:
-    fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))

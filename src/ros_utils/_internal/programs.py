@@ -338,8 +338,9 @@ def await_start(
     elif code or (found == "ended" and not may_end):
         fault = f"ended with exit code {code}"
     if fault:
+        reason = handle.reason()  # before it is told to end, and reports that
         handle.end()
-        _log.error(f"{handle.start.label}: {fault}: {handle.reason()}{handle.where()}")
+        _log.error(f"{handle.start.label}: {fault}: {reason}{handle.where()}")
         return False
     return wait_for_world(Started(handle), ready, begin + timeout, timeout)
 
