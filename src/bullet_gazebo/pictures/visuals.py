@@ -3,16 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bullet_gazebo.physics.description import Color, Joint, Link, ModelDescription, Shape
+from bullet_gazebo.physics.files.meshes import read_look
 from bullet_gazebo.physics.pose import Pose, rotate
-from bullet_gazebo.pictures.looks import read_look
-
-if TYPE_CHECKING:  # a simulator only asks for the visible shapes
-    from PIL import Image
 
 GREY: Color = (0.7, 0.7, 0.72, 1.0)  # of a shape without a colour
 SIDES = 40  # of a cylinder
@@ -49,11 +46,11 @@ class Solid(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """Triangles of one colour or texture; `uvs` (3 n, 2) are as in `looks.MeshPart`."""
+    """Triangles of one colour or texture; `texture` and `uvs` (3 n, 2) as in `MeshPart`."""
 
     solid: Solid
     rgba: Color
-    texture: "Image.Image | None" = None
+    texture: np.ndarray | None = None
     uvs: np.ndarray | None = None
 
 
@@ -103,7 +100,7 @@ def solid_of(shape: Shape) -> Solid:
         DescriptionError: a mesh file can't be read.
     """
     if shape.kind == "mesh":
-        mesh = shape.solid or read_look(shape.mesh)
+        mesh = shape.solid or read_look(shape.mesh).mesh
         return _flat(_scaled(mesh.vertices[mesh.faces], shape.size))
     if shape.kind == "box":
         return _flat(_box(shape.size))

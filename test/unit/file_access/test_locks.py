@@ -20,18 +20,16 @@ with locks.locked_folder(Path(sys.argv[1])):
 def test_a_second_holder_is_refused_until_the_block_ends(tmp_path) -> None:
     with locked_folder(tmp_path):
         assert is_locked(tmp_path)
-        with pytest.raises(BlockingIOError), locked_folder(tmp_path, wait=False):
+        with pytest.raises(BlockingIOError), locked_folder(tmp_path):
             pass
     assert not is_locked(tmp_path)
-    with locked_folder(tmp_path, wait=False):
+    with locked_folder(tmp_path):
         pass
 
 
 def test_a_lock_ends_with_its_process(tmp_path) -> None:
     holder = subprocess.Popen(
-        [sys.executable, "-c", HOLDER, tmp_path],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
+        [sys.executable, "-c", HOLDER, tmp_path], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     with holder:
         assert holder.stdout.readline() == b"locked\n"
@@ -41,7 +39,7 @@ def test_a_lock_ends_with_its_process(tmp_path) -> None:
         pass
 
 
-def test_a_folder_that_is_removed_while_one_waits_is_not_locked(tmp_path, monkeypatch) -> None:
+def test_a_folder_that_is_removed_meanwhile_is_not_locked(tmp_path, monkeypatch) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
 

@@ -1,7 +1,4 @@
-"""Package gazebo_ros: its Python module `gazebo_interface`, and the executable `spawn_model`.
-
-See docs/contract/gazebo_launch.md 4.2 and 4.3.
-"""
+"""Executable `spawn_model` of package gazebo_ros (docs/contract/gazebo_launch.md 4.3)."""
 
 import argparse
 import contextlib
@@ -14,7 +11,13 @@ from typing import Any
 from xml.etree import ElementTree
 
 import rospy
-from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SetModelConfiguration, SpawnModel
+from gazebo_msgs.srv import DeleteModel, GetWorldProperties
+from gazebo_ros.gazebo_interface import (
+    set_model_configuration_client,
+    spawn_sdf_model_client,
+    spawn_urdf_model_client,
+    wait_for_service,
+)
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import Empty
 
@@ -23,78 +26,12 @@ from file_access.content import MAX_BYTES, FileError, read_file
 from file_access.xml_text import decode
 from file_access.xml_text import parse as parse_xml
 from ros_calls.service import ServiceClient, ServiceFailed
-from ros_calls.waiting import service_comes_up, wait_until
+from ros_calls.waiting import wait_until
 
 FAREWELL = 3.0  # [s] for the end of spawning and for a call during shutdown
 INTERRUPTED = -1
 INCLUDE = '<sdf version="1.6"><world name="default"><include><uri>model://{}</uri></include></world></sdf>'
 REMIND = 10.0  # [s of wall time]
-
-
-def spawn_sdf_model_client(
-    model_name: str,
-    model_xml: str,
-    robot_namespace: str,
-    initial_pose: Pose,
-    reference_frame: str,
-    gazebo_namespace: str,
-) -> bool | None:
-    """Spawns a model from SDF text; waits for the simulator without limit.
-
-    Returns:
-        Whether the model was spawned; None, after a message, if the call failed.
-    """
-    request = (model_name, model_xml, robot_namespace, initial_pose, reference_frame)
-    return _try(f"{gazebo_namespace}/spawn_sdf_model", SpawnModel, request)
-
-
-def spawn_urdf_model_client(
-    model_name: str,
-    model_xml: str,
-    robot_namespace: str,
-    initial_pose: Pose,
-    reference_frame: str,
-    gazebo_namespace: str,
-) -> bool | None:
-    """Spawns a model from URDF text. See `spawn_sdf_model_client`."""
-    request = (model_name, model_xml, robot_namespace, initial_pose, reference_frame)
-    return _try(f"{gazebo_namespace}/spawn_urdf_model", SpawnModel, request)
-
-
-def set_model_configuration_client(
-    model_name: str,
-    model_param_name: str,
-    joint_names: Sequence[str],
-    joint_positions: Sequence[float],
-    gazebo_namespace: str,
-) -> bool | None:
-    """Puts joints at positions [rad, m]. See `spawn_sdf_model_client`."""
-    request = (model_name, model_param_name, joint_names, joint_positions)
-    return _try(f"{gazebo_namespace}/set_model_configuration", SetModelConfiguration, request)
-
-
-def wait_for_service(name: str) -> None:
-    """Waits without limit, with a message every 10 s.
-
-    Raises:
-        rospy.ROSInterruptException: the node was shut down meanwhile.
-    """
-    while not service_comes_up(name, REMIND):
-        rospy.logwarn("Still waiting for service %s: is the simulator running?", name)
-
-
-def _try(name: str, kind: Any, request: tuple[Any, ...]) -> bool | None:
-    wait_for_service(name)
-    try:
-        answer = rospy.ServiceProxy(name, kind)(*request)
-    except rospy.ServiceException as fault:
-        print(f"Service call failed: {fault}")
-        return None
-    if not answer.success:
-        rospy.logerr("%s", answer.status_message)
-    elif kind is SpawnModel:
-        rospy.loginfo("Spawn status: %s", answer.status_message)
-    return bool(answer.success)
 
 
 class CannotSpawn(Exception):

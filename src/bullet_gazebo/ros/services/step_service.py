@@ -21,7 +21,6 @@ from bullet_gazebo_msgs.srv import (
     PrepareStepResponse,
     SetLinkFriction,
     SetLinkFrictionRequest,
-    SetLinkFrictionResponse,
     StepWorld,
     StepWorldRequest,
     StepWorldResponse,
@@ -39,6 +38,7 @@ from bullet_gazebo.ros.common.messages import (
     to_twist_msg,
 )
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
+from bullet_gazebo.ros.services import Refused, offer
 from bullet_gazebo.ros.services.step_requests import MAX_TICKS, Addresses, StepPlan, query_of
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import NOTHING, StateQuery, StateReader, UnknownName
@@ -114,7 +114,7 @@ class StepService:
             rospy.Service("~prepare_step", PrepareStep, self._prepare),
             rospy.Service("~prepared_step", PreparedStep, self._step_prepared),
             rospy.Service("~step_world", StepWorld, self._step),
-            rospy.Service("~set_link_friction", SetLinkFriction, self._set_friction),
+            offer("~set_link_friction", SetLinkFriction, self._set_friction),
         ]
 
     def _prepare(self, request: PrepareStepRequest) -> PrepareStepResponse:
@@ -275,14 +275,13 @@ class StepService:
             **fields,
         )
 
-    def _set_friction(self, request: SetLinkFrictionRequest) -> SetLinkFrictionResponse:
-        fault = "link not found, did you forget to scope the link by model name?"
+    def _set_friction(self, request: SetLinkFrictionRequest) -> str:
         with self._sim.lock:
             found = self._sim.world.link(request.link_name)
-            if found is not None:
-                try:
-                    set_link_friction(*found, request.factor)
-                    return SetLinkFrictionResponse(True, "SetLinkFriction: friction set")
-                except PropertyError as error:
-                    fault = str(error)
-        return SetLinkFrictionResponse(False, f"SetLinkFriction: {fault}")
+            if found is None:
+                raise Refused("link not found, did you forget to scope the link by model name?")
+            try:
+                set_link_friction(*found, request.factor)
+            except PropertyError as error:
+                raise Refused(str(error)) from error
+        return "SetLinkFriction: friction set"

@@ -20,6 +20,7 @@ from bullet_gazebo.ros.clients.gz import CHUNK, METHOD
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import bad_number, from_pose_msg, to_vector
 from bullet_gazebo.ros.common.rospy_internals import answer_xmlrpc
+from bullet_gazebo.ros.services import Refused, check_message, offer
 from bullet_gazebo.ros.services.joint_services import ForceServices, JointServices
 from bullet_gazebo.ros.services.model_services import LinkServices, ModelServices
 from bullet_gazebo.simulator import Simulator
@@ -97,7 +98,7 @@ class PhysicsServices:
         self._services = [
             rospy.Service("~get_world_properties", srv.GetWorldProperties, self._get_world),
             rospy.Service("~get_physics_properties", srv.GetPhysicsProperties, self.get),
-            rospy.Service("~set_physics_properties", srv.SetPhysicsProperties, self.set),
+            offer("~set_physics_properties", srv.SetPhysicsProperties, self.set),
         ]
 
     def _get_world(self, request: srv.GetWorldPropertiesRequest) -> srv.GetWorldPropertiesResponse:
@@ -124,16 +125,14 @@ class PhysicsServices:
                 status_message="GetPhysicsProperties: got properties",
             )
 
-    def set(self, request: srv.SetPhysicsPropertiesRequest) -> srv.SetPhysicsPropertiesResponse:
+    def set(self, request: srv.SetPhysicsPropertiesRequest) -> str:
         """Sets all fields, none of which is optional; one bad value refuses the whole request."""
-        fault = bad_number(request)
-        if not fault and not SHORTEST_STEP <= request.time_step <= LONGEST_STEP:
-            fault = (
+        check_message(request)
+        if not SHORTEST_STEP <= request.time_step <= LONGEST_STEP:
+            raise Refused(
                 f"time_step is {request.time_step}; "
                 f"it must be between {SHORTEST_STEP:g} and {LONGEST_STEP:g} s"
             )
-        if fault:
-            return srv.SetPhysicsPropertiesResponse(False, f"SetPhysicsProperties: {fault}")
         ode = request.ode_config
         with self._sim.lock:
             world = self._sim.world
@@ -141,7 +140,7 @@ class PhysicsServices:
             self._sim.set_time_step(request.time_step)
             self._sim.max_update_rate = request.max_update_rate
             world.set_solver(SolverSettings(**{o: getattr(ode, k) for k, o in FIELDS.items()}))
-        return srv.SetPhysicsPropertiesResponse(True, "physics engine updated")
+        return "physics engine updated"
 
 
 class PhysicsReconfigure(DynamicServer):
@@ -166,9 +165,10 @@ class PhysicsReconfigure(DynamicServer):
             gravity=Vector3(*(config[f"gravity_{axis}"] for axis in AXES)),
             ode_config=ODEPhysics(**{name: config[name] for name in ODE}),
         )
-        answer = self._physics.set(request)
-        if not answer.success:
-            rospy.logwarn("set_parameters: %s", answer.status_message)
+        try:
+            self._physics.set(request)
+        except Refused as refusal:
+            rospy.logwarn("set_parameters: %s", refusal)
             config.update(self._in_force())
         return config
 
