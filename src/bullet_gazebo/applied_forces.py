@@ -51,12 +51,6 @@ class AppliedForces:
         self.efforts: list[AppliedEffort] = []
         self.wrenches: list[AppliedWrench] = []
 
-    def add_effort(self, effort: AppliedEffort) -> None:
-        self.efforts.append(effort)
-
-    def add_wrench(self, wrench: AppliedWrench) -> None:
-        self.wrenches.append(wrench)
-
     def clear_efforts(self, joint: str) -> None:
         """Drops all efforts on joints of that plain name, whatever their model."""
         self.efforts = [each for each in self.efforts if each.joint != joint]
@@ -75,21 +69,15 @@ class AppliedForces:
 
     def apply(self, now: int) -> None:
         """Applies what acts in the step that ends at `now` [ns], and drops what is over."""
-        self._apply_wrenches(now)
-        self._apply_efforts(now)
-
-    def _apply_wrenches(self, now: int) -> None:
         # Gazebo sets a body's force and torque: of several wrenches the one queued last counts.
         acting = {(id(w.model), w.link): w for w in self.wrenches if w.interval.covers(now)}
         for each in acting.values():
             each.model.body.add_wrench(each.link, *each.wrench)
+        for effort in self.efforts:
+            if effort.interval.covers(now) and effort.joint in effort.model.joint_names:
+                index = effort.model.joint_index(effort.joint)
+                effort.model.body.add_effort(index, _truncated(effort))
         self.wrenches = [each for each in self.wrenches if not each.interval.is_over(now)]
-
-    def _apply_efforts(self, now: int) -> None:
-        for each in self.efforts:
-            if each.interval.covers(now) and each.joint in each.model.joint_names:
-                index = each.model.joint_index(each.joint)
-                each.model.body.add_effort(index, _truncated(each))
         self.efforts = [each for each in self.efforts if not each.interval.is_over(now)]
 
 

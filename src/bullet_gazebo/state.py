@@ -5,7 +5,6 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from math import hypot
 from typing import NamedTuple
 
@@ -27,9 +26,9 @@ from bullet_gazebo.physics.pose import (
     subtract,
 )
 from bullet_gazebo.physics.world import World, seen_from
+from file_access.text import did_you_mean
 
 SCOPE = "::"
-MOST_COMPARED = 2000  # names; among more, the search for a similar one would take too long
 Wrench = tuple[Vector, Vector]
 """Force [N] and torque [N m], in world axes."""
 Collision = tuple[str, str, str]
@@ -127,13 +126,6 @@ def link_names(world: World) -> list[str]:
             if link != WORLD:
                 names += [link, f"{model.name}{SCOPE}{link}"]
     return names
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Returns the end of an error about an unknown name: the most similar known one, if there is one."""
-    names = sorted(set(known))
-    near = get_close_matches(name, names, 1) if len(names) <= MOST_COMPARED else []
-    return f"; did you mean '{near[0]}'?" if near else ""
 
 
 def _has_link(model: Model, name: str) -> bool:

@@ -7,8 +7,9 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
+from file_access.text import one_line
+
 MAX_BYTES = 64 * 2**20  # of one file or text; robots have some hundred kilobytes, worlds megabytes
-MAX_ERROR = 4000  # characters
 
 
 class FileError(ValueError):
@@ -27,12 +28,6 @@ class NotAFile(OSError):
 
     def __init__(self, path: Path) -> None:
         super().__init__(errno.EINVAL, "it is not a file", str(path))
-
-
-def one_line(text: str) -> str:
-    """Returns `text`, which may quote anything from a file, as one line of bounded length for a log."""
-    line = " ".join(text.split())
-    return line if len(line) <= MAX_ERROR else f"{line[:MAX_ERROR]}…"
 
 
 def open_file(path: Path) -> BinaryIO:

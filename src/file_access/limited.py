@@ -22,7 +22,7 @@ from contextlib import suppress
 from dataclasses import astuple, dataclass
 from typing import NoReturn
 
-from file_access.content import one_line
+from file_access.text import one_line
 
 STARTING = 30.0  # [s] beyond the time limit, for Python to start on a busy machine
 HEADER = struct.Struct("<cQ")  # of a message: its kind and its length [bytes]

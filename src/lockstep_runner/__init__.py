@@ -1,1 +1,6 @@
-"""Runs a ROS script, unchanged, in a process whose time is the simulation's (docs/lockstep.md)."""
+"""Runs a ROS script, unchanged, in a process whose time is the simulation's (docs/lockstep.md).
+
+The command is `launcher.main`; everything else is private.
+"""
+
+__all__ = ["launcher"]

@@ -20,7 +20,7 @@ import rospy.impl.simtime
 
 from lockstep_runner import originals
 from lockstep_runner.looks import Seen
-from lockstep_runner.notices import Notices
+from lockstep_runner.notices import tell_once
 from lockstep_runner.topics import Callbacks
 from lockstep_runner.world import ScriptWorld
 
@@ -70,13 +70,12 @@ class Others:
 class Clock:
     """Makes threads wait in simulated time."""
 
-    def __init__(self, world: ScriptWorld, notices: Notices) -> None:
+    def __init__(self, world: ScriptWorld) -> None:
         self.world = world
         self.passed = 0  # [ns] simulated in total; a reset of the simulation doesn't set it back
         self.waits = 0  # number of the main thread's waits in which time has passed
         self.driving = False  # whether the main thread waits
         self.others = Others()
-        self._notices = notices
         self._guard = originals.Condition()
         self._sleepers: list[Sleeper] = []
         self._running: dict[int, threading.Thread] = {}
@@ -279,14 +278,14 @@ class Clock:
                         del self._running[ident]
                     elif ident != me and thread in self._own and self._own[thread].is_quiet():
                         del self._running[ident]
-                        self._notices.once(
+                        tell_once(
                             f"waits {thread.name}",
                             f"thread '{thread.name}' waits for something that isn't simulated time: what it"
                             " does from here on isn't repeatable",
                         )
                     elif ident != me and originals.monotonic() > deadline:
                         del self._running[ident]
-                        self._notices.once(
+                        tell_once(
                             f"busy {thread.name}",
                             f"thread '{thread.name}' has computed, or waited for something that isn't"
                             f" simulated time, for {PATIENCE:g} s; time goes on without it, so that what"

@@ -18,11 +18,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from lockstep_runner import originals
 from lockstep_runner.clock import Others
 from lockstep_runner.line import ADDRESS, Line, LineEnded
 from lockstep_runner.looks import LOOK, QUIET, WORKING, Seen, look_at
-from lockstep_runner.notices import Notices
+from lockstep_runner.notices import tell_once
 
 SITE = Path(__file__).with_name("site")
 STARTING_PATIENCE = 30.0  # [s of wall time]
@@ -31,9 +33,8 @@ STARTING_PATIENCE = 30.0  # [s of wall time]
 class StartedProcesses:
     """Detects when the script starts processes, and when they stop working."""
 
-    def __init__(self, notices: Notices) -> None:
+    def __init__(self) -> None:
         self.is_going_on = False
-        self._notices = notices
         self._known: set[int] = set()  # already reported: these compute on their own
         paths = [str(SITE), *filter(None, [os.environ.get("PYTHONPATH")])]
         os.environ["PYTHONPATH"] = os.pathsep.join(paths)
@@ -69,7 +70,7 @@ class StartedProcesses:
             if busy and originals.monotonic() > deadline:
                 self._known |= busy
                 for pid in busy:
-                    self._notices.once(
+                    tell_once(
                         f"process {pid}",
                         f"process {pid} ({_name(pid)}) computes on its own: it isn't waited for, so that"
                         " what it tells the script isn't repeatable",
@@ -78,24 +79,14 @@ class StartedProcesses:
 
 def _below() -> dict[int, tuple[str, int]]:
     """Returns state and processor time [ticks] of each living descendant, by process id."""
-    parents: dict[int, tuple[int, str, int]] = {}
-    for entry in os.listdir("/proc"):
-        look = look_at(Path("/proc", entry)) if entry.isdigit() else None
-        if look is not None:
-            parents[int(entry)] = look
-    below = {os.getpid()}
-    grown = True
-    while grown:
-        more = {pid for pid, (parent, _, _) in parents.items() if parent in below} - below
-        below |= more
-        grown = bool(more)
-    below.discard(os.getpid())
-    return {pid: parents[pid][1:] for pid in below if parents[pid][1] != "Z"}
+    children = psutil.Process().children(recursive=True)
+    looks = {child.pid: look_at(Path("/proc", str(child.pid))) for child in children}
+    return {pid: look for pid, look in looks.items() if look is not None and look[0] != "Z"}
 
 
 def _name(pid: int) -> str:
-    with contextlib.suppress(OSError):
-        return Path(f"/proc/{pid}/comm").read_text().strip()
+    with contextlib.suppress(psutil.Error):
+        return str(psutil.Process(pid).name())
     return "ended"
 
 
@@ -124,11 +115,10 @@ class _Node:
 class Followers(Others):
     """All nodes that follow the clock."""
 
-    def __init__(self, notices: Notices) -> None:
+    def __init__(self) -> None:
         self.passed = lambda: 0  # [ns] Clock.passed
         self.forget_mail = lambda node: None
-        self.starting = StartedProcesses(notices)
-        self._notices = notices
+        self.starting = StartedProcesses()
         self._guard = originals.Condition()
         self._nodes: dict[str, _Node] = {}
         self._folder = tempfile.TemporaryDirectory(prefix="lockstep_")
@@ -194,7 +184,7 @@ class Followers(Others):
                         node.covered = False  # it waits for something other than time
                     elif originals.monotonic() > deadline:
                         node.covered = False
-                        self._notices.once(
+                        tell_once(
                             f"busy {node.name}",
                             f"node {node.name} has computed for {PATIENCE:g} s; time goes on without it,"
                             " so that what it does meanwhile isn't repeatable",

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import socket
 import sys
-from collections.abc import Sequence
 from typing import Any
 
 from lockstep_runner.line import ADDRESS, Line, LineEnded
@@ -43,6 +41,9 @@ def _wrap_init_node(rospy: Any) -> None:
 def _follow(name: str) -> None:
     import rospy
 
+    from lockstep_runner.replaced import install
+    from lockstep_runner.world import FollowedWorld
+
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         connection.connect(os.environ[ADDRESS])
@@ -51,46 +52,6 @@ def _follow(name: str) -> None:
     except (OSError, LineEnded):  # the script has ended
         connection.close()
         return
-    from lockstep_runner.install import install
-    from lockstep_runner.world import ScriptWorld, WorldFailed
-
-    class FollowedWorld(ScriptWorld):
-        """The simulator, except that time comes from the script's process."""
-
-        def __init__(self) -> None:
-            super().__init__()
-            self.longest = sys.maxsize
-
-        def advance(
-            self,
-            ticks: int,
-            until: Sequence[str] = (),
-            connect: tuple[Sequence[str], Sequence[str]] | None = None,
-        ) -> Any:
-            """As ScriptWorld.advance, but time passes only when the script's process says so."""
-            if not ticks:
-                return super().advance(0, (), connect)
-            response = super().advance(0, until)
-            response.paused = False  # a follower simply waits while no time passes
-            if response.messages:  # they arrived before the rest began
-                return response
-            passed = _rest(line, math.inf if ticks == sys.maxsize else ticks * self.step)
-            if rospy.core.is_shutdown():  # the simulator may have ended, too
-                return response
-            response = super().advance(0)
-            response.paused = False
-            response.ticks = round(passed / self.step)
-            return response
-
-    def _rest(line: Line, span: float) -> float:
-        try:
-            line.send(rest=None if span == math.inf else span)
-            return float(line.receive()["passed"])
-        except (LineEnded, KeyError) as fault:
-            if rospy.core.is_shutdown():
-                return 0.0
-            raise WorldFailed("the script that it followed has ended") from fault
-
     rospy.core.add_shutdown_hook(lambda reason: line.close())  # ends a rest at Ctrl-C
     options = argparse.Namespace(seed=None, dt=0.001, step_on=["none"], virtual_wall_clock=False)
-    install(options, FollowedWorld())
+    install(options, FollowedWorld(line))

@@ -48,14 +48,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(args: argparse.Namespace, code: types.CodeType) -> int:
-    from lockstep_runner.install import install
+    from lockstep_runner.replaced import install
     from lockstep_runner.runner import watch
 
     runner = install(args)
     if args.seed is not None:
-        from lockstep_runner.script import seed_everything
-
-        seed_everything(args.seed)
+        script.seed_everything(args.seed)
     watch(runner)
     show, sys.excepthook = sys.excepthook, _hide_ourselves(sys.excepthook, args.script)
     try:
@@ -86,8 +84,6 @@ def _hide_ourselves(show: Hook, path: str) -> Hook:
     ) -> None:
         fault.__traceback__ = script.own_part(trace, path)  # the default hook prints this
         show(kind, fault, fault.__traceback__)
-        if hint := script.hint(fault):
-            tell(hint)
 
     return shown
 

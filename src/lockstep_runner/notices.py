@@ -1,8 +1,10 @@
-"""Notices to the user on stderr, each one once."""
+"""Notices to the user on stderr."""
 
 from __future__ import annotations
 
 import sys
+
+_told: set[str] = set()  # what there was a notice about
 
 
 def tell(text: str) -> None:
@@ -10,14 +12,8 @@ def tell(text: str) -> None:
     print(f"lockstep: {text}", file=sys.stderr, flush=True)
 
 
-class Notices:
-    """Remembers which notices were printed."""
-
-    def __init__(self) -> None:
-        self._told: set[str] = set()
-
-    def once(self, what: str, text: str) -> None:
-        """Prints a line, unless there was one about `what` before."""
-        if what not in self._told:
-            self._told.add(what)
-            tell(text)
+def tell_once(what: str, text: str) -> None:
+    """Prints a line on stderr, unless there was one about `what` before."""
+    if what not in _told:
+        _told.add(what)
+        tell(text)

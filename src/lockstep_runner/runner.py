@@ -9,13 +9,13 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Collection, Sequence
-from typing import Concatenate, NoReturn, ParamSpec, TypeVar
+from typing import Any, NoReturn, TypeVar, cast
 
 import rospy
 
 from lockstep_runner import originals
 from lockstep_runner.clock import NANOSECONDS, Clock, Condition
-from lockstep_runner.notices import Notices, tell
+from lockstep_runner.notices import tell, tell_once
 from lockstep_runner.topics import Topics
 from lockstep_runner.triggers import Triggers
 from lockstep_runner.world import NODE, RunsByItself, ScriptWorld, WorldFailed, WorldGone
@@ -34,32 +34,27 @@ class BadPeriod(Exception):
     """The period at a trigger is no whole number of physics steps; the text gives both."""
 
 
-Answer = TypeVar("Answer")
-Options = ParamSpec("Options")
+Method = TypeVar("Method", bound=Callable[..., Any])
 
 
-def _ends_with_the_world(
-    instead: Answer,
-) -> Callable[[Callable[Concatenate[ScriptRunner, Options], Answer]], Callable[..., Answer]]:
+def _ends_with_the_world(instead: bool | None) -> Callable[[Method], Method]:
     """Makes a method return `instead` once the simulator has ended, and end the script if it failed."""
 
-    def decorate(
-        method: Callable[Concatenate[ScriptRunner, Options], Answer],
-    ) -> Callable[..., Answer]:
+    def decorate(method: Method) -> Method:
         @functools.wraps(method)
-        def guarded(self: ScriptRunner, *args: Options.args, **kwds: Options.kwargs) -> Answer:
+        def guarded(self: ScriptRunner, *args: Any, **kwds: Any) -> Any:
             try:
                 return method(self, *args, **kwds)
             except WorldGone as gone:
                 if not self.is_over:  # Ctrl-C ends both
-                    self.notices.once("gone", f"{gone}: without another one, sleeps are wall time")
+                    tell_once("gone", f"{gone}: without another one, sleeps are wall time")
                 return instead
             except BadPeriod as fault:
                 self.fail(fault, USAGE)
             except (RunsByItself, WorldFailed) as fault:
                 self.fail(fault)
 
-        return guarded
+        return cast(Method, guarded)
 
     return decorate
 
@@ -75,10 +70,9 @@ class ScriptRunner:
             triggers: topics and services; None for the commands to controllers.
             world: the simulator, and the source of time.
         """
-        self.notices = Notices()
         self.world = world
-        self.topics = Topics(self.world, self.notices)
-        self.clock = Clock(self.world, self.notices)
+        self.topics = Topics(self.world)
+        self.clock = Clock(self.world)
         self.triggers = Triggers(triggers)
         self._period = period
         self._looks = 0

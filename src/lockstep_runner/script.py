@@ -9,7 +9,6 @@ import importlib.machinery
 import importlib.util
 import os
 import random
-import re
 import sys
 import sysconfig
 import threading
@@ -17,13 +16,6 @@ import tokenize
 import types
 from collections.abc import Callable, Sequence
 
-PYTHON_2 = re.compile(r"<>|^\s*raise [\w.]+,|\bur['\"]|`")
-MODULES_OF_PYTHON_2 = frozenset(
-    ["ConfigParser", "Queue", "StringIO", "Tkinter", "__builtin__", "cPickle", "thread", "urllib2"]
-)
-NAMES_OF_PYTHON_2 = frozenset(
-    ["basestring", "execfile", "long", "raw_input", "reduce", "unichr", "unicode", "xrange"]
-)
 OURS = __name__.partition(".")[0]
 
 
@@ -44,33 +36,10 @@ def compiled(path: str) -> types.CodeType:
     except (OSError, UnicodeDecodeError) as fault:
         raise NoScript(f"{path}: {fault}") from fault
     except (SyntaxError, ValueError) as fault:
-        what, line, place = str(fault), "", ""
+        what, place = str(fault), ""
         if isinstance(fault, SyntaxError):
-            what, line, place = fault.msg, fault.text or "", f", line {fault.lineno}"
-        hint = ""
-        if _is_for_python_2(what, line):
-            hint = " (a script for Python 2: this is Python 3; 2to3 mends most of it)"
-        raise NoScript(f"{path}{place}: {what}{hint}") from fault
-
-
-def _is_for_python_2(fault: str, line: str) -> bool:
-    signs = (
-        "Missing parentheses in call to 'print'",
-        "Missing parentheses in call to 'exec'",
-        "multiple exception types must be parenthesized",
-        "leading zeros in decimal integer literals",
-        "invalid decimal literal",
-        "inconsistent use of tabs",
-    )
-    return any(sign in fault for sign in signs) or PYTHON_2.search(line) is not None
-
-
-def hint(fault: BaseException) -> str:
-    """Returns a hint if the fault is a missing name of Python 2, else an empty string."""
-    missing = fault.name if isinstance(fault, ImportError | NameError) else None
-    if missing in MODULES_OF_PYTHON_2 | NAMES_OF_PYTHON_2:
-        return f"{missing} is Python 2's: the script is for Python 2, this is Python 3; 2to3 mends most of it"
-    return ""
+            what, place = fault.msg, f", line {fault.lineno}"
+        raise NoScript(f"{path}{place}: {what}") from fault
 
 
 def run(path: str, arguments: Sequence[str], code: types.CodeType) -> None:
@@ -160,6 +129,7 @@ LIBRARIES = frozenset(
         "multiprocess",
         "numpy",
         "optuna",
+        "psutil",
         "pybullet",
         "ray",
         "rl_workbench",

@@ -15,7 +15,7 @@ import rospy.impl.registration
 from bullet_gazebo_msgs.msg import TopicMessage
 
 from lockstep_runner import originals
-from lockstep_runner.notices import Notices
+from lockstep_runner.notices import tell_once
 from lockstep_runner.world import NODE, ScriptWorld
 
 # Callbacks in a row that didn't act on the simulator; then time no longer stops for the topic.
@@ -142,12 +142,11 @@ NOT_COMMANDS = ("/goal", "/cancel")  # of an action, whose client waits in other
 class Topics:
     """Connects the script's publishers and subscribers to the simulator."""
 
-    def __init__(self, world: ScriptWorld, notices: Notices) -> None:
+    def __init__(self, world: ScriptWorld) -> None:
         # Topics that the script publishes and the simulator subscribes to
         self.commands: frozenset[str] = frozenset()
         self.follows: Callable[[str], bool] = lambda node: True
         self._world = world
-        self._notices = notices
         self._changed = True
         self._seen = -1  # the simulator's count of topic changes at the last `settle`
         # Topics that the script subscribes to and the simulator publishes
@@ -199,13 +198,13 @@ class Topics:
             return True
         if name not in self._heard:
             if not self.follows(node):
-                self._notices.once(
+                tell_once(
                     f"from {node}",
                     f"node {node} goes by the wall's time: when its messages on {name} come isn't"
                     " repeatable",
                 )
             return True
-        self._notices.once(
+        tell_once(
             f"others on {name}",
             f"{node} publishes on {name}, too, in wall time: its messages are left out",
         )

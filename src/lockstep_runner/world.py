@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import sys
 import threading
 from collections.abc import Sequence
 
@@ -10,6 +12,7 @@ from bullet_gazebo_msgs.msg import TopicMessage
 from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldRequest, AdvanceWorldResponse
 
 from lockstep_runner import originals
+from lockstep_runner.line import Line, LineEnded
 from ros_calls import master
 from ros_calls.service import ServiceClient, ServiceGone, ServiceHangs
 
@@ -128,16 +131,7 @@ class ScriptWorld:
             if not self._seeded:
                 request.reseed, request.seed = True, self._seed
                 self._seeded = True
-            try:
-                response: AdvanceWorldResponse = self._call(request)
-            except (ServiceGone, ServiceHangs) as fault:
-                raised = _raised_elsewhere(fault)
-                if raised is not None:
-                    raise raised  # noqa: B904 - as if nobody had taken it for the connection's
-                self.forget()
-                if isinstance(fault, ServiceGone) and not _is_registered():
-                    raise WorldGone("the simulator has been ended") from fault
-                raise WorldFailed(f"the simulator has died, or hangs: {fault}") from fault
+            response = self._answer(self._call, request)
             if not response.success:
                 rospy.logerr("%s", response.status_message)
             self.now = response.now.to_nsec()
@@ -145,6 +139,18 @@ class ScriptWorld:
             self.paused = response.paused
             self.topics_changed = response.topics_changed
         return response
+
+    def _answer(self, call: ServiceClient, request: AdvanceWorldRequest) -> AdvanceWorldResponse:
+        try:
+            return call(request)
+        except (ServiceGone, ServiceHangs) as fault:
+            raised = _raised_elsewhere(fault)
+            if raised is not None:
+                raise raised  # noqa: B904 - as if nobody had taken it for the connection's
+            self.forget()
+            if isinstance(fault, ServiceGone) and not _is_registered():
+                raise WorldGone("the simulator has been ended") from fault
+            raise WorldFailed(f"the simulator has died, or hangs: {fault}") from fault
 
     def forget_mail(self, node: str) -> None:
         """Makes the simulator drop the messages that it keeps for a node that has ended."""
@@ -164,6 +170,46 @@ class ScriptWorld:
         self._call = None
         self._guard = threading.RLock()  # another thread may have held the old one
         self._pending = []
+
+
+class FollowedWorld(ScriptWorld):
+    """The simulator of a node that follows a script's clock: time comes from the script's process."""
+
+    def __init__(self, line: Line) -> None:
+        super().__init__()
+        self.longest = sys.maxsize
+        self._line = line
+
+    def advance(
+        self,
+        ticks: int,
+        until: Sequence[str] = (),
+        connect: tuple[Sequence[str], Sequence[str]] | None = None,
+    ) -> AdvanceWorldResponse:
+        """As ScriptWorld.advance, but time passes only when the script's process says so."""
+        if not ticks:
+            return super().advance(0, (), connect)
+        response = super().advance(0, until)
+        response.paused = False  # a follower simply waits while no time passes
+        if response.messages:  # they arrived before the rest began
+            return response
+        passed = self._rest(math.inf if ticks == sys.maxsize else ticks * self.step)
+        if rospy.core.is_shutdown():  # the simulator may have ended, too
+            return response
+        response = super().advance(0)
+        response.paused = False
+        response.ticks = round(passed / self.step)
+        return response
+
+    def _rest(self, span: float) -> float:
+        """Rests for at most `span` of simulated time; returns how much has passed, both in [ns]."""
+        try:
+            self._line.send(rest=None if span == math.inf else span)
+            return float(self._line.receive()["passed"])
+        except (LineEnded, KeyError) as fault:
+            if rospy.core.is_shutdown():
+                return 0.0
+            raise WorldFailed("the script that it followed has ended") from fault
 
 
 def _raised_elsewhere(fault: BaseException) -> BaseException | None:

@@ -5,9 +5,9 @@ import importlib.util
 import keyword
 import os
 import re
+import secrets
 import shutil
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,35 +17,17 @@ VALID = re.compile(r"[a-z][a-z0-9_]*")
 
 
 def check_name(name: str) -> None:
-    """Raises CannotWrite, with a suggestion, unless a name is free and valid for catkin and Python."""
-    if VALID.fullmatch(name) and not keyword.iskeyword(name):
-        if _is_taken(name):
-            raise CannotWrite(f"the name '{name}' is taken: {_other(name)}")
-        return
-    why = "is a keyword of Python" if keyword.iskeyword(name) else "has other characters"
-    raise CannotWrite(
-        "a package's name has small letters, digits and _, and begins with a letter; "
-        f"'{name}' {why}: {_other(name)}"
-    )
+    """Raises CannotWrite unless a name is free and valid for catkin and Python."""
+    if not VALID.fullmatch(name) or keyword.iskeyword(name):
+        raise CannotWrite(
+            "a package's name has small letters, digits and _, begins with a letter, and is no keyword of "
+            f"Python: '{name}' isn't one"
+        )
+    if importlib.util.find_spec(name) is not None or _is_package(name):
+        raise CannotWrite(f"the name '{name}' is taken; choose another one, such as 'my_{name}'")
 
 
-def _other(name: str) -> str:
-    """Returns a similar name as a suggestion."""
-    words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
-    near = re.sub(r"[^a-z0-9]+", "_", words).strip("_") or "robot"
-    tried = (near, f"my_{near}", *(f"my_{near}_{number}" for number in range(2, 10)))
-    free = (
-        each
-        for each in tried
-        if VALID.fullmatch(each) and not keyword.iskeyword(each) and not _is_taken(each)
-    )
-    return f"'{next(free, 'my_robot')}' would do"
-
-
-def _is_taken(name: str) -> bool:
-    """Returns whether a package or a Python module has the name."""
-    if importlib.util.find_spec(name) is not None:
-        return True
+def _is_package(name: str) -> bool:
     if importlib.util.find_spec("rospkg") is None:
         return False
     import rospkg
@@ -133,23 +115,17 @@ def _write(args: argparse.Namespace, parent: Path) -> list[str]:
         args.name, folder, args.urdf, package.read_arguments(args.arguments), args.base, args.height,
         args.interface, tuple(args.passive),
     )  # fmt: skip
+    made = parent / f".{args.name}.{secrets.token_hex(4)}"
     try:
-        made = Path(tempfile.mkdtemp(prefix=f".{args.name}.", dir=parent))
+        made.mkdir()
     except OSError as error:
         raise CannotWrite(
             f"{parent}: {error.strerror}; --to FOLDER names a place where you may write"
         ) from error
     try:
         lines = package.write(request, made)
-        made.chmod(0o777 & ~_umask())
         made.rename(folder)
     except BaseException:
         shutil.rmtree(made, ignore_errors=True)
         raise
     return lines
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -14,9 +14,8 @@ from bullet_gazebo.physics.dynamics import (
 )
 from package_writing.survey import EFFORT, POSITION, Motor, Survey
 
-FREQUENCY = (
-    12.0  # [rad/s], at least, of a joint on its p and d with all that it carries stretched out
-)
+# [rad/s], at least, of a joint on its p and d with all that it carries stretched out
+FREQUENCY = 12.0
 HIGHEST = 250.0  # [rad/s], of a joint's own inertia; steps of 1 ms can't follow a higher one
 MOST = 25.0  # largest ratio of carried to own inertia
 SAG = 0.1  # [rad, m], largest sag under its weight with p alone
@@ -51,11 +50,6 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
             {"p": p, "i": 2.0 * p, "d": 2.0 * moved * frequency, "i_clamp": weight}
         )
     return found
-
-
-def velocity_gains() -> Gains:
-    """Returns the gains of a position controller with a velocity as output."""
-    return {"p": VELOCITY}
 
 
 def wheel_gains(model: ModelDescription) -> dict[str, Gains]:
@@ -136,7 +130,7 @@ def controllers_text(survey: Survey) -> str:
             gains = of_wheels if motor.wheel else by_joint
             lines.append(f"  pid: {_inline(gains[motor.joint])}  # {_units(motor)}")
         elif motor.interface != POSITION and not motor.wheel:
-            lines.append(f"  pid: {_inline(velocity_gains())}  # [1/s]")
+            lines.append(f"  pid: {_inline({'p': VELOCITY})}  # [1/s]")
         lines.append("")
     unlimited = [motor.joint for motor in survey.motors if not motor.limited]
     if unlimited:
@@ -194,11 +188,6 @@ def wheels_text(survey: Survey) -> dict[str, str]:
         "wheels": f"WHEELS = {{  # commanded by velocity\n{listed}}}\n",
         "where": text.replace("\n", f"\n{kinds}\n"),
     }
-
-
-def names_text(survey: Survey) -> str:
-    """Returns joints and their controllers, as the inside of a Python dict."""
-    return "".join(f'    "{each.joint}": "{controller(each)}",\n' for each in survey.motors)
 
 
 def control_text(package: str, urdf: str, survey: Survey | None, loose: str) -> str:

@@ -75,14 +75,39 @@ def write(request: PackageRequest, made: Path) -> list[str]:
     """
     if request.height is not None and not math.isfinite(request.height):
         raise CannotWrite(f"--height is a number of metres, not {request.height}")
-    source = request.urdf or ARM
-    copied = copy_urdf(source, request.arguments, request.name, made)
+    copied = copy_urdf(request.urdf or ARM, request.arguments, request.name, made)
     _check_packages(copied)
-    resources = _resources(request.name, made)
+    loose = _loose_link(request, root_link(copied.xml), request.urdf or ARM)
+    urdf, xml, survey, lacks = _completed(request, copied, made, loose)
+    stands = None if survey.model.fixed_base else standing_height(survey.model)
+    if request.height is None:
+        request = replace(request, height=stands or 0.0)
+    contents.fill(made, request.name, _values(request, survey, urdf, copied))
+    parameters = yaml.safe_load((made / "config/controllers.yaml").read_text(encoding="utf-8"))
+    run = tuple(map(contents.controller, survey.motors))
+    robot = Robot(urdf=xml, controllers=parameters, run=run)
+    movable = [each.name for each in survey.model.movable_joints]
+    wrong = list(controllers.faults(run, None, parameters, robot.hardware(), movable))
+    if wrong:
+        raise CannotWrite("; ".join(wrong))
+    more = f"urdf/{urdf}, which includes it, adds {' and '.join(lacks)}" if lacks else ""
+    return list(_report(request, copied, survey, more, stands))
+
+
+def _completed(
+    request: PackageRequest, copied: Copied, made: Path, loose: str
+) -> tuple[str, str, Survey, list[str]]:
+    """Surveys the robot, and writes a file that adds what its own lacks.
+
+    Returns:
+        The file to use, in the folder urdf; its XML; the survey; and what was lacking.
+    """
+    others = files.resources()
+    resources = Resources(
+        package=lambda name: str(made) if name == request.name else others.package(name)
+    )
     interface = f"{request.interface.capitalize()}JointInterface" if request.interface else None
     free = request.base == "free"
-    loose = _loose_link(request, root_link(copied.xml), source)
-    urdf, xml = copied.place, copied.xml
     control = f"{request.name}_control.urdf.xacro"
 
     def with_more(survey: Survey | None) -> str:
@@ -90,28 +115,15 @@ def write(request: PackageRequest, made: Path) -> list[str]:
         (made / "urdf" / control).write_text(text, encoding="utf-8")
         return expanded(made / "urdf" / control, request.arguments)
 
+    urdf, xml = copied.place, copied.xml
     if loose:  # a base without mass can't be simulated until it is fixed
         urdf, xml = control, with_more(None)
     survey = look_at(xml, interface, resources, free=free, passive=request.passive)
     lacks, added = list(_lacks(survey, loose)), survey.added
     if added or not survey.has_plugin:
         urdf, xml = control, with_more(survey)
-        survey = look_at(xml, interface, resources, free=free)
-    stands = None if survey.model.fixed_base else standing_height(survey.model)
-    if request.height is None:
-        request = replace(request, height=stands or 0.0)
-    values = _values(request, survey, urdf, copied)
-    contents.fill(made, request.name, values)
-    parameters = yaml.safe_load((made / "config/controllers.yaml").read_text(encoding="utf-8"))
-    robot = Robot(
-        urdf=xml, controllers=parameters, run=tuple(map(contents.controller, survey.motors))
-    )
-    movable = [each.name for each in survey.model.movable_joints]
-    wrong = list(controllers.faults(robot.run, None, parameters, robot.hardware(), movable))
-    if wrong:
-        raise CannotWrite("; ".join(wrong))
-    more = f"urdf/{urdf}, which includes it, adds {' and '.join(lacks)}" if lacks else ""
-    return list(_report(request, copied, replace(survey, added=added), more, stands))
+        survey = replace(look_at(xml, interface, resources, free=free), added=added)
+    return urdf, xml, survey, lacks
 
 
 def _loose_link(request: PackageRequest, root: str, source: Path) -> str:
@@ -142,11 +154,6 @@ def _package(name: str) -> Path | None:
         return None
 
 
-def _resources(name: str, folder: Path) -> Resources:
-    others = files.resources()
-    return Resources(package=lambda each: str(folder) if each == name else others.package(each))
-
-
 def _values(request: PackageRequest, survey: Survey, urdf: str, copied: Copied) -> dict[str, str]:
     needed = [each for each in copied.packages if each not in OURS]
     pairs = [f"{name}:={value}" for name, value in request.arguments.items()]
@@ -157,7 +164,9 @@ def _values(request: PackageRequest, survey: Survey, urdf: str, copied: Copied) 
         "name": request.name,
         "urdf": urdf,
         "dependencies": "".join(f"  <exec_depend>{each}</exec_depend>\n" for each in needed),
-        "controllers": contents.names_text(survey),
+        "controllers": "".join(
+            f'    "{each.joint}": "{contents.controller(each)}",\n' for each in survey.motors
+        ),
         "controllers_yaml": contents.controllers_text(survey),
         "ranges": contents.ranges_text(survey),
         "units": ", ".join(each for each in ("rad", "m", "rad/s") if each in units),

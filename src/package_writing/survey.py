@@ -15,8 +15,8 @@ from bullet_gazebo.physics.dynamics import poses_at_zero
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose, conjugate, rotate
-from bullet_gazebo.state import did_you_mean
 from file_access.content import FileError
+from file_access.text import did_you_mean
 from file_access.xml_text import parse
 from package_writing import CannotWrite
 
@@ -80,18 +80,15 @@ def look_at(
     except (ControlError, DescriptionError, FileError) as error:
         raise CannotWrite(str(error)) from error
     movable = [joint.name for joint in model.movable_joints]
-    mimics = {e.get("name") for e in robot.findall("joint") if e.find("mimic") is not None}
     driven = {each.joint: each.interface for each in control.transmissions}
     added = not driven
     _check_passive(passive, movable, driven)
     endless = {each.name for each in model.movable_joints if each.kind == "continuous"}
     wheels = endless if free and not model.fixed_base else set()
     if added:
-        driven = {
-            name: interface or (VELOCITY if name in wheels else EFFORT)
-            for name in movable
-            if name not in mimics and name not in passive
-        }
+        mimics = {e.get("name") for e in robot.findall("joint") if e.find("mimic") is not None}
+        names = [name for name in movable if name not in mimics and name not in passive]
+        driven = {name: interface or (VELOCITY if name in wheels else EFFORT) for name in names}
     motors = tuple(_motors(control, driven, movable, wheels))
     if not motors:
         raise CannotWrite(
@@ -99,14 +96,9 @@ def look_at(
         )
     plugin = next(_plugins(robot), None)
     namespace = "" if plugin is None else (plugin.findtext("robotNamespace") or "")
-    return Survey(
-        model=model,
-        motors=motors,
-        passive=tuple(name for name in movable if name not in driven),
-        added=added,
-        has_plugin=plugin is not None,
-        namespace=namespace.strip().strip("/"),
-    )
+    without = tuple(name for name in movable if name not in driven)
+    namespace = namespace.strip().strip("/")
+    return Survey(model, motors, without, added, plugin is not None, namespace)
 
 
 def root_link(xml: str) -> str:

@@ -126,10 +126,11 @@ def check_task(task: Any) -> None:
             raise TaskError(f"{name}.query: {what} lists names: ({names!r},), and not {names!r}")
 
 
-def check_steps(most: Any) -> None:
-    """Raises TaskError unless episodes can be truncated after so many steps; None: never."""
+def checked_steps(most: Any) -> int | None:
+    """Returns after how many steps episodes are truncated, or None; raises TaskError for anything else."""
     if most is not None and (not isinstance(most, (int, np.integer)) or most < 1):
         raise TaskError(f"max_steps must be at least 1, and a whole number, not {most!r}")
+    return None if most is None else int(most)
 
 
 def made_space(task: Task, method: str) -> gymnasium.Space[Any]:

@@ -8,7 +8,7 @@ from bullet_gazebo.control.controllers.base import Controller
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.hardware import RobotHardware
 from bullet_gazebo.control.manager import STRICT, ControllerManager
-from bullet_gazebo.state import did_you_mean
+from file_access.text import did_you_mean
 
 KINDS = ("Float64", "Float64MultiArray")  # of command topics that take numbers
 QUANTITIES = ("position", "velocity", "effort")  # that they command

@@ -9,7 +9,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import data_equivalence
 
 from bullet_gazebo.pictures.camera import Camera
-from bullet_gazebo.state import did_you_mean
+from file_access.text import did_you_mean
 from robot_envs import checks
 from robot_envs.backends import OWN, make_backend
 from robot_envs.backends.backend import RobotBackend, side_by_side
@@ -39,6 +39,13 @@ class _Step(NamedTuple):
     action: Any
     arriving: Commands
     sent: Commands | None
+
+
+def _control_period(scene: Scene, given: Any) -> float:
+    period = scene.robots[0].control_period if given is None else given
+    if not isinstance(period, (int, float)):
+        raise ValueError(f"control_period is a number [s], not {period!r}")
+    return period
 
 
 class RobotEnv(DrawnEnv):
@@ -91,6 +98,7 @@ class RobotEnv(DrawnEnv):
     """
 
     side_by_side = staticmethod(side_by_side)
+    _spec: EnvSpec | None = None
 
     def __init__(
         self,
@@ -116,14 +124,10 @@ class RobotEnv(DrawnEnv):
         self._closed = True  # until there is something to close
         checks.check_task(task)
         self.scene = scene = Scene(robot if isinstance(robot, Sequence) else [robot], task.objects)
-        self.max_steps = task.max_steps if max_steps is None else max_steps
-        checks.check_steps(self.max_steps)
+        self.max_steps = checks.checked_steps(task.max_steps if max_steps is None else max_steps)
         self._adopt(task)
-        own_period = scene.robots[0].control_period
-        self.control_period = period = own_period if control_period is None else control_period
-        if not isinstance(period, (int, float)):
-            raise ValueError(f"control_period is a number [s], not {period!r}")
-        nominal = period if period > 0.0 else own_period  # [s]
+        self.control_period = period = _control_period(scene, control_period)
+        nominal = period if period > 0.0 else scene.robots[0].control_period  # [s]
         sensor = Sensor(scene.joints, nominal, sensor_noise, sensor_delay, encoder_step)
         self._sensor = None if sensor.is_exact else sensor
         holds = {name: port.holds for name, (_, port) in scene.ports.items()}
@@ -133,7 +137,6 @@ class RobotEnv(DrawnEnv):
             randomisation = UniformRandomisation(scene, randomisation) if randomisation else None
         self._randomisation = randomisation
         self._prepare_drawing(nominal, camera, (width, height), render_mode)
-        self._spec: EnvSpec | None = None
         self._state: WorldState | None = None
         self._first: dict[str, Any] = {}  # commands that go along with an episode's first action
         self._initial = InitialState()
@@ -232,7 +235,8 @@ class RobotEnv(DrawnEnv):
         measured = state if self._sensor is None else self._sensor.begin(state, self.np_random)
         observation = self._observe(measured)
         self._steps = 0
-        self._show()
+        if self.render_mode == "human":
+            self._show()
         return observation, {**checks.checked_info(self.task, self.task.info(state)), **info}
 
     def _checked_options(self, options: dict[str, Any]) -> dict[str, Any]:
@@ -315,7 +319,8 @@ class RobotEnv(DrawnEnv):
         if terminated or truncated:
             self._steps = None
         measured = state if self._sensor is None else self._sensor.measure(state, self.np_random)
-        self._show()
+        if self.render_mode == "human":
+            self._show()
         reward: Any = task.reward(state, action)
         if type(reward) is not float or not math.isfinite(reward):
             reward = checks.checked_number(task, "reward", reward)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from bullet_gazebo.physics.files.reading import Resources
-from bullet_gazebo.state import did_you_mean
 from file_access.content import FileError, read_file
 from file_access.expansion import CannotExpand, expand
+from file_access.text import did_you_mean
 from file_access.yaml_text import load_documents
 from robot_envs.errors import RobotEnvError
 

@@ -5,7 +5,7 @@ import inspect
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from bullet_gazebo.state import did_you_mean
+from file_access.text import did_you_mean
 from robot_envs.checks import short
 from robot_envs.environment import RobotEnv
 from robot_envs.errors import RobotEnvError

@@ -14,7 +14,7 @@ from bullet_gazebo.control.transmissions import RobotDescription, read_descripti
 from bullet_gazebo.physics.description import DescriptionError, ModelDescription
 from bullet_gazebo.physics.files.urdf import parse_urdf
 from bullet_gazebo.physics.pose import Pose
-from bullet_gazebo.state import did_you_mean
+from file_access.text import did_you_mean
 from robot_envs import controllers, files
 from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-from bullet_gazebo.state import did_you_mean
+from file_access.text import did_you_mean
 from robot_envs.controllers import CommandPort
 from robot_envs.errors import RobotEnvError, TaskError
 from robot_envs.robot import Robot, unfit_pose

@@ -8,7 +8,8 @@ from bullet_gazebo.physics.engine import Twist
 from bullet_gazebo.physics.model import AT_REST
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.physics.world import seen_from
-from bullet_gazebo.state import ContactPair, LinkQuery, StateQuery, did_you_mean
+from bullet_gazebo.state import ContactPair, LinkQuery, StateQuery
+from file_access.text import did_you_mean
 
 __all__ = [
     "Command",

@@ -9,18 +9,6 @@ START = "roslaunch gazebo_ros empty_world.launch"
 WORLD = "get_world_properties"  # every simulator has it
 LOCKSTEP = ("step_world", "prepare_step", "prepared_step", "advance_world", "set_link_friction")
 MANAGER = "controller_manager"
-OF_A_WORLD = (
-    *(WORLD, "pause_physics", "unpause_physics", "reset_world", "reset_simulation", "delete_model"),
-    *(
-        "spawn_urdf_model",
-        "spawn_sdf_model",
-        "get_model_state",
-        "set_model_state",
-        "get_link_state",
-    ),
-    *("set_model_configuration", "get_physics_properties", "set_physics_properties"),
-    *("get_link_properties", "set_link_properties", "set_joint_properties"),
-)
 
 
 def is_offered(service: str) -> bool:
@@ -51,7 +39,7 @@ def why_absent(service: str) -> str:
         return f"the simulator isn't in lock-step; start it with: {START} lockstep:=true"
     if name in LOCKSTEP:
         return f"no simulator runs at {master.uri()}; start one with: {START} lockstep:=true"
-    if name in OF_A_WORLD:
+    if name == WORLD or (last == "gazebo" and not is_offered(f"{parent}/{WORLD}")):
         return f"no simulator runs at {master.uri()}; start one with: {START}"
     if last == MANAGER:
         return (

@@ -40,6 +40,13 @@ __all__ = [
 ]
 
 
+SERVICES = {
+    LoadController: "load_controller",
+    SwitchController: "switch_controller",
+    UnloadController: "unload_controller",
+}
+
+
 class ListResult(int):
     """True if a call succeeded for all controllers of a list; `failed` names the others."""
 
@@ -62,20 +69,7 @@ def _service_name(ns: str | None, service: str) -> str:
     return f"{(ns or '').rstrip('/')}/controller_manager/{service}"
 
 
-def _states(ns: str | None, timeout: float) -> dict[str, str] | None:
-    """Returns the loaded controllers' states by name, or None if the manager doesn't answer."""
-    try:
-        answer = wait_and_call(
-            _service_name(ns, "list_controllers"), ListControllers, timeout=timeout
-        )
-    except ServiceFailed as fault:
-        _log.error(str(fault))
-        return None
-    return {controller.name: controller.state for controller in answer.controller}
-
-
 def _until_ok(
-    service: str,
     kind: Any,
     request: tuple[Any, ...],
     what: str,
@@ -84,6 +78,7 @@ def _until_ok(
     timeout: float,
 ) -> bool:
     """Calls a service until its answer is ok, at most `max_retries` times; gives up after a failed call."""
+    service = SERVICES[kind]
     try:
         for _ in range(max_retries):
             if wait_and_call(_service_name(ns, service), kind, *request, timeout=timeout).ok:
@@ -110,15 +105,8 @@ def load_controller_srv(
         True once the manager has loaded it. False if it refuses (already loaded, no parameters,
         unknown type or joint) or doesn't answer.
     """
-    return _until_ok(
-        "load_controller",
-        LoadController,
-        (controller_name,),
-        controller_name,
-        ns,
-        max_retries,
-        service_timeout,
-    )
+    request = (controller_name,)
+    return _until_ok(LoadController, request, controller_name, ns, max_retries, service_timeout)
 
 
 def load_controller_list_srv(
@@ -154,15 +142,8 @@ def unload_controller_srv(
     Returns:
         True once it is unloaded. False if it runs, is unknown, or the manager doesn't answer.
     """
-    return _until_ok(
-        "unload_controller",
-        UnloadController,
-        (controller_name,),
-        controller_name,
-        ns,
-        max_retries,
-        service_timeout,
-    )
+    request = (controller_name,)
+    return _until_ok(UnloadController, request, controller_name, ns, max_retries, service_timeout)
 
 
 def unload_controller_list_srv(
@@ -215,9 +196,7 @@ def switch_controllers_srv(
     request = (list(start_controllers), list(stop_controllers), strictness, start_asap, timeout)
     what = f"start {_names(start_controllers)}, stop {_names(stop_controllers)}"
     patience = max(service_timeout, timeout + 2.0)  # the manager gives up after timeout + 1 s
-    return _until_ok(
-        "switch_controller", SwitchController, request, what, ns, max_retries, patience
-    )
+    return _until_ok(SwitchController, request, what, ns, max_retries, patience)
 
 
 def start_controllers_srv(
@@ -297,7 +276,7 @@ def spawn_controllers_srv(
         True if all are loaded and the manager has started them. If one can't be loaded, the others
         still start.
     """
-    known = _states(ns, service_timeout)
+    known = list_controllers_srv(ns, service_timeout=service_timeout)
     if known is None:
         return False
     missing = [name for name in spawn_controllers if name not in known]
@@ -341,7 +320,13 @@ def list_controllers_srv(
 
     None, with an error in the log, if the manager doesn't answer.
     """
-    return _states(ns, service_timeout)
+    name = _service_name(ns, "list_controllers")
+    try:
+        answer = wait_and_call(name, ListControllers, timeout=service_timeout)
+    except ServiceFailed as fault:
+        _log.error(str(fault))
+        return None
+    return {controller.name: controller.state for controller in answer.controller}
 
 
 def list_controller_types_srv(

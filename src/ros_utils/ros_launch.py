@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Mapping, Sequence
 
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
 from ros_utils._internal import packages as _packages
-from ros_utils._internal import processes as _processes
 from ros_utils._internal import programs as _programs
 from ros_utils._internal import roslaunch as _roslaunch
-from ros_utils._internal.programs import (
-    CannotStart,
-    Handle,
-    Readiness,
-    Started,
-    wait_for_world,
-    wait_until_ready,
-)
+from ros_utils._internal.programs import CannotStart, Started, await_start
 from ros_utils.readiness import Ready
 
 
@@ -106,12 +97,9 @@ def ros_launch_from_path(
             return False
         if not wait:
             return Started(handle)
-        begin = time.monotonic()
-        readiness = wait_until_ready(
-            lambda: _roslaunch.list_processes(handle) is not None, handle, timeout
+        return await_start(
+            handle, lambda: _roslaunch.has_started(handle), "nothing runs", timeout, ready
         )
-        started = _report(handle, readiness, timeout)
-        return started and wait_for_world(started, ready, handle, begin, timeout)
 
 
 def ros_kill_launch_process() -> bool:
@@ -120,18 +108,4 @@ def ros_kill_launch_process() -> bool:
     Returns:
         True if none is left.
     """
-    return _programs.end([entry for entry in _processes.started() if entry.kind == "launch"])
-
-
-def _report(handle: Handle, readiness: Readiness, timeout: float) -> Started | bool:
-    label = handle.start.label
-    if readiness is Readiness.LATE:
-        _log.error(f"{label}: nothing runs after {timeout:g} s; ended it{handle.where()}")
-        handle.end()
-        return False
-    if readiness is Readiness.READY:
-        _roslaunch.let_settle(handle)
-    code = handle.exit_code()
-    if code:
-        _log.error(f"{label}: ended with exit code {code}: {handle.reason()}{handle.where()}")
-    return False if code else Started(handle)
+    return _programs.end([entry for entry in _programs.started() if entry.kind == "launch"])

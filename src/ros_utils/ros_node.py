@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import time
 from collections.abc import Mapping, Sequence
 
 import rosgraph
@@ -15,16 +14,8 @@ from ros_calls import master as _master
 from ros_utils._internal import log as _log
 from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import packages as _packages
-from ros_utils._internal import processes as _processes
 from ros_utils._internal import programs as _programs
-from ros_utils._internal.programs import (
-    CannotStart,
-    Handle,
-    Readiness,
-    Started,
-    wait_for_world,
-    wait_until_ready,
-)
+from ros_utils._internal.programs import CannotStart, Handle, Started, await_start
 from ros_utils.readiness import Ready
 
 
@@ -76,11 +67,7 @@ def ros_node_from_pkg(
     with _master.using(master_uri):
         try:
             command = [_executable(pkg_name, node_name), *_arguments(args), *_remappings(name, ns)]
-            if (
-                launch_master
-                and not _master.is_up()
-                and not _start_master(launch_master_term, timeout)
-            ):
+            if launch_master and not _start_master(launch_master_term, timeout):
                 return False
             _master.require()
             before = set(_nodes.node_uris().values())
@@ -93,23 +80,16 @@ def ros_node_from_pkg(
                 log_file=log_file,
                 env=env,
             )
-        except (
-            _packages.NotFound,
-            CannotStart,
-            _master.MasterDown,
-            ValueError,
-        ) as fault:
+        except (_packages.NotFound, CannotStart, _master.MasterDown, ValueError) as fault:
             _log.error(f"{label}: {fault}")
             return False
         if not wait:
             return Started(handle)
-        begin = time.monotonic()
         full_name = rosgraph.names.ns_join(_global(ns), name) if name else None
-        readiness = wait_until_ready(
-            lambda: _is_registered(handle, full_name, before), handle, timeout
+        absent = f"not registered at {_master.uri()} (for a program that is no node: wait=False)"
+        return await_start(
+            handle, lambda: _is_registered(handle, full_name, before), absent, timeout, ready
         )
-        started = _report(handle, readiness, timeout)
-        return started and wait_for_world(started, ready, handle, begin, timeout)
 
 
 def ros_kill_node(node_name: str) -> bool:
@@ -166,7 +146,7 @@ def ros_kill_all_processes() -> bool:
         True if nothing of them is left.
     """
     nodes = _nodes.node_uris()  # asked first: the master may end with the processes
-    gone = _programs.end(_processes.started())
+    gone = _programs.end(_programs.started())
     return _shut_down(nodes) and gone
 
 
@@ -219,19 +199,17 @@ def _remappings(name: str | None, ns: str | None) -> list[str]:
     return [*([f"__name:={name}"] if name else []), f"__ns:={_global(ns)}"]
 
 
-def _start_master(window: bool, timeout: float) -> bool:
-    """Starts a master at ROS_MASTER_URI."""
-    _master.is_up_or_startable()
+def _start_master(window: bool, timeout: float) -> Started | bool:
+    """Starts a master at ROS_MASTER_URI, unless there is one; returns whether there is one now."""
+    if _master.is_up_or_startable():
+        return True
     port = str(_master.host_and_port()[1])
     handle = _programs.start(["roscore", "-p", port], "master", "roscore", window=window)
-    readiness = wait_until_ready(
-        lambda: _master.is_up() and "/rosout" in _nodes.node_names(), handle, timeout
-    )
-    if readiness is Readiness.READY:
-        return True
-    _log.error(f"roscore: not up after {timeout:g} s: {handle.reason()}{handle.where()}")
-    handle.end()
-    return False
+
+    def is_up() -> bool:
+        return _master.is_up() and "/rosout" in _nodes.node_names()
+
+    return await_start(handle, is_up, "not up", timeout, None, may_end=False)
 
 
 def _is_registered(handle: Handle, name: str | None, before: set[str]) -> bool:
@@ -239,18 +217,3 @@ def _is_registered(handle: Handle, name: str | None, before: set[str]) -> bool:
     addresses = [_nodes.node_uri(name)] if name else list(_nodes.node_uris().values())
     new = [address for address in addresses if address and address not in before]
     return any(handle.owns(_nodes.node_pid(address)) for address in new)
-
-
-def _report(handle: Handle, readiness: Readiness, timeout: float) -> Started | bool:
-    label = handle.start.label
-    if readiness is Readiness.LATE:
-        _log.error(
-            f"{label}: not registered at {_master.uri()} after {timeout:g} s; ended it:"
-            f" {handle.reason()}{handle.where()}. For a program that is no node: wait=False"
-        )
-        handle.end()
-        return False
-    code = handle.exit_code() if readiness is Readiness.ENDED else 0
-    if code:
-        _log.error(f"{label}: ended with exit code {code}: {handle.reason()}{handle.where()}")
-    return False if code else Started(handle)

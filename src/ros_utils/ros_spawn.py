@@ -93,29 +93,18 @@ def spawn_model_in_gazebo(
     Returns:
         True if every stage succeeded. The first failure ends the call; earlier stages aren't undone.
     """
-    if not ros_urdf.urdf_load_from_pkg(
-        pkg_name,
-        model_urdf_file,
-        "robot_description",
-        folder=model_urdf_folder,
-        ns=ns,
-        args_xacro=args_xacro,
-    ):
+    model = (pkg_name, model_urdf_file, "robot_description", model_urdf_folder)
+    if not ros_urdf.urdf_load_from_pkg(*model, ns, args_xacro):
         return False
     if not init_robot_state_pub(ns, max_pub_freq, rob_st_term):
         return False
+    pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     spawned, _ = ros_gazebo.gazebo_spawn_urdf_param(
         "robot_description",
         gazebo_name,
         ns,
         gaz_ref_frame,
-        pos_x,
-        pos_y,
-        pos_z,
-        ori_x,
-        ori_y,
-        ori_z,
-        ori_w,
+        *pose,
         timeout=timeout,
         gazebo_ns=gazebo_ns,
         verify=verify,

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
 from ros_utils._internal import params as _params
-from ros_utils._internal import urdf as _urdf
-from ros_utils._internal.urdf import urdf_parse_from_path, urdf_parse_from_pkg
+from ros_utils._internal.packages import urdf_parse_from_path, urdf_parse_from_pkg
 
 __all__ = [
     "urdf_load_from_path",
@@ -41,8 +40,8 @@ def urdf_load_from_pkg(
         True if the parameter was set. False, with an error in the log, if the package or file is
         missing, the file is broken, or no master answers.
     """
-    path = _urdf.find("urdf_load_from_pkg", pkg_name, folder, model_name)
-    return path is not None and urdf_load_from_path(path, param_name, ns, args_xacro)
+    xml = urdf_parse_from_pkg(pkg_name, model_name, folder, args_xacro)
+    return xml is not None and _load(xml, param_name, ns)
 
 
 def urdf_load_from_path(
@@ -50,8 +49,10 @@ def urdf_load_from_path(
 ) -> bool:
     """Expands a URDF or xacro file and sets it as a parameter. See `urdf_load_from_pkg`."""
     xml = urdf_parse_from_path(model_path, args_xacro)
-    if xml is None:
-        return False
+    return xml is not None and _load(xml, param_name, ns)
+
+
+def _load(xml: str, param_name: str, ns: str | None) -> bool:
     name = param_name if ns in (None, "", "/") else f"{ns}/{param_name}"
     try:
         _params.put(name, xml)

@@ -16,7 +16,6 @@ from __future__ import annotations
 import contextlib
 import os
 import socket
-from types import TracebackType
 from typing import Any
 
 from ros_calls import master as _master
@@ -115,10 +114,5 @@ class Simulation:
     def __enter__(self) -> Simulation:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

@@ -2,7 +2,7 @@
 
 import threading
 
-from file_access.content import one_line
+from file_access.text import one_line
 
 
 class ControlError(ValueError):

@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from bullet_gazebo.physics.pose import Pose, Vector
-from file_access.content import one_line
+from file_access.text import one_line
 
 MOVABLE = ("revolute", "continuous", "prismatic")
 

@@ -1,14 +1,12 @@
 """Models, lights and contacts as nodes of viser's web page; knows no ROS."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import viser
 
 from bullet_gazebo.physics.description import Light
 from bullet_gazebo.physics.files.elements import shown
-from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.pictures.page_batches import NUMBERS, Batches, Singles
 from bullet_gazebo.pictures.page_shapes import ShapeMaker, color_bytes
 from bullet_gazebo.pictures.visuals import VisibleModel
@@ -17,19 +15,6 @@ STILL = 1e-6  # [m], and of a quaternion's parts: smaller moves aren't sent
 NOWHERE = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 CONTACT = 0.02  # [m]; size of a contact point
 RED = (220, 30, 30)
-
-
-@dataclass
-class DrawnModel:
-    """A model on the page."""
-
-    seen: VisibleModel
-
-    def pose(self, links: np.ndarray) -> Pose:
-        """Returns where the model's frame is, from the poses (n, 7) of its links."""
-        row = links[self.seen.root].tolist()
-        root = Pose((row[0], row[1], row[2]), (row[3], row[4], row[5], row[6]))
-        return root.compose(self.seen.frame)
 
 
 class Picture:
@@ -48,7 +33,7 @@ class Picture:
         self._batches = Batches(server.scene, below)
         self._singles = Singles(below)
         self._shapes = ShapeMaker(server.scene, self._batches, self._singles, warn)
-        self.models: dict[int, DrawnModel] = {}  # in the scene's order
+        self.models: dict[int, VisibleModel] = {}  # in the scene's order
         self._first: dict[int, int] = {}  # each model's first row in the poses
         self._lights: list[viser.SceneNodeHandle] = []
         self._lit: list[Light] | None = None
@@ -69,11 +54,9 @@ class Picture:
                 if model.number not in self.models:
                     self._add(model, joint_frames)
             drawn = self.models
-            self.models = {
-                model.number: drawn.get(model.number) or DrawnModel(model) for model in models
-            }
+            self.models = {model.number: drawn.get(model.number, model) for model in models}
             self._light(list(lights))
-        counts = [len(model.seen.links) for model in self.models.values()]
+        counts = [len(model.links) for model in self.models.values()]
         starts = np.cumsum([0, *counts]).tolist()
         self._first = dict(zip(self.models, starts, strict=False))
         self._batches.settle(self._first)
@@ -156,17 +139,17 @@ class Picture:
         found = {}
         for number, model in self.models.items():
             first = self._first[number]
-            rows = self._last[first : first + len(model.seen.links)]
-            if len(rows) and np.isfinite(rows[model.seen.root]).all():
-                found[model.seen.name] = rows
+            rows = self._last[first : first + len(model.links)]
+            if len(rows) and np.isfinite(rows[model.root]).all():
+                found[model.name] = rows
         return found
 
     def joints(self, positions: Sequence[float]) -> dict[str, list[float]]:
         """Returns the positions [rad, m] of all joints by model."""
         found, first = {}, 0
         for model in self.models.values():
-            count = len(model.seen.joints)
-            found[model.seen.name] = list(positions[first : first + count])
+            count = len(model.joints)
+            found[model.name] = list(positions[first : first + count])
             first += count
         return found
 

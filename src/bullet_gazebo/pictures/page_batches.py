@@ -43,22 +43,18 @@ class Appearance(NamedTuple):
     shadow: bool = True
 
 
-class Instance(NamedTuple):
-    """A shape in its link: its pose there, its size as factors of its geometry's, its colour."""
+Where = tuple[int, int]
+"""A model's number and the index of one of its links."""
 
+
+class Instance(NamedTuple):
+    """A shape of a link: its pose there, its size as factors of its geometry's, its colour."""
+
+    where: Where
     pose: Pose
     scale: tuple[float, float, float]
     color: tuple[int, int, int]
     opacity: float = 1.0
-
-
-@dataclass
-class _Entry:
-    """An instance, with its link and its model's number."""
-
-    number: int
-    link: int
-    instance: Instance
 
 
 class Batches:
@@ -69,7 +65,7 @@ class Batches:
         self._batches: dict[Appearance, list[_Batch]] = defaultdict(list)
         self._made = 0
 
-    def add(self, number: int, link: int, look: Appearance, instance: Instance) -> None:
+    def add(self, look: Appearance, instance: Instance) -> None:
         """Adds an instance; it is drawn with the next `move` after `settle`."""
         batches = self._batches[look]
         batch = next(
@@ -79,7 +75,7 @@ class Batches:
             self._made += 1
             batch = _Batch(self._scene, f"{self._below}/batch{self._made}", look)
             batches.append(batch)
-        batch.add(_Entry(number, link, instance))
+        batch.add(instance)
 
     def remove(self, numbers: set[int]) -> None:
         """Removes all instances of these models."""
@@ -110,26 +106,23 @@ class _Batch:
         self._scene, self._name, self._look = scene, name, look
         self._handle: Any = None
         self._changed = False  # its entries
-        self.entries: list[_Entry] = []
+        self.entries: list[Instance] = []
 
-    def add(self, entry: _Entry) -> None:
+    def add(self, entry: Instance) -> None:
         self.entries.append(entry)
         self._changed = True
 
     def remove(self, numbers: set[int]) -> None:
-        kept = [each for each in self.entries if each.number not in numbers]
+        kept = [each for each in self.entries if each.where[0] not in numbers]
         self._changed |= len(kept) < len(self.entries)
         self.entries = kept
         if not kept and self._handle is not None:
             self._handle.remove()
 
     def settle(self, first: dict[int, int]) -> None:
-        self._rows = np.array([first[each.number] + each.link for each in self.entries])
+        self._rows = np.array([first[model] + link for (model, link), *_ in self.entries])
         self._inner = np.array(
-            [
-                (*each.instance.pose.position, *each.instance.pose.orientation)
-                for each in self.entries
-            ]
+            [(*pose.position, *pose.orientation) for _, pose, *_ in self.entries]
         )
 
     def move(self, poses: np.ndarray, moved: np.ndarray) -> None:
@@ -171,24 +164,22 @@ class _Batch:
 
     @property
     def _scales(self) -> np.ndarray:
-        return np.array([each.instance.scale for each in self.entries], dtype=np.float32)
+        return np.array([each.scale for each in self.entries], dtype=np.float32)
 
     @property
     def _colors(self) -> np.ndarray:
         """Linear colours: the page takes those of batches as linear, and others as sRGB."""
-        screen = np.array([each.instance.color for each in self.entries]) / 255.0
+        screen = np.array([each.color for each in self.entries]) / 255.0
         light = np.where(screen <= 0.04045, screen / 12.92, ((screen + 0.055) / 1.055) ** 2.4)
         return np.rint(255.0 * light).astype(np.uint8)
 
     @property
     def _opacities(self) -> np.ndarray:
-        return np.array([each.instance.opacity for each in self.entries], dtype=np.float32)
+        return np.array([each.opacity for each in self.entries], dtype=np.float32)
 
 
-@dataclass
-class _Single:
-    number: int
-    link: int
+class _Single(NamedTuple):
+    where: Where
     inner: np.ndarray  # pose (7,) in the link
     node: viser.SceneNodeHandle
 
@@ -206,20 +197,20 @@ class Singles:
         self._named += 1
         return f"{self._below}/single{self._named}"
 
-    def add(self, number: int, link: int, inner: np.ndarray, node: viser.SceneNodeHandle) -> None:
+    def add(self, where: Where, inner: np.ndarray, node: viser.SceneNodeHandle) -> None:
         """Moves a node with a link of a model, at a pose (7,) in it."""
-        self._all.append(_Single(number, link, inner, node))
+        self._all.append(_Single(where, inner, node))
 
     def remove(self, numbers: set[int]) -> None:
         """Removes all nodes of these models."""
         for each in self._all:
-            if each.number in numbers:
+            if each.where[0] in numbers:
                 each.node.remove()
-        self._all = [each for each in self._all if each.number not in numbers]
+        self._all = [each for each in self._all if each.where[0] not in numbers]
 
     def settle(self, first: dict[int, int]) -> None:
         """Sets the row of the poses at which each model begins."""
-        self._rows = np.array([first[each.number] + each.link for each in self._all], dtype=int)
+        self._rows = np.array([first[model] + link for (model, link), *_ in self._all], dtype=int)
         self._inner = np.array([each.inner for each in self._all]).reshape(-1, 7)
 
     def move(self, poses: np.ndarray, moved: np.ndarray) -> None:

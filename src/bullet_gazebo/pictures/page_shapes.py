@@ -3,15 +3,16 @@
 import math
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
+from typing import Any
 
 import numpy as np
 import viser
 from trimesh import creation
 
-from bullet_gazebo.physics.description import Color, DescriptionError, Shape
+from bullet_gazebo.physics.description import Color, DescriptionError, Joint, Shape
 from bullet_gazebo.physics.files.elements import shown
+from bullet_gazebo.physics.files.meshes import read_look
 from bullet_gazebo.physics.pose import Pose, Vector, rotate
-from bullet_gazebo.pictures.looks import MeshLook, read_look
 from bullet_gazebo.pictures.page_batches import (
     Appearance,
     Batches,
@@ -19,8 +20,9 @@ from bullet_gazebo.pictures.page_batches import (
     GlbFile,
     Instance,
     Singles,
+    Where,
 )
-from bullet_gazebo.pictures.visuals import GREY, ROUNDS, SIDES, VisibleJoint
+from bullet_gazebo.pictures.visuals import GREY, ROUNDS, SIDES
 
 COLLISION = (1.0, 0.5, 0.0, 0.35)
 UNSHOWN = (1.0, 0.0, 1.0, 1.0)  # a box in place of a shape that can't be shown
@@ -32,9 +34,6 @@ OWN_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 AXES_COLORS = ((225, 0, 0), (0, 190, 0), (0, 0, 225))
 MOST_NAMES = 200  # of joints; each is a node of its own
 MOST_FILES = 32
-
-Where = tuple[int, int]
-"""A model's number and the index of one of its links."""
 
 
 class ShapeMaker:
@@ -58,8 +57,11 @@ class ShapeMaker:
         self._warn = warn
         self._complained: set[str] = set()
         self._names = 0
-        self._geometry_of = lru_cache(MOST_FILES)(_geometry_of)
-        self._glb_of = lru_cache(MOST_FILES)(_glb_of)
+        # One object for each file, so that its shapes are in the same batch.
+        self._geometry_of = lru_cache(MOST_FILES)(
+            lambda look: _geometry(look.mesh.vertices, look.mesh.faces, side="double")
+        )
+        self._glb_of = lru_cache(MOST_FILES)(lambda look: GlbFile(look.glb))
 
     def add(self, where: Where, shape: Shape, what: str, collision: bool) -> None:
         """Adds a shape of a link; `what` it is, for the log."""
@@ -82,10 +84,10 @@ class ShapeMaker:
             complaint = f"{what}: a shape '{shown(shape.kind)}' is not known"
             self._add_unshown(where, complaint, shape.pose)
 
-    def add_joint(self, where: Where, joint: VisibleJoint) -> None:
+    def add_joint(self, where: Where, joint: Joint) -> None:
         """Adds a joint's frame, axis and name; `where` is the link that it moves."""
         self._names += 1
-        corner, turn = joint.frame
+        corner, turn = joint.anchor
         for own, color in zip(OWN_AXES, AXES_COLORS, strict=True):
             self._add_rod(where, corner, rotate(turn, own), (0.0, AXES), AXES / 25, color)
         axis = rotate(turn, joint.axis)
@@ -93,7 +95,7 @@ class ShapeMaker:
         if self._names <= MOST_NAMES:
             end = np.array(corner) + 2.0 * AXES * np.array(axis)
             label = self._scene.add_label(self._singles.name(), shown(joint.name))
-            self._singles.add(*where, np.array([*end, 0.0, 0.0, 0.0, 1.0]), label)
+            self._singles.add(where, np.array([*end, 0.0, 0.0, 0.0, 1.0]), label)
 
     def clear(self) -> None:
         """Counts names from 0 again, after everything was removed."""
@@ -110,7 +112,7 @@ class ShapeMaker:
     ) -> None:
         opacity = min(max(rgba[3], 0.0), 1.0)
         look = Appearance(solid, math.prod(scale) < 0.0, opacity < 1.0, not collision)
-        self._batches.add(*where, look, Instance(pose, scale, color_bytes(rgba), opacity))
+        self._batches.add(look, Instance(where, pose, scale, color_bytes(rgba), opacity))
 
     def _add_plane(self, where: Where, pose: Pose) -> None:
         plane = self._scene.add_grid(
@@ -118,26 +120,26 @@ class ShapeMaker:
             cell_color=(205, 205, 205), section_color=(170, 170, 170), plane_color=(235, 235, 235),
             plane_opacity=1.0,
         )  # fmt: skip
-        self._singles.add(*where, _numbers(pose), plane)
+        self._singles.add(where, _numbers(pose), plane)
 
     def _add_mesh(
         self, where: Where, shape: Shape, what: str, rgba: Color, collision: bool
     ) -> None:
         try:
-            mesh = read_look(shape.mesh)
+            look = read_look(shape.mesh)
         except DescriptionError as error:
             self._add_unshown(where, f"{what}: {error}", shape.pose)
             return
         x, y, z = shape.size if len(shape.size) == 3 else (1.0, 1.0, 1.0)
-        if mesh.glb is not None and not collision:
+        if look.glb is not None and not collision:
             if x * y * z < 0.0:  # mirrored: in a batch it would show its back
-                whole = self._scene.add_glb(self._singles.name(), mesh.glb, scale=(x, y, z))
-                self._singles.add(*where, _numbers(shape.pose), whole)
+                whole = self._scene.add_glb(self._singles.name(), look.glb, scale=(x, y, z))
+                self._singles.add(where, _numbers(shape.pose), whole)
             else:
-                part = Instance(shape.pose, (x, y, z), color_bytes(rgba))
-                self._batches.add(*where, Appearance(self._glb_of(mesh)), part)
+                part = Instance(where, shape.pose, (x, y, z), color_bytes(rgba))
+                self._batches.add(Appearance(self._glb_of(look)), part)
             return
-        self._add_part(where, self._geometry_of(mesh), shape.pose, (x, y, z), rgba, collision)
+        self._add_part(where, self._geometry_of(look), shape.pose, (x, y, z), rgba, collision)
 
     def _add_unshown(self, where: Where, complaint: str, pose: Pose) -> None:
         if complaint not in self._complained:
@@ -157,27 +159,22 @@ class ShapeMaker:
         """Adds a thin cylinder along `way`, between two distances [m] from `corner`."""
         low, high = ends
         x, y, z = np.array(corner) + (low + high) / 2.0 * np.array(way)
-        part = Instance(Pose((x, y, z), _turned(way)), (radius, radius, high - low), color)
-        self._batches.add(*where, Appearance(_cylinder(), shadow=False), part)
-
-
-def _glb_of(mesh: MeshLook) -> GlbFile:
-    assert mesh.glb is not None
-    return GlbFile(mesh.glb)
+        part = Instance(where, Pose((x, y, z), _turned(way)), (radius, radius, high - low), color)
+        self._batches.add(Appearance(_cylinder(), shadow=False), part)
 
 
 @cache
 def _box() -> Geometry:
     """Returns a cube with sides of 1 m."""
     cube = creation.box((1.0, 1.0, 1.0))
-    return Geometry(_singles(cube.vertices), _indices(cube.faces))
+    return _geometry(cube.vertices, cube.faces)
 
 
 @cache
 def _ball() -> Geometry:
     """Returns a ball with a radius of 1 m."""
     found = creation.icosphere(subdivisions=ROUNDS)
-    return Geometry(_singles(found.vertices), _indices(found.faces), flat=False)
+    return _geometry(found.vertices, found.faces, flat=False)
 
 
 @cache
@@ -197,20 +194,12 @@ def _cylinder() -> Geometry:
         (middles + 1, 3 * SIDES + here, 3 * SIDES + following),
     ]
     faces = np.concatenate([np.column_stack(corners) for corners in triangles])
-    return Geometry(_singles(vertices), _indices(faces), flat=False)
+    return _geometry(vertices, faces, flat=False)
 
 
-def _geometry_of(mesh: MeshLook) -> Geometry:
-    """Returns the triangles of a file, visible from both sides."""
-    return Geometry(_singles(mesh.vertices), _indices(mesh.faces), side="double")
-
-
-def _singles(vertices: np.ndarray) -> np.ndarray:
-    return np.asarray(vertices, dtype=np.float32)
-
-
-def _indices(faces: np.ndarray) -> np.ndarray:
-    return np.asarray(faces, dtype=np.uint32)
+def _geometry(vertices: np.ndarray, faces: np.ndarray, **look: Any) -> Geometry:
+    """Returns a geometry of the numbers' types that the page takes."""
+    return Geometry(np.asarray(vertices, np.float32), np.asarray(faces, np.uint32), **look)
 
 
 def _turned(way: Vector) -> tuple[float, float, float, float]:

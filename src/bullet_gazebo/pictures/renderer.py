@@ -8,6 +8,8 @@ import hashlib
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +20,6 @@ from bullet_gazebo.physics.engines.quiet_pybullet import pybullet
 from bullet_gazebo.physics.pose import IDENTITY, Pose, Vector, is_finite
 from bullet_gazebo.pictures.camera import Background, Camera, background
 from bullet_gazebo.pictures.visuals import Piece, Solid, box_around, moved, pieces_of
-from bullet_gazebo.scratch import scratch_folder
 
 MOST_CORNERS = 90_000  # of a body: PyBullet refuses more than 131072
 FARTHEST = 1e6  # [m]; beyond it nothing is drawn
@@ -39,13 +40,13 @@ class Textures:
         self._client = client
         self._numbers: dict[bytes, int] = {}
 
-    def number(self, image: Image.Image) -> int:
-        """Returns PyBullet's number of an RGB image."""
-        digest = hashlib.sha256(repr(image.size).encode() + image.tobytes()).digest()
+    def number(self, image: np.ndarray) -> int:
+        """Returns PyBullet's number of an RGB image (h, w, 3) of uint8."""
+        digest = hashlib.sha256(repr(image.shape).encode() + image.tobytes()).digest()
         if digest not in self._numbers:
-            with scratch_folder() as folder:
-                path = folder / "texture.png"
-                image.save(path, compress_level=1)
+            with TemporaryDirectory() as folder:
+                path = Path(folder, "texture.png")
+                Image.fromarray(image).save(path, compress_level=1)
                 self._numbers[digest] = pybullet.loadTexture(
                     str(path), physicsClientId=self._client
                 )
@@ -107,19 +108,6 @@ class DrawnPart:
         pybullet.removeBody(self.body, physicsClientId=self._client)
 
 
-def drawn_parts(client: int, link: str, shape: Shape, textures: Textures) -> list[DrawnPart]:
-    """Adds a shape to PyBullet's renderer.
-
-    Raises:
-        DescriptionError: a mesh file can't be read.
-    """
-    return [
-        DrawnPart(client, link, shape, small, textures)
-        for piece in pieces_of(shape)
-        for small in _small(piece)
-    ]
-
-
 def _small(piece: Piece) -> Iterator[Piece]:
     """Splits a piece into sizes that PyBullet takes."""
     for start in range(0, len(piece.solid.corners), MOST_CORNERS):
@@ -155,7 +143,8 @@ class Renderer:
         self._models[name] = parts = []
         for link, shape in shapes:
             try:
-                parts += drawn_parts(self._client, link, shape, self._textures)
+                for piece in (small for whole in pieces_of(shape) for small in _small(whole)):
+                    parts.append(DrawnPart(self._client, link, shape, piece, self._textures))
             except DescriptionError as error:
                 logger.warning("model '%s', link '%s' isn't drawn whole: %s", name, link, error)
 

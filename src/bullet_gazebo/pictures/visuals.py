@@ -3,59 +3,39 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from bullet_gazebo.physics.description import Color, Joint, ModelDescription, Shape
-from bullet_gazebo.physics.pose import Pose, Vector, rotate
-from bullet_gazebo.pictures.looks import read_look
-
-if TYPE_CHECKING:  # a simulator only asks for the visible shapes
-    from PIL import Image
+from bullet_gazebo.physics.description import Color, Joint, Link, ModelDescription, Shape
+from bullet_gazebo.physics.files.meshes import read_look
+from bullet_gazebo.physics.pose import Pose, rotate
 
 GREY: Color = (0.7, 0.7, 0.72, 1.0)  # of a shape without a colour
-NO_STOP = (1.0, 0.0)  # limits of a joint without any: the lower one above the upper one
 SIDES = 40  # of a cylinder
 MOST_RINGS = 16  # of a prism
 ROUNDS = 3  # of dividing a ball's triangles
 
 
 @dataclass(frozen=True)
-class VisibleLink:
-    """A link's shapes, in its frame; collisions only where they are to be shown."""
-
-    name: str
-    visuals: Sequence[Shape]
-    collisions: Sequence[Shape] = ()
-
-
-@dataclass(frozen=True)
-class VisibleJoint:
-    """A movable joint. `frame` is its own, in the child link, `axis` is given in it. Limits in [rad, m]."""
-
-    name: str
-    kind: str
-    child: str
-    frame: Pose
-    axis: Vector
-    lower: float
-    upper: float
-
-
-@dataclass(frozen=True)
 class VisibleModel:
-    """A model. `number` is unique: another model with its name has another number.
+    """A model's links with their shapes, and its movable joints.
 
-    `root` is the index of its root link, `frame` the model's frame as seen from that link.
+    `number` is unique: another model with its name has another number. `root` is the index of its root link,
+    `frame` the model's frame as seen from that link.
     """
 
     number: int
     name: str
-    links: Sequence[VisibleLink] = ()
-    joints: Sequence[VisibleJoint] = ()
+    links: Sequence[Link] = ()
+    joints: Sequence[Joint] = ()
     root: int = 0
     frame: Pose = Pose()
+
+    def pose(self, links: np.ndarray) -> Pose:
+        """Returns where the model's frame is, from the poses (n, 7) of its links."""
+        x, y, z, qx, qy, qz, qw = links[self.root].tolist()
+        return Pose((x, y, z), (qx, qy, qz, qw)).compose(self.frame)
 
 
 class Solid(NamedTuple):
@@ -66,11 +46,11 @@ class Solid(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """Triangles of one colour or texture; `uvs` (3 n, 2) are as in `looks.MeshPart`."""
+    """Triangles of one colour or texture; `texture` and `uvs` (3 n, 2) as in `MeshPart`."""
 
     solid: Solid
     rgba: Color
-    texture: "Image.Image | None" = None
+    texture: np.ndarray | None = None
     uvs: np.ndarray | None = None
 
 
@@ -87,23 +67,18 @@ def visible_model(
         number,
         name,
         [_link(description, each, collisions) for each in links],
-        [_joint(description.joints[each]) for each in joints],
+        [description.joints[each] for each in joints],
         links.index(description.root) if description.root in links else 0,
         description.root_pose.inverse(),
     )
 
 
-def _link(description: ModelDescription, name: str, collisions: bool) -> VisibleLink:
+def _link(description: ModelDescription, name: str, collisions: bool) -> Link:
     link = description.links[name]
     # A plane is read as a collision only, and the ground has to be visible.
     planes = [shape for shape in link.collisions if shape.kind == "plane"]
-    others = [shape for shape in link.collisions if shape.kind != "plane"]
-    return VisibleLink(name, [*link.visuals, *planes], others if collisions else [])
-
-
-def _joint(joint: Joint) -> VisibleJoint:
-    lower, upper = (joint.lower, joint.upper) if joint.bounded else NO_STOP
-    return VisibleJoint(joint.name, joint.kind, joint.child, joint.anchor, joint.axis, lower, upper)
+    others = [shape for shape in link.collisions if shape.kind != "plane" and collisions]
+    return Link(name, collisions=others, visuals=[*link.visuals, *planes])
 
 
 def visible_shapes(model: ModelDescription) -> list[tuple[str, Shape]]:
@@ -125,7 +100,7 @@ def solid_of(shape: Shape) -> Solid:
         DescriptionError: a mesh file can't be read.
     """
     if shape.kind == "mesh":
-        mesh = shape.solid or read_look(shape.mesh)
+        mesh = shape.solid or read_look(shape.mesh).mesh
         return _flat(_scaled(mesh.vertices[mesh.faces], shape.size))
     if shape.kind == "box":
         return _flat(_box(shape.size))

@@ -1,7 +1,7 @@
 """The scene for windows: what the world looks like, where its links are, and where they touch.
 
 An empty world offers exactly what Gazebo's does (docs/contract/gazebo.md 7), so the service and the topics
-come when a window asks for them through the node's XML-RPC server (node/world_control.py).
+come when a window asks for them through the node's XML-RPC server (`world_services.WorldControl`).
 """
 
 import secrets
@@ -14,19 +14,32 @@ from functools import partial
 
 import numpy as np
 import rospy
-from bullet_gazebo_msgs.msg import SceneContacts, SceneModel, ScenePoses
+from bullet_gazebo_msgs.msg import (
+    SceneContacts,
+    SceneJoint,
+    SceneLight,
+    SceneLink,
+    SceneModel,
+    ScenePoses,
+    SceneShape,
+)
 from bullet_gazebo_msgs.srv import GetScene, GetSceneRequest, GetSceneResponse
+from geometry_msgs.msg import Vector3
+from std_msgs.msg import ColorRGBA
 
+from bullet_gazebo.physics.description import Color, Joint, Light, Link, Shape
 from bullet_gazebo.physics.engine import Contact
-from bullet_gazebo.ros.common.messages import to_time
+from bullet_gazebo.physics.model import Model
+from bullet_gazebo.pictures.visuals import VisibleModel, visible_model
+from bullet_gazebo.ros.common.messages import from_pose_msg, to_pose_msg, to_time, to_vector
 from bullet_gazebo.ros.common.publishing import SubscriberCount
-from bullet_gazebo.ros.scene_messages import to_light, to_model
 from bullet_gazebo.simulator import Simulator
 
 PERIOD = 1.0 / 30.0  # [s of wall time] between two messages of a topic
 PATIENCE = PERIOD / 4  # [s] to wait for a tick, before a resting world is copied without one
 STOP_TIMEOUT = 1.0  # [s]
 REPEAT = 1.0  # [s] between two logs of the same complaint
+NO_STOP = (1.0, 0.0)  # limits of a joint without any: the lower one above the upper one
 
 
 class SceneOffer:
@@ -183,3 +196,113 @@ def _singles(rows: Iterable[Sequence[float]]) -> np.ndarray:
     """Returns all numbers in a row as 32-bit floats; too large ones become infinite."""
     with np.errstate(over="ignore"):
         return np.array([number for row in rows for number in row]).astype(np.float32)
+
+
+def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
+    """Converts the visible parts of a model, with its collision shapes if `collisions`."""
+    description = model.description
+    seen = visible_model(
+        description, number, model.name, model.link_names, model.joint_names, collisions
+    )
+    return SceneModel(
+        number=number,
+        name=model.name,
+        is_static=description.static,
+        links=[
+            SceneLink(link.name, _to_shapes(link.visuals), _to_shapes(link.collisions))
+            for link in seen.links
+        ],
+        joints=[_to_joint(joint) for joint in seen.joints],
+        root=seen.root,
+        frame=to_pose_msg(seen.frame),
+    )
+
+
+def from_model(message: SceneModel) -> VisibleModel:
+    return VisibleModel(
+        message.number,
+        message.name,
+        [
+            Link(
+                link.name,
+                collisions=_from_shapes(link.collisions),
+                visuals=_from_shapes(link.visuals),
+            )
+            for link in message.links
+        ],
+        [_from_joint(joint) for joint in message.joints],
+        message.root,
+        from_pose_msg(message.frame),
+    )
+
+
+def to_light(light: Light) -> SceneLight:
+    return SceneLight(
+        name=light.name,
+        kind=light.kind,
+        diffuse=ColorRGBA(*light.diffuse),
+        pose=to_pose_msg(light.pose),
+        direction=Vector3(*light.direction),
+    )
+
+
+def from_light(message: SceneLight) -> Light:
+    return Light(
+        message.name,
+        diffuse=_from_color(message.diffuse),
+        direction=to_vector(message.direction),
+        pose=from_pose_msg(message.pose),
+        kind=message.kind,
+    )
+
+
+def _to_joint(joint: Joint) -> SceneJoint:
+    lower, upper = (joint.lower, joint.upper) if joint.bounded else NO_STOP
+    frame, axis = to_pose_msg(joint.anchor), Vector3(*joint.axis)
+    return SceneJoint(joint.name, joint.kind, joint.child, frame, axis, lower, upper)
+
+
+def _from_joint(message: SceneJoint) -> Joint:
+    return Joint(
+        message.name,
+        message.kind,
+        parent="",
+        child=message.child,
+        anchor=from_pose_msg(message.frame),
+        axis=to_vector(message.axis),
+        lower=message.lower,
+        upper=message.upper,
+    )
+
+
+def _to_shapes(shapes: Iterable[Shape]) -> list[SceneShape]:
+    return [
+        SceneShape(
+            name=shape.name,
+            kind=shape.kind,
+            size=shape.size,
+            pose=to_pose_msg(shape.pose),
+            mesh=shape.mesh,
+            has_color=shape.rgba is not None,
+            color=ColorRGBA(*(shape.rgba or (0.0, 0.0, 0.0, 0.0))),
+        )
+        for shape in shapes
+    ]
+
+
+def _from_shapes(messages: Iterable[SceneShape]) -> list[Shape]:
+    return [
+        Shape(
+            message.kind,
+            tuple(message.size),
+            from_pose_msg(message.pose),
+            message.mesh,
+            _from_color(message.color) if message.has_color else None,
+            message.name,
+        )
+        for message in messages
+    ]
+
+
+def _from_color(message: ColorRGBA) -> Color:
+    return (message.r, message.g, message.b, message.a)

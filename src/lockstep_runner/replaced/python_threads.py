@@ -7,12 +7,13 @@ time.sleep; with --virtual-wall-clock also time.time, monotonic and perf_counter
 from __future__ import annotations
 
 import concurrent.futures._base as futures
+import contextlib
 import math
 import queue
 import threading
 import time
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import thread as pools
 from dataclasses import dataclass, field
@@ -22,7 +23,9 @@ from weakref import WeakKeyDictionary
 import rospy
 
 from lockstep_runner import originals
+from lockstep_runner.clock import Clock
 from lockstep_runner.looks import LOOK
+from lockstep_runner.notices import tell_once
 from lockstep_runner.runner import ScriptRunner
 from lockstep_runner.script import caller, is_the_script
 
@@ -30,40 +33,66 @@ from lockstep_runner.script import caller, is_the_script
 ROUNDING = 1e-6
 
 
+_rounded = threading.local()  # `passed`: when a thread's time limit was all but over
+
+
 def replace_threads(runner: ScriptRunner) -> None:
     """Replaces the waits of threading, queue and concurrent.futures."""
-    rounded = threading.local()  # `passed`: when a thread's time limit was all but over
+    _replace_waits(runner)
+    _replace_start(runner)
+    begun = originals.monotonic()
 
-    def covered() -> bool:
-        return (
-            is_the_script(2)
-            and not runner.is_over
-            and runner.clock.covers_this_thread()
-            and runner.is_connected()
-        )
+    def time_limits() -> float:
+        """Returns the time [s] for time limits: simulated time where the wait is simulated."""
+        if not _is_covered(runner):
+            return originals.monotonic()
+        passed = runner.clock.passed
+        is_over = vars(_rounded).pop("passed", None) == passed  # once, for the waiting thread
+        return begun + passed / 1e9 + (ROUNDING if is_over else 0.0)
 
+    threading._time = queue.time = time_limits  # type: ignore[attr-defined]
+    futures.time = types.SimpleNamespace(monotonic=time_limits)  # type: ignore[attr-defined]
+
+
+def _is_covered(runner: ScriptRunner) -> bool:
+    """Returns whether the wait that asks is the script's, and takes simulated time."""
+    return (
+        is_the_script(2)
+        and not runner.is_over
+        and runner.clock.covers_this_thread()
+        and runner.is_connected()
+    )
+
+
+def _replace_waits(runner: ScriptRunner) -> None:
     def event_wait(self: threading.Event, timeout: float | None = None) -> bool:
-        if covered():
+        if _is_covered(runner):
             came = runner.wait_for_event(_span(timeout), self.is_set)
             if came or not runner.is_over:
                 return came or self.is_set()
         return originals.event_wait(self, timeout)
 
     def condition_wait(self: threading.Condition, timeout: float | None = None) -> bool:
-        if not covered():
+        if not _is_covered(runner):
             return originals.condition_wait(self, timeout)
         if timeout is not None and 0.0 < timeout < ROUNDING:  # else its caller asks again for ever
-            rounded.passed = runner.clock.passed
+            _rounded.passed = runner.clock.passed
             timeout = 0.0
         return wait_for_notice(runner, self, timeout)
 
     def join(self: threading.Thread, timeout: float | None = None) -> None:
-        if covered() and self is not threading.current_thread():
+        if _is_covered(runner) and self is not threading.current_thread():
             ended = runner.wait(_span(timeout), lambda: not self.is_alive())
             if not (ended or runner.is_over):
                 return
         originals.join(self, timeout)
 
+    threading.Event.wait = event_wait  # type: ignore[method-assign]
+    threading.Condition.wait = condition_wait  # type: ignore[method-assign]
+    threading.Thread.join = join  # type: ignore[method-assign]
+
+
+def _replace_start(runner: ScriptRunner) -> None:
     def start(self: threading.Thread) -> None:
         if not (is_the_script(1) and runner.world.there):
             originals.start(self)
@@ -83,21 +112,7 @@ def replace_threads(runner: ScriptRunner) -> None:
         finally:
             gate.release()
 
-    def time_limits() -> float:
-        """Returns the time [s] for time limits: simulated time where the wait is simulated."""
-        if not covered():
-            return originals.monotonic()
-        passed = runner.clock.passed
-        is_over = vars(rounded).pop("passed", None) == passed  # once, for the waiting thread
-        return begun + passed / 1e9 + (ROUNDING if is_over else 0.0)
-
-    begun = originals.monotonic()
-    threading._time = queue.time = time_limits  # type: ignore[attr-defined]
-    futures.time = types.SimpleNamespace(monotonic=time_limits)  # type: ignore[attr-defined]
     threading.Thread.start = start  # type: ignore[method-assign]
-    threading.Event.wait = event_wait  # type: ignore[method-assign]
-    threading.Condition.wait = condition_wait  # type: ignore[method-assign]
-    threading.Thread.join = join  # type: ignore[method-assign]
 
 
 def wait_for_notice(runner: ScriptRunner, condition: Any, timeout: float | None) -> bool:
@@ -133,11 +148,34 @@ def _span(timeout: float | None) -> float:
 class _Tasks:
     """The tasks of one executor."""
 
+    clock: Clock
     guard: Any = field(default_factory=originals.Condition)
     submitted: int = 0
     begun: int = 0
     busy: int = 0  # threads that run a task
     over: bool = False  # shut down: its threads end after the last task
+
+    def wait_for_begin(self, workers: int) -> None:
+        """Waits until the last task has begun, unless all workers are busy."""
+        self.submitted += 1
+        while self.begun < self.submitted and self.busy < workers:
+            originals.condition_wait(self.guard, LOOK)
+
+    @contextlib.contextmanager
+    def running(self) -> Iterator[None]:
+        """Runs a task in this thread."""
+        with self.guard:
+            self.begun += 1
+            self.busy += 1
+            self.clock.began(threading.current_thread())
+            self.guard.notify_all()
+        try:
+            yield
+        finally:
+            with self.guard:
+                self.busy -= 1
+                if self.begun == self.submitted and not self.over:  # else more tasks wait
+                    self.clock.ended(threading.current_thread())
 
 
 class _Task:
@@ -162,32 +200,16 @@ def replace_futures(runner: ScriptRunner) -> None:
     ) -> Future[Any]:
         if not (is_the_script(1) and runner.world.there):
             return submit(self, call, *args, **kwds)
-        tasks = executors.setdefault(self, _Tasks())
+        tasks = executors.setdefault(self, _Tasks(runner.clock))
         with tasks.guard:
             future = submit(self, _Task(call, tasks), *args, **kwds)
-            tasks.submitted += 1
-            # The task begins before the script goes on, unless all workers are busy
-            while tasks.begun < tasks.submitted and tasks.busy < self._max_workers:
-                originals.condition_wait(tasks.guard, LOOK)
+            tasks.wait_for_begin(self._max_workers)
         return future
 
     def running(item: Any) -> None:
-        if not isinstance(item.fn, _Task):
+        ours = isinstance(item.fn, _Task)
+        with item.fn.tasks.running() if ours else contextlib.nullcontext():
             run(item)
-            return
-        tasks = item.fn.tasks
-        with tasks.guard:
-            tasks.begun += 1
-            tasks.busy += 1
-            runner.clock.began(threading.current_thread())
-            tasks.guard.notify_all()
-        try:
-            run(item)
-        finally:
-            with tasks.guard:
-                tasks.busy -= 1
-                if tasks.begun == tasks.submitted and not tasks.over:  # else more tasks wait
-                    runner.clock.ended(threading.current_thread())
 
     def shutting_down(self: ThreadPoolExecutor, *args: Any, **kwds: Any) -> None:
         tasks = executors.get(self)
@@ -216,14 +238,7 @@ def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
         ):
             originals.sleep(seconds)
         elif _is_wall_time(runner):
-            runner.notices.once(
-                f"sleep {threading.current_thread().name}",
-                f"thread '{threading.current_thread().name}' sleeps by time.sleep, outside the main"
-                " thread: its sleeps are wall time, so that what it does isn't repeatable; rospy.sleep,"
-                " rospy.Rate and rospy.Timer are covered",
-            )
-            runner.clock.ended(threading.current_thread())  # time doesn't wait for this thread
-            originals.sleep(seconds)
+            _sleep_in_wall_time(runner, seconds)
         elif runner.is_connected():
             if seconds < 0:
                 raise ValueError("sleep length must be non-negative")
@@ -240,6 +255,17 @@ def replace_time(runner: ScriptRunner, virtual_wall_clock: bool) -> None:
 
         time.time = lambda: start + simulated()
         time.monotonic = time.perf_counter = simulated
+
+
+def _sleep_in_wall_time(runner: ScriptRunner, seconds: float) -> None:
+    thread = threading.current_thread()
+    tell_once(
+        f"sleep {thread.name}",
+        f"thread '{thread.name}' sleeps by time.sleep, outside the main thread: its sleeps are wall time,"
+        " so that what it does isn't repeatable; rospy.sleep, rospy.Rate and rospy.Timer are covered",
+    )
+    runner.clock.ended(thread)  # time doesn't wait for this thread
+    originals.sleep(seconds)
 
 
 def _is_wall_time(runner: ScriptRunner) -> bool:

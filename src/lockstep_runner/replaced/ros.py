@@ -146,27 +146,31 @@ def replace_services(runner: ScriptRunner) -> None:
         if self.service_class._type == "std_srvs/Empty" and runner.switches(self.resolved_name):
             return self.response_class()
         runner.before_call(self.resolved_name)
-        if self._lockstep_guard.acquire(blocking=False):
-            try:
-                _drop_if_broken(self)
-                answer = call(self, request)
-            except rospy.ServiceException:
-                _drop(self)
-                raise
-            finally:
-                self._lockstep_guard.release()
-        else:  # another thread is calling over this connection
-            proxy = ServiceProxy(self.resolved_name, self.service_class)
-            try:
-                answer = call(proxy, request)
-            finally:
-                proxy.close()
+        answer = _call_kept(self, call, request)
         runner.called(self.resolved_name, lambda: _bytes(request))
         return answer
 
     ServiceProxy.__init__ = beginning
     ServiceProxy.call = calling
     _let_time_pass_with(runner, ServiceClient)
+
+
+def _call_kept(proxy: ServiceProxy, call: Callable[..., Any], request: Any) -> Any:
+    """Calls over the kept connection; over another one while a thread is using that."""
+    if not proxy._lockstep_guard.acquire(blocking=False):
+        other = ServiceProxy(proxy.resolved_name, proxy.service_class)
+        try:
+            return call(other, request)
+        finally:
+            other.close()
+    try:
+        _drop_if_broken(proxy)
+        return call(proxy, request)
+    except rospy.ServiceException:
+        _drop(proxy)
+        raise
+    finally:
+        proxy._lockstep_guard.release()
 
 
 def _let_time_pass_with(runner: ScriptRunner, kind: type[ServiceClient]) -> None:

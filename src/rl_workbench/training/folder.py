@@ -69,7 +69,7 @@ def held(folder: Path, holder: str = "a training") -> Iterator[None]:
     """Keeps a second training out of a run's folder. The lock ends with the process."""
     with contextlib.ExitStack() as holding:
         try:
-            holding.enter_context(locked_folder(folder, wait=False))
+            holding.enter_context(locked_folder(folder))
         except BlockingIOError as error:
             raise WorkbenchError(f"{holder} is running in {folder}") from error
         except OSError as error:

@@ -48,7 +48,7 @@ def make_backend(
         ValueError: for an unknown backend, or a control period that isn't a whole number of physics steps.
         RobotEnvError: if ROS isn't installed, or the robots can't be brought up.
     """
-    from bullet_gazebo.state import did_you_mean
+    from file_access.text import did_you_mean
     from robot_envs.backends.backend import PHYSICS_STEP, ticks_per_action
     from robot_envs.robot import EMPTY
 

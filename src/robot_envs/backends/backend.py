@@ -77,18 +77,6 @@ def ticks_per_action(control_period: float, physics_step: float) -> int:
     return ticks
 
 
-class StartingWorld(Protocol):
-    """A world whose simulator is starting."""
-
-    def connect(self) -> None:
-        """Waits until the simulator can be used."""
-        ...
-
-    def close(self) -> None:
-        """Ends the simulator."""
-        ...
-
-
 class Slot(NamedTuple):
     """The place of a simulator among those that start together, from 1 on."""
 
@@ -104,7 +92,7 @@ class _Group:
     """The simulators of a `side_by_side` block."""
 
     count: int
-    starting: list[StartingWorld] = field(default_factory=list)
+    starting: list[tuple[Callable[[], object], Callable[[], object]]] = field(default_factory=list)
     ends: list[Callable[[], object]] = field(default_factory=list)
 
 
@@ -126,11 +114,11 @@ def side_by_side(count: int) -> Iterator[None]:
     try:
         try:
             yield
-            for world in group.starting:
-                world.connect()
+            for connect, _ in group.starting:
+                connect()
         except BaseException:  # Ctrl-C, too
-            for world in group.starting:
-                world.close()
+            for _, close in group.starting:
+                close()
             raise
         finally:
             for wait in group.ends:
@@ -145,13 +133,13 @@ def next_slot() -> Slot:
     return Slot() if group is None else Slot(len(group.starting) + 1, group.count)
 
 
-def connect_in_turn(world: StartingWorld) -> None:
-    """Connects a world whose simulator is starting: now, or at the end of the block."""
+def connect_in_turn(connect: Callable[[], object], close: Callable[[], object]) -> None:
+    """Connects to a simulator that is starting: now, or at the end of the block; `close` ends it."""
     group = _group.get()
     if group is None:
-        world.connect()
+        connect()
     else:
-        group.starting.append(world)
+        group.starting.append((connect, close))
 
 
 def join_in_turn(join: Callable[[], object]) -> None:

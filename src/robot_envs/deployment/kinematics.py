@@ -11,7 +11,8 @@ from bullet_gazebo.physics.pose import (
     scale,
     subtract,
 )
-from bullet_gazebo.state import SCOPE, did_you_mean
+from bullet_gazebo.state import SCOPE
+from file_access.text import did_you_mean
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.world_state import JointState, LinkQuery, Motion, StateQuery, link_keys

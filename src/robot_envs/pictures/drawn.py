@@ -17,6 +17,7 @@ from robot_envs.world_state import InitialState, WorldState
 if TYPE_CHECKING:
     from viser import ViserServer
 
+    from bullet_gazebo.pictures.renderer import Renderer
     from robot_envs.pictures.page import LivePage, RobotOnPage
 
 __all__ = ["HEIGHT", "WIDTH", "Camera", "DrawnEnv", "RobotPicture"]
@@ -56,8 +57,8 @@ class RobotPicture:
                 raise ValueError(f"a picture's width and height lie in [1, {LARGEST}], not {side}")
         self._size = (int(width), int(height))
         self._camera = camera
-        self._placement = lambda: Placement(robot, base, beside)
-        self._drawn: _DrawnRobot | None = None
+        self._place = lambda: Placement(robot, base, beside)
+        self._loaded: tuple[Placement, Camera, Renderer] | None = None
 
     def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
         """Draws the robot with its joints at these positions [rad, m], by name: (height, width, 3) of uint8.
@@ -65,9 +66,21 @@ class RobotPicture:
         Raises:
             RobotEnvError: if the robot's file can't be read.
         """
-        if self._drawn is None:
-            self._drawn = _DrawnRobot(self._placement(), self._camera, self._size)
-        return self._drawn(positions)
+        placement, camera, renderer = self._loaded = self._loaded or self._load()
+        base = placement.base()
+        for name, poses in placement.poses(positions, base).items():
+            renderer.place(name, poses)
+        if camera.follows:
+            camera = camera.at(add(camera.target, placement.travelled(positions, base)))
+        return renderer.picture(camera, *self._size)
+
+    def _load(self) -> tuple[Placement, Camera, "Renderer"]:
+        from bullet_gazebo.pictures.renderer import Renderer  # loads PyBullet
+
+        placement, renderer = self._place(), Renderer()
+        for name, shapes in placement.models.items():
+            renderer.add(name, shapes)
+        return placement, placement.camera(self._camera, self._size[0] / self._size[1]), renderer
 
     def draw_on(
         self, server: "ViserServer", positions: Callable[[], Mapping[str, float]], beside: int = 0
@@ -79,35 +92,13 @@ class RobotPicture:
         """
         from robot_envs.pictures.page import RobotOnPage
 
-        return RobotOnPage(server, self._placement(), positions, self._camera, self._size, beside)
+        return RobotOnPage(server, self._place(), positions, self._camera, self._size, beside)
 
     def close(self) -> None:
         """Frees what it has loaded; may be called twice."""
-        if self._drawn is not None:
-            self._drawn.scene.close()
-            self._drawn = None
-
-
-class _DrawnRobot:
-    """A robot in a scene, and a camera."""
-
-    def __init__(self, placement: Placement, camera: Camera | None, size: tuple[int, int]) -> None:
-        from bullet_gazebo.pictures.renderer import Renderer  # loads PyBullet
-
-        self._placement, self._size = placement, size
-        self._camera = placement.camera(camera, size[0] / size[1])
-        self.scene = Renderer()
-        for name, shapes in placement.models.items():
-            self.scene.add(name, shapes)
-
-    def __call__(self, positions: Mapping[str, float]) -> np.ndarray:
-        base = self._placement.base()
-        for name, poses in self._placement.poses(positions, base).items():
-            self.scene.place(name, poses)
-        camera = self._camera
-        if camera.follows:
-            camera = camera.at(add(camera.target, self._placement.travelled(positions, base)))
-        return self.scene.picture(camera, *self._size)
+        if self._loaded is not None:
+            self._loaded[2].close()
+            self._loaded = None
 
 
 class DrawnEnv(gymnasium.Env[Any, Any]):
@@ -140,9 +131,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         self._page: LivePage | None = None
 
     def _show(self) -> None:
-        """Shows the state on a page, in the render mode "human"."""
-        if self.render_mode != "human":
-            return
+        """Shows the state on a page, as in the render mode "human"."""
         if self._page is None:
             from robot_envs.pictures.page import LivePage
 

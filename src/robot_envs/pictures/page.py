@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
-from bullet_gazebo.physics.description import Shape
+from bullet_gazebo.physics.description import Link, Shape
 from bullet_gazebo.physics.files.world_file import empty_world
 from bullet_gazebo.physics.pose import IDENTITY, ZERO
 from bullet_gazebo.pictures.camera import Camera, overview
 from bullet_gazebo.pictures.page import Picture
-from bullet_gazebo.pictures.visuals import VisibleLink, VisibleModel, visible_model
+from bullet_gazebo.pictures.visuals import VisibleModel, visible_model
 from robot_envs.pictures.placement import Placement
 from web_viewer.address import LOOPBACK, find_address
 from web_viewer.server import serve, stop
@@ -182,5 +182,6 @@ def _seen(placement: Placement) -> list[VisibleModel]:
             links |= {link: [] for link in placement.description.links}
         for link, shape in shapes:
             links[link].append(shape)
-        models.append(VisibleModel(number, name, [VisibleLink(*each) for each in links.items()]))
+        seen = [Link(link, visuals=visuals) for link, visuals in links.items()]
+        models.append(VisibleModel(number, name, seen))
     return models

@@ -10,7 +10,6 @@ from robot_envs.task import GoalTask
 from robot_envs.testing.rollouts import (
     Subject,
     differences,
-    expect,
     expect_error,
     numbers,
     outside,
@@ -28,19 +27,18 @@ def observations(subject: Subject) -> None:
         for at, given in enumerate(rollout(env, subject.steps, seed=1)):
             seen = given[0]
             wrong = outside(env.observation_space, seen)
-            expect(
-                not wrong, f"observation {at} of a rollout isn't in the observation space: {wrong}"
+            assert not wrong, (
+                f"observation {at} of a rollout isn't in the observation space: {wrong}"
             )
             for array in numbers(seen):
                 finite = array.dtype.kind != "f" or np.isfinite(array).all()
-                expect(bool(finite), f"observation {at} of a rollout isn't finite: {seen!r}")
-            expect(type(given[-1]) is dict, f"an info is {given[-1]!r}, and no dict")
+                assert finite, f"observation {at} of a rollout isn't finite: {seen!r}"
+            assert type(given[-1]) is dict, f"an info is {given[-1]!r}, and no dict"
             if len(given) == 5:
                 kinds = [type(each) for each in given[1:4]]
                 names = ", ".join(kind.__name__ for kind in kinds)
-                expect(
-                    kinds == [float, bool, bool],
-                    f"reward, terminated and truncated are {names}, and not float, bool, bool",
+                assert kinds == [float, bool, bool], (
+                    f"reward, terminated and truncated are {names}, and not float, bool, bool"
                 )
 
 
@@ -51,9 +49,8 @@ def observations_are_new(subject: Subject) -> None:
         first, _ = env.reset(seed=2)
         kept = [array.copy() for array in numbers(first)]
         env.step(env.action_space.sample())
-        expect(
-            same(kept, list(numbers(first))),
-            "an observation has changed with the next step; observe() must make a new array each time",
+        assert same(kept, list(numbers(first))), (
+            "an observation has changed with the next step; observe() must make a new array each time"
         )
 
 
@@ -65,15 +62,14 @@ def ends(subject: Subject) -> None:
         for seed in range(TRIES):
             env.reset(seed=seed)
             _, _, terminated, truncated, _ = env.step(action)
-            expect(
-                terminated or truncated,
-                "an episode with max_steps=1 goes on after its first step",
+            assert terminated or truncated, (
+                "an episode with max_steps=1 goes on after its first step"
             )
-            expect(not (terminated and truncated), "an episode is terminated and truncated at once")
+            assert not (terminated and truncated), "an episode is terminated and truncated at once"
             cut = cut or truncated
             behind = "step() behind an episode's end"
             expect_error(lambda: env.step(action), behind, gymnasium.error.ResetNeeded)
-        expect(cut, f"{TRIES} episodes of random seeds all terminate with their first step")
+        assert cut, f"{TRIES} episodes of random seeds all terminate with their first step"
 
 
 def beginnings(subject: Subject) -> None:
@@ -93,9 +89,8 @@ def beginnings(subject: Subject) -> None:
         for seed in (0, 0):
             env.reset(seed=seed, options=begin)
             states.append(env.state.joints if env.state else {})
-        expect(
-            states[0] == states[1],
-            f"reset() to the same initial_state gives joints {states[0]} and {states[1]}",
+        assert states[0] == states[1], (
+            f"reset() to the same initial_state gives joints {states[0]} and {states[1]}"
         )
 
 
@@ -108,7 +103,7 @@ def wrong_actions(subject: Subject) -> None:
         disturbed = _given(env, actions, _wrong(env.action_space))
         if env.backend.deterministic:
             difference = differences(undisturbed, disturbed)
-            expect(not difference, f"a refused action has moved something: {difference}")
+            assert not difference, f"a refused action has moved something: {difference}"
 
 
 def _given(env: Any, actions: list[Any], wrong: list[Any]) -> list[tuple[Any, ...]]:
@@ -162,12 +157,9 @@ def pictures(subject: Subject) -> None:
         env.action_space.seed(4)
         env.reset(seed=4)
         first = env.render()
-        expect(
-            isinstance(first, np.ndarray)
-            and first.shape == (64, 96, 3)
-            and first.dtype == np.uint8,
-            "render() with width 96 and height 64 gives no array of uint8 of the shape (64, 96, 3)",
-        )
+        assert (
+            isinstance(first, np.ndarray) and first.shape == (64, 96, 3) and first.dtype == np.uint8
+        ), "render() with width 96 and height 64 gives no array of uint8 of the shape (64, 96, 3)"
         for _ in range(subject.steps):
             _, _, terminated, truncated, _ = env.step(env.action_space.sample())
             if terminated or truncated:
@@ -184,24 +176,21 @@ def goals(subject: Subject) -> None:
     """Goals are in their space; rewards are those of `compute_reward`, one by one and all at once."""
     with subject.made() as env:
         if not isinstance(env.task, GoalTask):
-            expect(
-                not hasattr(env, "compute_reward"),
-                "it has compute_reward(), and its task is no GoalTask",
+            assert not hasattr(env, "compute_reward"), (
+                "it has compute_reward(), and its task is no GoalTask"
             )
             return
         given = [each for each in rollout(env, subject.steps, seed=5) if len(each) == 5]
         for seen, reward, _, _, info in given:
             for key in ("achieved_goal", "desired_goal"):
                 wrong = outside(env.observation_space[key], seen[key])  # type: ignore[index]
-                expect(not wrong, f"{key} isn't in the space of goals: {wrong}")
+                assert not wrong, f"{key} isn't in the space of goals: {wrong}"
             alone = env.compute_reward(seen["achieved_goal"], seen["desired_goal"], info)
-            expect(
-                _near(alone, reward) or not env.measures_exactly,
-                f"step() gave the reward {reward}, and compute_reward() of its goals gives {alone}",
+            assert _near(alone, reward) or not env.measures_exactly, (
+                f"step() gave the reward {reward}, and compute_reward() of its goals gives {alone}"
             )
-            expect(
-                type(info.get("is_success")) is bool,
-                f"an info has is_success={info.get('is_success')!r}, and no bool",
+            assert type(info.get("is_success")) is bool, (
+                f"an info has is_success={info.get('is_success')!r}, and no bool"
             )
         _check_all_at_once(env, given)
         _check_own_goal(env)
@@ -213,21 +202,18 @@ def _check_all_at_once(env: Any, given: list[Any]) -> None:
     )
     infos = np.array([each[4] for each in given], object)
     rewards = np.asarray(env.compute_reward(achieved, desired, infos))
-    expect(
-        rewards.shape == (len(given),),
+    assert rewards.shape == (len(given),), (
         f"compute_reward() of {len(given)} goals at once gives the shape {rewards.shape}, and not "
-        f"({len(given)},)",
+        f"({len(given)},)"
     )
     for reward, one, other, info in zip(rewards, achieved, desired, infos, strict=True):
         alone = env.compute_reward(one, other, info)
-        expect(
-            _near(alone, reward),
-            f"compute_reward({one}, {other}) alone gives {alone}, and among others {reward}",
+        assert _near(alone, reward), (
+            f"compute_reward({one}, {other}) alone gives {alone}, and among others {reward}"
         )
     reached = np.asarray(env.task.is_success(achieved, achieved))
-    expect(
-        reached.shape == (len(given),) and bool(reached.all()),
-        f"is_success() of goals that were achieved as they were desired gives {reached}",
+    assert reached.shape == (len(given),) and bool(reached.all()), (
+        f"is_success() of goals that were achieved as they were desired gives {reached}"
     )
 
 
@@ -235,9 +221,8 @@ def _check_own_goal(env: Any) -> None:
     """A requested goal is the episode's, unless it is impossible."""
     wanted = env.task.goals().sample()
     seen, _ = env.reset(seed=6, options={"goal": wanted})
-    expect(
-        np.array_equal(seen["desired_goal"], wanted),
-        f'reset(options={{"goal": {wanted}}}) has the desired goal {seen["desired_goal"]}',
+    assert np.array_equal(seen["desired_goal"], wanted), (
+        f'reset(options={{"goal": {wanted}}}) has the desired goal {seen["desired_goal"]}'
     )
     wrong = np.full_like(wanted, np.nan)
     expect_error(

@@ -13,7 +13,6 @@ from robot_envs.testing.rollouts import (
     Given,
     Subject,
     differences,
-    expect,
     expect_error,
     rollout,
     same,
@@ -27,9 +26,8 @@ def seeding(subject: Subject) -> None:
     """The same seed and actions are bit-identical: again, after other episodes, in another instance."""
     with subject.made() as env:
         if not env.backend.deterministic:
-            expect(
-                env.spec is None or env.spec.nondeterministic,
-                "it never gives the same bits again, and spec.nondeterministic doesn't say so",
+            assert env.spec is None or env.spec.nondeterministic, (
+                "it never gives the same bits again, and spec.nondeterministic doesn't say so"
             )
             return
         first = rollout(env, subject.steps, SEED)
@@ -42,7 +40,7 @@ def seeding(subject: Subject) -> None:
 
 def _expect_same(first: Given, again: Given, when: str) -> None:
     difference = differences(first, again)
-    expect(not difference, f"the same seed and actions give other bits {when}: {difference}")
+    assert not difference, f"the same seed and actions give other bits {when}: {difference}"
 
 
 def two_phases(subject: Subject) -> None:
@@ -63,7 +61,7 @@ def two_phases(subject: Subject) -> None:
         again = rollout(env, subject.steps, SEED, two_phases=True)
         env.begin_step(action)  # dropped by close()
         difference = differences(first, again) if env.backend.deterministic else ""
-        expect(not difference, f"steps that are begun first give other bits: {difference}")
+        assert not difference, f"steps that are begun first give other bits: {difference}"
 
 
 def _samples(env: gymnasium.Env[Any, Any]) -> Iterator[Any]:
@@ -77,7 +75,7 @@ def backends(subject: Subject, other: Subject) -> None:
         with each.made() as env:
             runs.append(rollout(env, subject.steps, SEED))
     difference = differences(*runs)
-    expect(not difference, f"{subject.backend} and {other.backend} give other bits: {difference}")
+    assert not difference, f"{subject.backend} and {other.backend} give other bits: {difference}"
 
 
 def specification(subject: Subject) -> None:
@@ -96,9 +94,8 @@ def specification(subject: Subject) -> None:
     again = gymnasium.make(spec)
     second, _ = again.reset(seed=SEED)
     again.close()
-    expect(
-        same(first, second) or not deterministic,
-        f"made again from its spec it begins with {second!r}, and not with {first!r}",
+    assert same(first, second) or not deterministic, (
+        f"made again from its spec it begins with {second!r}, and not with {first!r}"
     )
 
 
@@ -115,10 +112,9 @@ def vectors(subject: Subject) -> None:
             vector.close()
         for index, (mine, theirs) in enumerate(zip(alone, together, strict=True)):
             for step, (one, other) in enumerate(zip(mine, theirs, strict=True)):
-                expect(
-                    same(one, other),
+                assert same(one, other), (
                     f"environment {index} of {WORLDS} in a vector ({kind}) gives after {step} steps "
-                    f"{other!r}, and alone {one!r}",
+                    f"{other!r}, and alone {one!r}"
                 )
 
 

@@ -37,8 +37,8 @@ class Subject:
         """Makes one without wrappers, and closes it in the end."""
         env = self.make(**{**self._all_options, **options}).unwrapped
         try:
-            expect(isinstance(env, RobotEnv), f"it is {env!r}, and no robot_envs.RobotEnv")
-            yield env  # type: ignore[misc]
+            assert isinstance(env, RobotEnv), f"it is {env!r}, and no robot_envs.RobotEnv"
+            yield env
         finally:
             env.close()
 
@@ -49,12 +49,6 @@ class Subject:
     def over(self, backend: str | None) -> "Subject":
         """Returns the same over another backend."""
         return replace(self, backend=backend)
-
-
-def expect(right: bool, otherwise: str) -> None:
-    """Raises AssertionError with the text `otherwise` unless `right`."""
-    if not right:
-        raise AssertionError(otherwise)
 
 
 def expect_error(call: Callable[[], Any], what: str, *kinds: type[Exception]) -> None:

@@ -10,7 +10,7 @@ from gymnasium.utils.env_checker import check_env
 
 from robot_envs.backends import IN_PROCESS, MUJOCO, REALTIME
 from robot_envs.testing import episodes, repetition
-from robot_envs.testing.rollouts import Make, Subject, expect
+from robot_envs.testing.rollouts import Make, Subject
 
 STEPS = 100
 # Warnings of Gymnasium's checker for observations without bounds, and environments without an id.
@@ -74,7 +74,7 @@ def gymnasiums_checker(subject: Subject) -> None:
     """Gymnasium's own checker finds nothing, and nothing warns."""
     with _warnings() as texts, subject.made() as env:
         check_env(env)
-    expect(not texts, f"Gymnasium's checker warns: {' '.join(texts)}")
+    assert not texts, f"Gymnasium's checker warns: {' '.join(texts)}"
 
 
 @contextlib.contextmanager

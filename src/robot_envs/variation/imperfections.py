@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from bullet_gazebo.state import did_you_mean
+from file_access.text import did_you_mean
 from robot_envs.world_state import Joints, JointState, WorldState
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.control.pid import Gains
-from bullet_gazebo.state import did_you_mean
+from file_access.text import did_you_mean
 from robot_envs.controllers import load
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.robot import Robot

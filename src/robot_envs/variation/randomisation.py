@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bullet_gazebo.state import did_you_mean
+from file_access.text import did_you_mean
 from robot_envs.scene import Scene
 from robot_envs.variation.imperfections import by_name, is_number
 from robot_envs.variation.parts import Parts, check_tunable

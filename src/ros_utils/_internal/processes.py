@@ -1,7 +1,7 @@
-"""Records the programs that this toolkit starts, for all processes of the user, and ends them.
+"""Finds the programs that this toolkit started, from any process of the user, and ends them.
 
-The starts under one master are listed in `<ROS_HOME>/ros_utils/<host>_<port>.json`. All descendants of a
-start carry its token in an environment variable, so they are found even if their parent was killed.
+All descendants of a start carry its description in an environment variable. So they are found even if their
+parent was killed, and there is no list that could be out of date.
 """
 
 from __future__ import annotations
@@ -9,23 +9,18 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import re
 import signal
-import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import psutil
-import rospkg
 
-from file_access.locks import locked_file
 from ros_calls import master as _master
 from ros_utils._internal import log as _log
 
-MARK = "ROS_UTILS_LAUNCH"  # environment variable with tokens, outer starts first
+MARK = "ROS_UTILS_LAUNCH"  # environment variable: the starts a process belongs to, outer ones first
 # roslaunch gives each of its nodes 15 s after SIGINT and 2 s after SIGTERM before it ends itself.
 PATIENCE = {"node": 8.0, "launch": 20.0, "master": 20.0}  # [s] after SIGINT
 LEFTOVERS = 3.0  # [s] instead, for processes that outlive the program itself
@@ -40,117 +35,75 @@ hurry = threading.Event()  # set: skip SIGINT
 class Start:
     """A started program and all its descendants."""
 
-    pid: int
-    token: str  # value of the mark in its environment
+    token: str  # identifies it
     kind: str  # "master", "launch" or "node"
     label: str  # name for the user
-    log: str | None = None
+    master: str  # address
     caller: int = 0  # id of its parent, whose end the kernel signals to it; 0: none
+
+    def mark(self) -> str:
+        """Returns the value of MARK for its processes."""
+        return json.dumps([*map(asdict, _starts(os.environ.get(MARK, ""))), asdict(self)])
 
     @property
     def is_orphan(self) -> bool:
         """Returns whether it still runs although its caller was killed."""
-        if not self.caller:
-            return False
-        root = next((each for each in family(self.token) if each.pid == self.pid), None)
-        try:
-            return root is not None and root.ppid() != self.caller
-        except psutil.Error:
-            return False
+        return bool(self.caller) and not _lives(self.caller) and bool(family(self.token))
 
 
-def family(token: str) -> list[psutil.Process]:
-    """Returns the living processes of a start: those with its token, and their descendants.
-
-    The token finds children whose parent was killed; descent finds those with a cleaned environment.
-    """
-    everything = {process.pid: process for process in psutil.process_iter()}
-    parents: dict[int, int] = {}
-    found: set[int] = set()
-    for pid, process in everything.items():
-        with contextlib.suppress(psutil.Error):
-            parents[pid] = process.ppid()
-            if token in process.environ().get(MARK, "").split(":"):
-                found.add(pid)
-    while grown := {pid for pid, parent in parents.items() if parent in found} - found:
-        found |= grown
-    return [everything[pid] for pid in found if _lives(everything[pid])]
-
-
-def _lives(process: psutil.Process) -> bool:
+def _starts(mark: str) -> list[Start]:
     try:
-        return bool(process.status() not in (psutil.STATUS_ZOMBIE, psutil.STATUS_DEAD))
+        return [Start(**item) for item in json.loads(mark)]
+    except (ValueError, TypeError):
+        return []  # not ours: nothing can be ended safely
+
+
+def _lives(pid: int) -> bool:
+    try:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
     except psutil.Error:
         return False
 
 
-def list_path() -> Path:
-    """Returns the file that lists the starts under the present master."""
-    try:
-        host, port = _master.host_and_port()
-        # All names of this machine mean the same master.
-        name = f"{'localhost' if _master.is_local() else host}_{port}"
-    except _master.MasterDown:
-        name = "unknown"
-    return Path(rospkg.get_ros_home(), "ros_utils", re.sub(r"[^\w.-]", "_", name) + ".json")
+def family(token: str) -> dict[int, psutil.Process]:
+    """Returns the living processes of a start, by id: those with its token, and their descendants.
+
+    The token finds children whose parent was killed; descent finds those with a cleaned environment.
+    """
+    everything: dict[int, psutil.Process] = {}
+    parents: dict[int, int] = {}
+    found: set[int] = set()
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error):
+            if process.status() in (psutil.STATUS_ZOMBIE, psutil.STATUS_DEAD):
+                continue
+            everything[process.pid], parents[process.pid] = process, process.ppid()
+            if token in process.environ().get(MARK, ""):
+                found.add(process.pid)
+    while grown := {pid for pid, parent in parents.items() if parent in found} - found:
+        found |= grown
+    return {pid: everything[pid] for pid in found}
 
 
-def started() -> list[Start]:
-    """Returns what any process of this user started under this master and may still run, oldest first."""
-    with _locked():
-        return _read()
+def started(own: Sequence[Start]) -> list[Start]:
+    """Returns what any process of this user started under this master and still runs.
 
-
-def add(start: Start) -> None:
-    """Lists a start."""
-    _change(lambda known: [*known, start])
-
-
-def _remove(tokens: set[str]) -> None:
-    _change(lambda known: [start for start in known if start.token not in tokens])
-
-
-def _change(edit: Callable[[list[Start]], list[Start]]) -> None:
-    try:
-        with _locked():
-            _write(edit(_read()))
-    except OSError as fault:
-        _log.warn(
-            f"{list_path()}: {fault.strerror}: other processes won't know what was started here"
-        )
-
-
-@contextlib.contextmanager
-def _locked() -> Iterator[None]:
-    path = list_path()
-    with contextlib.ExitStack() as stack:
-        # Where nothing can be written, no lock is needed.
-        with contextlib.suppress(OSError):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            stack.enter_context(locked_file(path.with_suffix(".json.lock")))
-        yield
-
-
-def _read() -> list[Start]:
-    try:
-        return [Start(**item) for item in json.loads(list_path().read_text(encoding="utf-8"))]
-    except (OSError, ValueError, TypeError):
-        return []  # absent, or not ours: nothing can be ended safely
-
-
-def _write(known: list[Start]) -> None:
-    path = list_path()
-    if not known:
-        path.unlink(missing_ok=True)
-        return
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".starts")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        json.dump([asdict(start) for start in known], file, indent=1)
-    os.replace(temporary, path)
+    Args:
+        own: of the calling process; one whose main thread has ended, but not the others, has no
+            environment any more.
+    """
+    found = {start.token: start for start in own}
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error):
+            for start in _starts(process.environ().get(MARK, "")):
+                found[start.token] = start
+    with contextlib.suppress(_master.MasterDown):
+        return [start for start in found.values() if _master.is_at(start.master)]
+    return []
 
 
 def end(starts: Sequence[Start], reap: Callable[[set[str]], bool]) -> bool:
-    """Ends starts with their descendants, nodes first and the master last, and removes them from the list.
+    """Ends starts with their descendants, nodes first and the master last.
 
     Skips a start that the calling process itself descends from.
 
@@ -164,15 +117,13 @@ def end(starts: Sequence[Start], reap: Callable[[set[str]], bool]) -> bool:
     """
     own_line = {process.pid for process in (psutil.Process(), *psutil.Process().parents())}
     gone = True
-    starts = [s for s in starts if own_line.isdisjoint(each.pid for each in family(s.token))]
+    starts = [start for start in starts if own_line.isdisjoint(family(start.token))]
     for kind in ("node", "launch", "master"):
         wave = [start for start in starts if start.kind == kind]
         if not wave:
             continue
         left = _end_wave(wave, PATIENCE[kind], reap)
-        ended = {start.token for start in wave} - left
-        gone = reap(ended) and gone and not left
-        _remove(ended)
+        gone = reap({start.token for start in wave} - left) and gone and not left
     return gone
 
 
@@ -185,7 +136,7 @@ def end_orphans(reap: Callable[[set[str]], bool]) -> bool:
     Returns:
         Whether none is left.
     """
-    orphans = [each for each in started() if each.kind != "node" and each.is_orphan]
+    orphans = [each for each in started(()) if each.kind != "node" and each.is_orphan]
     deadline = time.monotonic() + max((PATIENCE[each.kind] for each in orphans), default=0.0)
     while any(each.is_orphan for each in orphans) and time.monotonic() < deadline:
         time.sleep(POLL)
@@ -207,7 +158,7 @@ def _end_wave(
             return set()
     left = [start for start in starts if family(start.token)]
     for start in left:
-        _log.warn(f"{start.label}: process {start.pid} can't be ended")
+        _log.warn(f"{start.label} can't be ended: processes {sorted(family(start.token))}")
     return {start.token for start in left}
 
 
@@ -219,33 +170,43 @@ def _end_with(
 ) -> bool:
     """Sends one signal and waits; returns whether something still runs after `grace` [s]."""
     deadline = time.monotonic() + grace
+    programs: set[int] = set()  # what the starts ran at first
     signalled: set[int] = set()
-    orphaned = False
     while True:
         reap(set())
-        families = {start.pid: family(start.token) for start in starts}
-        if not any(families.values()):
+        families = [family(start.token) for start in starts]
+        if not any(families):
             return False
-        roots = {pid for pid, each in families.items() if any(p.pid == pid for p in each)}
-        if not roots and not orphaned:
-            orphaned = True
+        tops = {pid for members in families for pid in members.keys() - _children(members)}
+        programs = programs or tops
+        if programs.isdisjoint(set().union(*families)):
+            programs = tops
             deadline = min(deadline, time.monotonic() + LEFTOVERS)
         if time.monotonic() > deadline or (hurry.is_set() and number is signal.SIGINT):
             return True
-        for root, members in families.items():
-            for process in members:
+        for members in families:
+            for pid in members.keys() - signalled:
                 # As Ctrl-C in a terminal: to the program's process group, which ends its own children.
                 # roslaunch puts its nodes into groups of their own and ends them in order.
-                whole = root not in roots or number is signal.SIGKILL
-                if process.pid not in signalled and (whole or _group(process) == root):
-                    signalled.add(process.pid)
+                if number is signal.SIGKILL or not tops.isdisjoint((pid, _group(pid))):
+                    signalled.add(pid)
                     with contextlib.suppress(psutil.Error):
-                        process.send_signal(number)  # never reaches a new process with the same id
+                        members[pid].send_signal(number)  # never reaches a new process of that id
         time.sleep(POLL)
 
 
-def _group(process: psutil.Process) -> int:
+def _children(members: dict[int, psutil.Process]) -> set[int]:
+    """Returns the ids of members whose parent is one, too."""
+    found = set()
+    for pid, process in members.items():
+        with contextlib.suppress(psutil.Error):
+            if process.ppid() in members:
+                found.add(pid)
+    return found
+
+
+def _group(pid: int) -> int:
     try:
-        return os.getpgid(process.pid)
+        return os.getpgid(pid)
     except ProcessLookupError:
         return 0

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import enum
 import os
 import re
 import secrets
@@ -21,7 +20,6 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import TracebackType
 
 import rospkg
 
@@ -29,7 +27,7 @@ from ros_calls import master as _master
 from ros_calls.waiting import wait_until
 from ros_utils._internal import log as _log
 from ros_utils._internal import processes as _processes
-from ros_utils.readiness import Ready
+from ros_utils.readiness import Ready, still_missing
 
 COLLECTED = 5.0  # [s] longest time from the end of a process's main thread to its exit code
 # A caller in a shell's background ignores SIGINT, and its children would inherit that.
@@ -50,6 +48,7 @@ class Handle:
 
     start: _processes.Start
     process: subprocess.Popen[bytes]
+    log: str | None
     status_file: str | None = None  # a terminal window writes the program's exit code here
 
     def exit_code(self) -> int | None:
@@ -65,13 +64,13 @@ class Handle:
 
     def owns(self, pid: int | None) -> bool:
         """Returns whether the process id is the program's or a descendant's."""
-        return any(each.pid == pid for each in _processes.family(self.start.token))
+        return pid in _processes.family(self.start.token)
 
     def lines(self, part: str = "") -> list[str]:
         """Returns the log's lines that contain `part`; empty if the output went to a terminal."""
-        if self.start.log is None:
+        if self.log is None:
             return []
-        with open(self.start.log, encoding="utf-8", errors="replace") as file:
+        with open(self.log, encoding="utf-8", errors="replace") as file:
             plain = [re.sub(r"\x1b[\[\]][0-9;]*[A-Za-z]?", "", line).strip() for line in file]
         return [line for line in plain if line and part in line]
 
@@ -83,7 +82,7 @@ class Handle:
 
     def where(self) -> str:
         """Returns where to find the output, for the end of a message."""
-        return f" (log: {self.start.log})" if self.start.log else ""
+        return f" (log: {self.log})" if self.log else ""
 
     def end(self) -> bool:
         """Ends the program and its descendants; returns whether nothing is left."""
@@ -109,12 +108,12 @@ class Started(int):
     @property
     def pid(self) -> int | None:
         """Process id; None if it wasn't started here."""
-        return self._handle.start.pid if self._handle else None
+        return self._handle.process.pid if self._handle else None
 
     @property
     def log_file(self) -> str | None:
         """Path of its output; None for a terminal."""
-        return self._handle.start.log if self._handle else None
+        return self._handle.log if self._handle else None
 
     @property
     def running(self) -> bool:
@@ -139,12 +138,7 @@ class Started(int):
     def __enter__(self) -> Started:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -193,14 +187,12 @@ def start(
         _log.info(
             f"{label}: no display or no xterm, so its output goes to {log or 'this terminal'}"
         )
-    process = _spawn(full, {**_environment(token), **(env or {})}, log)
-    caller = os.getpid() if bound else 0
+    this = _processes.Start(token, kind, label, _master.uri(), os.getpid() if bound else 0)
     handle = Handle(
-        _processes.Start(process.pid, token, kind, label, log, caller), process, status_file
+        this, _spawn(full, {**_environment(this), **(env or {})}, log), log, status_file
     )
     with _lock:
         _handles.append(handle)
-    _processes.add(handle.start)
     return handle
 
 
@@ -215,6 +207,13 @@ def end(starts: Sequence[_processes.Start]) -> bool:
 def end_orphans() -> bool:
     """Ends the launches and masters of killed callers. See `processes.end_orphans`."""
     return _processes.end_orphans(_reap)
+
+
+def started() -> list[_processes.Start]:
+    """Returns what runs under this master. See `processes.started`."""
+    with _lock:
+        own = [handle.start for handle in _handles if handle.process.poll() is None]
+    return _processes.started(own)
 
 
 def _reap(tokens: set[str]) -> bool:
@@ -257,20 +256,19 @@ def _dying_with_caller() -> list[str]:
     return ["setpriv", "--pdeathsig", "TERM", "--"]
 
 
-def _environment(token: str) -> dict[str, str]:
-    """Returns the caller's environment with the token, and with the caller's Python first on PATH.
+def _environment(start: _processes.Start) -> dict[str, str]:
+    """Returns the caller's environment with the start's mark, and with the caller's Python first on PATH.
 
     Many ROS scripts begin with ``#!/usr/bin/env python3``, and the first Python on PATH often lacks
     rospy; the caller's has it.
     """
-    outer = os.environ.get(_processes.MARK)
     path = os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", os.defpath)])
     return {
         **os.environ,
-        _processes.MARK: f"{outer}:{token}" if outer else token,
+        _processes.MARK: start.mark(),
         "PATH": path,
         "PYTHONUNBUFFERED": "1",
-        "ROS_MASTER_URI": _master.uri(),
+        "ROS_MASTER_URI": start.master,
     }
 
 
@@ -305,80 +303,78 @@ def _end_own() -> None:
     end([handle.start for handle in _handles])
 
 
-class Readiness(enum.Enum):
-    """How a wait ended."""
-
-    READY = "ready"
-    ENDED = "ended"
-    LATE = "late"
-
-
-def wait_until_ready(ready: Callable[[], bool], handle: Handle, timeout: float) -> Readiness:
-    """Waits until `ready` is true, the program ends, or time is up; returns which.
+def await_start(
+    handle: Handle,
+    is_there: Callable[[], bool],
+    absent: str,
+    timeout: float,
+    ready: Ready | None,
+    may_end: bool = True,
+) -> Started | bool:
+    """Waits for a started program, then for its world; ends it and logs the reason if one isn't there.
 
     Args:
-        ready: returns whether the wait is over.
         handle: the program.
-        timeout: limit of the wait [s].
+        is_there: returns whether it can be used.
+        absent: what to report if it can't in time.
+        timeout: limit of each of the waits, the second one from now on [s].
+        ready: the world to wait for; None for no wait.
+        may_end: whether it may end by itself, without an error, before that.
 
     Raises:
         rospy.ROSInterruptException: the caller's node was shut down meanwhile.
     """
+    begin = time.monotonic()
 
-    def look() -> Readiness | None:
-        # Checked before `ready`, so that a program's last act before its end isn't missed.
+    def look() -> str:
+        # Checked before `is_there`, so that a program's last act before its end isn't missed.
         ended = handle.exit_code() is not None
-        if ready():
-            return Readiness.READY
-        return Readiness.ENDED if ended else None
+        return "there" if is_there() else "ended" if ended else ""
 
-    return wait_until(look, timeout, handle.start.label) or Readiness.LATE
+    found = wait_until(look, timeout, handle.start.label)
+    fault, code = "", handle.exit_code()
+    if not found:
+        fault = f"{absent} after {timeout:g} s; ended it"
+    elif code or (found == "ended" and not may_end):
+        fault = f"ended with exit code {code}"
+    if fault:
+        reason = handle.reason()  # before it is told to end, and reports that
+        handle.end()
+        _log.error(f"{handle.start.label}: {fault}: {reason}{handle.where()}")
+        return False
+    return wait_for_world(Started(handle), ready, begin + timeout, timeout)
 
 
 def wait_for_world(
-    started: Started | bool,
-    ready: Ready | None,
-    handle: Handle | None,
-    begin: float,
-    timeout: float,
+    started: Started, ready: Ready | None, deadline: float, timeout: float
 ) -> Started | bool:
     """Waits until a world is ready after a start; ends the started program if it isn't.
 
     Args:
-        started: the result on success.
+        started: the program, and the result on success.
         ready: the world to wait for; None for no wait.
-        handle: the started program; None if it ran before.
-        begin: time of the start, by time.monotonic() [s].
-        timeout: limit of the wait, from the start on [s].
-
-    Returns:
-        `started`, or False, with the missing part as an error in the log.
+        deadline: of the wait, by time.monotonic() [s].
+        timeout: what the wait is reported to have taken [s].
 
     Raises:
         rospy.ROSInterruptException: the caller's node was shut down meanwhile.
     """
     if ready is None:
         return started
-    missing = ""
-    ended = False
+    handle = started._handle
 
-    def look() -> bool:
-        nonlocal missing, ended
+    def has_ended() -> bool:
+        code = started.exit_code()
         # A node may have done its work and end before the rest is ready.
-        code = handle.exit_code() if handle else None
-        ended = bool(code) or (code == 0 and handle is not None and handle.start.kind == "launch")
-        missing = ready.missing()
-        return ended or not missing
+        return bool(code) or (code == 0 and handle is not None and handle.start.kind == "launch")
 
-    left = begin + timeout - time.monotonic()
-    wait_until(look, max(0.0, left), "a world that is ready")
+    missing = still_missing(ready, max(0.0, deadline - time.monotonic()), has_ended)
     if not missing:
         return started
-    label = handle.start.label if handle else "the world"
     what = f"not ready after {timeout:g} s"
-    if handle and ended:
+    if handle and has_ended():
         what = f"ended with exit code {handle.exit_code()} before it was ready: {handle.reason()}"
-    _log.error(f"{label}: {what}: {missing}{handle.where() if handle else ''}")
-    if handle:
-        handle.end()
+    label, where = (handle.start.label, handle.where()) if handle else ("the world", "")
+    _log.error(f"{label}: {what}: {missing}{where}")
+    started.close()
     return False

@@ -62,8 +62,13 @@ def list_processes(handle: Handle) -> tuple[list[str], list[str]] | None:
     return None
 
 
-def let_settle(handle: Handle) -> None:
-    """Waits until the launch's processes have registered as nodes; briefly, as not every program is one."""
+def has_started(handle: Handle) -> bool:
+    """Returns whether the launch has started its processes.
+
+    If so, waits until they have registered as nodes; briefly, as not every program is one.
+    """
+    if list_processes(handle) is None:
+        return False
     deadline = time.monotonic() + SETTLE
     seen: tuple[list[str], list[str]] = ([], [])
     since = time.monotonic()
@@ -79,6 +84,7 @@ def let_settle(handle: Handle) -> None:
         _warn(handle, f"ended already: {', '.join(seen[1])}")
     for line in handle.lines("cannot launch node"):  # roslaunch goes on with the other nodes
         _warn(handle, line)
+    return True
 
 
 def _warn(handle: Handle, text: str) -> None:

@@ -7,6 +7,8 @@ import unittest
 import rostest
 from support.ros.pg_train_runs import Place
 
+from cartpole import dqn_train
+
 SHORT = ["total_timesteps:=300", "eval_frequency:=0"]
 
 
@@ -44,9 +46,12 @@ class DqnTrain(unittest.TestCase):
         figures = []
         for backend in ("ros", "bullet"):
             run = place.folder / backend
-            training = place.start("rosrun", "cartpole", "dqn_train.py", f"--run-dir={run}",
-                                   f"--env-kwargs=backend={backend}", *options)  # fmt: skip
-            self.assertEqual(training.end(), 0, training.output)
+            flags = [f"--run-dir={run}", f"--env-kwargs=backend={backend}", *options]
+            if backend == "ros":
+                training = place.start("rosrun", "cartpole", "dqn_train.py", *flags)
+                self.assertEqual(training.end(), 0, training.output)
+            else:
+                self.assertEqual(dqn_train.main(flags), 0)
             with (run / "scalars.csv").open() as rows:
                 figures.append([row.split(",")[:3] for row in rows if "SPS" not in row])
         self.assertTrue(any(tag == "eval/mean_reward" for _, tag, _ in figures[0]))

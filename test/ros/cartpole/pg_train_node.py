@@ -12,6 +12,8 @@ import torch
 from support.ros.pg_train_runs import NETWORKS, Place
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from cartpole import pg_train
+
 TAGS = {
     "Reward",
     "Value Loss",
@@ -37,17 +39,26 @@ class PgTrain(unittest.TestCase):
         self.assertNotIn("Traceback", training.output)
         return training.output
 
-    def test_from_nothing(self):
+    def test_from_nothing_by_its_launch_file(self):
         place = self.place()
-        output = self.trained(place, "--episodes=5", "--seed=1", "--save-every=4", "--gui")
+        training = place.start(
+            "roslaunch", "cartpole", "pg_train.launch", "episodes:=5", "seed:=2", "save_every:=4",
+            "gui:=true", f"run_dir:={place.run}", "params:=gamma=0.98",
+        )  # fmt: skip
+        training.end()
+        output = training.output
+        self.assertEqual(place.left_after(), {}, output)
+        self.assertNotIn("Traceback", output)
         self.assertIn("the window is the page http://127.0.0.1:", output)
-        self.assertEqual(place.left_after(), {})
         self.assertIn("trained 5 episodes", output)
         self.assertIn(str(place.run), output)
         self.assertLessEqual(
             NETWORKS | {"learning_curve.png", "summary.json", "policy_network_episode_4.pth"},
             place.files(),
         )
+        record = json.loads((place.run / "config.json").read_text())
+        self.assertEqual((record["run"]["episodes"], record["run"]["seed"]), (5, 2))
+        self.assertEqual(record["hyperparameters"]["gamma"], 0.98)
         log = EventAccumulator(str(place.run))
         log.Reload()
         self.assertEqual(set(log.Tags()["scalars"]), TAGS)
@@ -67,8 +78,7 @@ class PgTrain(unittest.TestCase):
         flags = ("--start-noise=0.05", "--episodes=30", "--eval-episodes=1", "--num-envs=2", "--seed=4",
                  "--checkpoint-frequency=60")  # fmt: skip
         inside = self.place()
-        self.trained(inside, *flags, "--backend=bullet")
-        self.assertEqual(inside.processes(), {})
+        self.assertEqual(pg_train.main([f"--run-dir={inside.run}", *flags, "--backend=bullet"]), 0)
         killed = self.place()
         training = killed.train(*flags)
         training.wait_for("Episode   20 |")
@@ -82,68 +92,29 @@ class PgTrain(unittest.TestCase):
         self.assert_same_weights(inside, killed)
         self.assertEqual(killed.left_after(), {})
 
-    def test_realtime(self):
-        place = self.place()
-        self.trained(place, "--episodes=3", "--realtime")
-        lengths = json.loads((place.run / "summary.json").read_text())["lengths"]
-        self.assertGreater(min(lengths), 1)
-        self.assertEqual(place.left_after(), {})
-
-    def test_a_simulator_already_there_is_used_and_left_as_it_was(self):
-        place = self.place()
-        world = place.start("roslaunch", "gazebo_ros", "empty_world.launch", "lockstep:=true",
-                            "paused:=true", "gui:=false")  # fmt: skip
-        world.wait_for("process[gazebo-2]: started")
-        self.wait_for_service(place, "/gazebo/step_world")
-        before = set(place.processes())
-        output = self.trained(place, "--episodes=2", "--gui")  # it has no window: one is opened
-        self.assertIn("opening the simulator's window", output)
-        self.assertIn("the window is the page http://127.0.0.1:", output)
-        self.assertEqual(set(place.processes()), before)
-        self.assertNotIn("cartpole", self.models(place))
-        world.interrupt()
-        world.end()
-        self.assertEqual(place.left_after(), {})
-
-    def test_a_robot_already_there_is_used_and_stays(self):
+    def test_a_simulator_and_a_robot_that_are_there_are_used_and_left_as_they_were(self):
         place = self.place()
         world = place.start("roslaunch", "cartpole", "simulation.launch")
         world.wait_for("starting joint_state_controller")
         world.wait_for("process has finished cleanly")
+        before = set(place.processes())
         output = self.trained(place, "--episodes=2")
         self.assertNotIn("starting", output)
         self.assertNotIn("spawning", output)
-        self.assertIn("cartpole", self.models(place))
+        self.assertIn("cartpole", self.ask(place, "/gazebo/get_world_properties"))
+        self.assertIn("True", self.ask(place, "/gazebo/delete_model", "cartpole"))
+        place.run = place.folder / "another"
+        output = self.trained(place, "--episodes=2", "--gui")  # it has no window: one is opened
+        self.assertIn("opening the simulator's window", output)
+        self.assertIn("the window is the page http://127.0.0.1:", output)
+        self.assertEqual(set(place.processes()), before)
+        self.assertNotIn("cartpole", self.ask(place, "/gazebo/get_world_properties"))
+        world.interrupt()
+        world.end()
+        self.assertEqual(place.left_after(), {})
 
-    def test_a_world_that_is_not_in_lockstep_is_refused_with_the_remedy(self):
-        place = self.place()
-        world = place.start("roslaunch", "gazebo_ros", "empty_world.launch", "gui:=false")
-        world.wait_for("process[gazebo-2]: started")
-        self.wait_for_service(place, "/gazebo/get_world_properties")
-        training = place.train("--episodes=2")
-        self.assertEqual(training.end(), 1)
-        self.assertIn("lockstep:=true", training.output)
-        self.assertIn("--realtime", training.output)
-        self.assertFalse(place.run.exists())
-
-    def test_parameters_of_the_launch_file(self):
-        place = self.place()
-        training = place.start(
-            "roslaunch", "cartpole", "pg_train.launch", "episodes:=3", "seed:=2",
-            f"run_dir:={place.run}", "algo:=reinforce", "params:=batch_episodes=2",
-        )  # fmt: skip
-        training.end()
-        self.assertEqual(place.left_after(), {}, training.output)
-        record = json.loads((place.run / "config.json").read_text())
-        self.assertEqual((record["run"]["episodes"], record["run"]["seed"]), (3, 2))
-        self.assertEqual(record["hyperparameters"]["batch_episodes"], 2)
-
-    def wait_for_service(self, place: Place, name: str) -> None:
-        script = f"import rospy; rospy.wait_for_service('{name}', 180)"
-        self.assertEqual(place.start("python3", "-c", script).end(), 0)
-
-    def models(self, place: Place) -> str:
-        asked = place.start("rosservice", "call", "/gazebo/get_world_properties")
+    def ask(self, place: Place, service: str, *request: str) -> str:
+        asked = place.start("rosservice", "call", service, *request)
         self.assertEqual(asked.end(), 0, asked.output)
         return asked.output
 

@@ -173,6 +173,14 @@ class PolicyNode(unittest.TestCase):
         node.interrupt()
         self.assertEqual(node.end(BOUND), 130, node.output)
 
+    def test_a_training_in_real_time_is_refused_with_the_remedy(self):
+        run = self.place.folder / "refused"
+        training = self.place.start("rosrun", "cartpole", "pg_train.py", f"--run-dir={run}")
+        self.assertEqual(training.end(), 1)
+        self.assertIn("lockstep:=true", training.output)
+        self.assertIn("--realtime", training.output)
+        self.assertFalse(run.exists())
+
 
 if __name__ == "__main__":
     rostest.rosrun("cartpole", "policy_on_robot", PolicyNode)

@@ -13,6 +13,8 @@ from pathlib import Path
 import rostest
 from support.ros.pg_train_runs import Place
 
+from cartpole import workbench
+
 ARM = "robot_envs/TwoLinkReachGoal-v0"
 HAS_SB3 = importlib.util.find_spec("stable_baselines3") is not None
 
@@ -28,35 +30,37 @@ class WorkbenchGoals(unittest.TestCase):
         self.place = Place()
         self.addCleanup(self.place.close)
 
-    def workbench(self, *arguments: str) -> str:
+    def over_ros(self, *arguments: str) -> None:
         command = self.place.start("rosrun", "cartpole", "workbench.py", *arguments)
         self.assertEqual(command.end(), 0, command.output)
-        return command.output
 
-    def train(self, backend: str, run: Path, *params: str) -> None:
-        self.workbench("train", "--algo", "sac", "--env-id", ARM, "--run-dir", str(run),
-                       "--env-kwargs", f"backend={backend}",
-                       "--params", "eval_frequency=130", "eval_episodes=2", *params)  # fmt: skip
+    def here(self, *arguments: str) -> None:
+        self.assertEqual(workbench.main(list(arguments)), 0)
 
     @unittest.skipUnless(HAS_SB3, "./ws extras isn't installed")
     def test_hindsight_learns_the_same_and_its_policy_acts_anywhere(self):
         params = ["her=true", "learning_starts=100", "net_arch=[16]",
                   "batch_size=16", "train_freq=2"]  # fmt: skip
-        run = self.place.folder / "sac_ros"
-        self.train("ros", run, *params, "total_timesteps=150")
-        self.workbench("train", "--resume", str(run), "--total-timesteps", "300")
-        over_ros = figures(run)
-        here = self.place.folder / "sac_bullet"
-        self.train("bullet", here, *params, "total_timesteps=300")
-        self.assertEqual(over_ros, figures(here))
-        evaluated = [row.split(",")[0] for row in over_ros if ",eval/success_rate," in row]
+        ros, here = self.place.folder / "ros", self.place.folder / "bullet"
+        train = ["train", "--algo", "sac", "--env-id", ARM,
+                 "--params", "eval_frequency=130", "eval_episodes=2", *params]  # fmt: skip
+        self.over_ros(
+            *train, "total_timesteps=150", "--env-kwargs", "backend=ros", "--run-dir", str(ros)
+        )
+        self.over_ros("train", "--resume", str(ros), "--total-timesteps", "300")
+        self.here(
+            *train, "total_timesteps=300", "--env-kwargs", "backend=bullet", "--run-dir", str(here)
+        )
+        self.assertEqual(figures(ros), figures(here))
+        evaluated = [row.split(",")[0] for row in figures(ros) if ",eval/success_rate," in row]
         self.assertEqual(evaluated, ["130", "260", "300"])
 
+        figures_file = self.place.folder / "figures.json"
+        command = ["eval", str(ros), "--episodes", "2", "--json", str(figures_file)]
         returns = []
-        for options in ([], ["--env-kwargs", "backend=bullet"]):
-            found = self.place.folder / "figures.json"
-            self.workbench("eval", str(run), "--episodes", "2", "--json", str(found), *options)
-            returns.append(json.loads(found.read_text())["returns"])
+        for evaluate, backend in ((self.over_ros, "ros"), (self.here, "bullet")):
+            evaluate(*command, "--env-kwargs", f"backend={backend}")
+            returns.append(json.loads(figures_file.read_text())["returns"])
         self.assertEqual(*returns)
         self.assertEqual(self.place.left_after(), {})
 

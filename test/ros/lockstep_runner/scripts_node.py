@@ -135,9 +135,7 @@ class LockstepTest(unittest.TestCase):
         importlib.util.find_spec("stable_baselines3"), "./ws extras isn't installed"
     )
     def test_an_environment_that_sleeps_trains_with_stable_baselines3(self):
-        one = self.twice("gym_sleep.py", 256).stdout.splitlines()[-1]
-        other = lockstep("--seed", 4, SCRIPTS / "gym_sleep.py", 256)
-        self.assertNotEqual(self.check(other).splitlines()[-1].split()[0], one.split()[0])
+        self.assertIn(" 128 ", self.twice("gym_sleep.py", 128).stdout)
 
     def test_a_thread_with_a_rate_is_under_the_clock(self):
         script = HEAD + (
@@ -316,7 +314,7 @@ class LockstepTest(unittest.TestCase):
         self.assertEqual((run.returncode, run.stderr.count("\n")), (2, 1), run.stderr)
         run = lockstep(written("print 'two'\n"))
         self.assertEqual(run.returncode, 2)
-        self.assertIn("Python 2", run.stderr)
+        self.assertIn("line 1", run.stderr)
         run = lockstep("--dt", 0.0085, written(HEAD))
         self.assertEqual(run.returncode, 2, run.stderr)
         self.assertIn("0.0085", run.stderr)

@@ -13,39 +13,15 @@ from hypothesis import strategies as st
 from support.mutations.mesh_files import ascii_stl, binary_stl, dae, library, obj, polylist
 
 INDICES = (
-    "0",
-    "1",
-    "-1",
-    "-9",
-    "7",
-    "8",
-    "9",
-    "99",
-    "4294967295",
-    "-2147483648",
-    "18446744073709551616",
-)
+    "0", "1", "-1", "-9", "7", "8", "9", "99", "4294967295", "-2147483648", "18446744073709551616",
+)  # fmt: skip
 NUMBERS = (
     "0", "-0.0", "1e-320", "1e38", "1e39", "1e99", "-1e308", "1e400", "nan", "-inf", "1.#IND", "0x1p3", "1,5",
     "--1", "1e", ".", "1_0", "", "٣", "1" * 400,
 )  # fmt: skip
 WORDS = (
-    "vertex",
-    "facet",
-    "endloop",
-    "endsolid",
-    "solid",
-    "f",
-    "v",
-    "o",
-    "g",
-    "#",
-    "\\",
-    "/",
-    "1//",
-    "\0",
-    "é",
-)
+    "vertex", "facet", "endloop", "endsolid", "solid", "f", "v", "o", "g", "#", "\\", "/", "1//", "\0", "é",
+)  # fmt: skip
 TAGS = (
     "p", "vcount", "v", "triangles", "polylist", "polygons", "tristrips", "trifans", "lines",
     "input", "source", "vertices", "float_array", "accessor", "param", "node", "instance_node",
@@ -54,17 +30,8 @@ TAGS = (
     "instance_controller", "library_nodes",
 )  # fmt: skip
 ATTRIBUTES = (
-    "id",
-    "source",
-    "url",
-    "count",
-    "stride",
-    "offset",
-    "semantic",
-    "name",
-    "meter",
-    "set",
-)
+    "id", "source", "url", "count", "stride", "offset", "semantic", "name", "meter", "set",
+)  # fmt: skip
 SEMANTICS = ("POSITION", "VERTEX", "NORMAL", "TEXCOORD", "COLOR", "")
 TOKEN = re.compile(r"[^\s<>\"'=/]+")
 

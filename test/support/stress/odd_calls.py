@@ -25,10 +25,10 @@ from gazebo_msgs.srv import (
     SpawnModel,
 )
 from geometry_msgs.msg import Point, Pose
+from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from std_srvs.srv import Empty
 from support.ros.odd_requests import BOX, SIMPLE, messages, requests
-from support.stress.drawing import drawn
 
 from bullet_gazebo.ros.clients.gz import METHOD
 from cartpole.robot import ROBOT
@@ -47,17 +47,9 @@ XMLRPC = [
     *("paramUpdate", "publisherUpdate", "requestTopic", "system.listMethods", METHOD, "none", ""),
 ]
 WORDS = [
-    *(
-        "step",
-        "pause",
-        "reset",
-        "/clock",
-        "/gazebo/set_link_state",
-        "http://127.0.0.1:1/",
-        "http://",
-    ),
-    *("TCPROS", "\0", "x" * 100_000),
-]
+    "step", "pause", "reset", "/clock", "/gazebo/set_link_state", "http://127.0.0.1:1/", "http://",
+    "TCPROS", "\0", "x" * 100_000,
+]  # fmt: skip
 NUMBERS = st.integers(-(2**31), 2**31 - 1) | st.floats()
 ARGUMENTS = st.recursive(
     st.sampled_from(WORDS) | NUMBERS | st.text(max_size=8) | st.booleans() | st.binary(max_size=9),
@@ -94,7 +86,18 @@ class OddCalls:
             yield from self._dice.choice(self._makers)()
 
     def _draw(self, strategy: st.SearchStrategy[Any]) -> list[Any]:
-        return drawn(strategy, AT_ONCE, self._dice.randrange(2**32))
+        """Some values of a strategy, the same for the same seed."""
+        found: list[Any] = []
+
+        @seed(self._dice.randrange(2**32))
+        @settings(max_examples=AT_ONCE, deadline=None, database=None, phases=[Phase.generate],
+                  suppress_health_check=list(HealthCheck))  # fmt: skip
+        @given(strategy)
+        def take(value: Any) -> None:
+            found.append(value)
+
+        take()
+        return found
 
     def _service(self, name: str) -> Callable[[], Iterator[Call]]:
         kind = rosservice.get_service_class_by_name(name)

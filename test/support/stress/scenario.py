@@ -20,7 +20,6 @@ class Row:
 
     Args:
         name: what was done, in the words of the table.
-        asked: number of cases at full scale.
         done: those that were tried.
         failures: what went wrong, and in which case.
         notes: figures besides, such as the memory before and after.
@@ -28,7 +27,6 @@ class Row:
     """
 
     name: str
-    asked: int
     done: int = 0
     failures: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -56,11 +54,6 @@ class Scenario:
         """The random numbers of one case, whichever others were tried before."""
         return random.Random(f"{self.seed}/{name}/{number}")
 
-    def row(self, name: str, asked: int) -> Row:
-        """Adds a row to the table."""
-        self.rows.append(Row(name, asked))
-        return self.rows[-1]
-
     def run(self, name: str, count: int, case: Case, lanes: int = 1, unit: int = 1) -> Row:
         """Tries the cases, in so many threads; a case that fails keeps none of the others from it.
 
@@ -75,7 +68,8 @@ class Scenario:
             AssertionError: with all failures, in the end.
         """
         __tracebackhide__ = True
-        row, begin = self.row(name, count * unit), time.monotonic()
+        row, begin = Row(name), time.monotonic()
+        self.rows.append(row)
 
         def attempt(number: int) -> None:
             if len(row.failures) >= ENOUGH:

@@ -58,7 +58,7 @@ class FakeModel:
 def ticks(each, count=20, now=0):
     """On which ticks after `now` an effort acts."""
     applied, acted = AppliedForces(), []
-    applied.add_effort(each)
+    applied.efforts.append(each)
     for tick in range(1, count + 1):
         each.model.body.efforts.clear()
         applied.apply(now + tick * TICK)
@@ -93,7 +93,7 @@ def test_when_an_effort_acts(start, duration, acted):
 def test_efforts_add_up_each_clamped_to_the_joint():
     model, applied = FakeModel(), AppliedForces()
     for value in (1.0, 5.0, -9.0):
-        applied.add_effort(effort(joint="b", value=value, model=model))
+        applied.efforts.append(effort(joint="b", value=value, model=model))
     applied.apply(TICK)
     assert model.body.efforts == [(1, 1.0), (1, 2.0), (1, -2.0)]
 
@@ -103,14 +103,14 @@ def test_efforts_add_up_each_clamped_to_the_joint():
 def test_no_effort_beyond_the_velocity_limit(speed, value, expected):
     model, applied = FakeModel(), AppliedForces()
     model.speed = speed
-    applied.add_effort(effort(joint="b", value=value, model=model))
+    applied.efforts.append(effort(joint="b", value=value, model=model))
     applied.apply(TICK)
     assert model.body.efforts == [(1, expected)]
 
 
 def test_an_effort_on_a_fixed_joint_does_nothing():
     model, applied = FakeModel(), AppliedForces()
-    applied.add_effort(effort(joint="fixed", model=model))
+    applied.efforts.append(effort(joint="fixed", model=model))
     applied.apply(TICK)
     assert model.body.efforts == []
 
@@ -121,9 +121,9 @@ def wrench(model, force, link="cart", duration=-1):
 
 def test_the_wrench_queued_last_counts():
     model, applied = FakeModel(), AppliedForces()
-    applied.add_wrench(wrench(model, (1.0, 0.0, 0.0)))
-    applied.add_wrench(wrench(model, (2.0, 0.0, 0.0), duration=TICK))
-    applied.add_wrench(wrench(model, (3.0, 0.0, 0.0), link="pole"))
+    applied.wrenches.append(wrench(model, (1.0, 0.0, 0.0)))
+    applied.wrenches.append(wrench(model, (2.0, 0.0, 0.0), duration=TICK))
+    applied.wrenches.append(wrench(model, (3.0, 0.0, 0.0), link="pole"))
     applied.apply(TICK)
     applied.apply(2 * TICK)
     forces = [(link, force[0]) for link, force, _ in model.body.wrenches]
@@ -134,7 +134,7 @@ def test_joint_forces_are_cleared_by_plain_name_in_all_models():
     applied = AppliedForces()
     one, other = FakeModel("one"), FakeModel("other")
     for model in (one, other):
-        applied.add_effort(effort(model=model))
+        applied.efforts.append(effort(model=model))
     applied.clear_efforts("one::a")
     applied.apply(TICK)
     applied.clear_efforts("a")
@@ -147,7 +147,7 @@ def test_wrenches_are_cleared_by_scoped_name():
     applied = AppliedForces()
     one, other = FakeModel("one"), FakeModel("other")
     for model in (one, other):
-        applied.add_wrench(wrench(model, (1.0, 0.0, 0.0)))
+        applied.wrenches.append(wrench(model, (1.0, 0.0, 0.0)))
     applied.clear_wrenches("cart")
     applied.clear_wrenches("one::cart")
     applied.apply(TICK)
@@ -160,8 +160,8 @@ def test_a_deleted_model_takes_what_acts_on_it_along():
     applied = AppliedForces()
     one, other = FakeModel("one"), FakeModel("other")
     for model in (one, other):
-        applied.add_effort(effort(model=model))
-        applied.add_wrench(wrench(model, (1.0, 0.0, 0.0)))
+        applied.efforts.append(effort(model=model))
+        applied.wrenches.append(wrench(model, (1.0, 0.0, 0.0)))
     applied.forget(one)
     applied.apply(TICK)
     assert one.body.wrenches == one.body.efforts == other.body.efforts == []

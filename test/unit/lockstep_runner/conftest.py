@@ -6,7 +6,13 @@ import pytest
 import rospy
 from support.ros.lockstep_world import Counter
 
+from lockstep_runner import notices
 from lockstep_runner.runner import ScriptRunner
+
+
+@pytest.fixture(autouse=True)
+def _nothing_was_told(monkeypatch):
+    monkeypatch.setattr(notices, "_told", set())
 
 
 @pytest.fixture

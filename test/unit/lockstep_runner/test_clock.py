@@ -11,7 +11,6 @@ from support.ros.lockstep_world import MS, Counter
 
 from lockstep_runner import clock as module
 from lockstep_runner.clock import Clock
-from lockstep_runner.notices import Notices
 
 BOUND = 30.0  # [s]
 
@@ -20,7 +19,7 @@ BOUND = 30.0  # [s]
 def clock(monkeypatch):
     monkeypatch.setattr(rospy.rostime, "_rostime_current", None)
     monkeypatch.setattr(rospy.rostime, "_rostime_initialized", False)
-    made = Clock(Counter(), Notices())
+    made = Clock(Counter())
     yield made
     made.release_all()
 
@@ -109,14 +108,14 @@ def rest_in_threads(clock, spans):
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.lists(st.integers(1, 40), min_size=1, max_size=5), min_size=1, max_size=4))
 def test_sleepers_wake_when_they_asked_for_in_one_order(spans):
-    one = rest_in_threads(Clock(Counter(), Notices()), spans)
+    one = rest_in_threads(Clock(Counter()), spans)
     expected = sorted(sum(mine[: count + 1]) for mine in spans for count in range(len(mine)))
     assert [at for at, _ in one] == expected
     for number, mine in enumerate(spans):
         assert [at for at, who in one if who == number] == [
             sum(mine[: count + 1]) for count in range(len(mine))
         ]
-    assert rest_in_threads(Clock(Counter(), Notices()), spans) == one
+    assert rest_in_threads(Clock(Counter()), spans) == one
 
 
 def test_no_time_passes_while_a_thread_computes(clock):

@@ -58,7 +58,12 @@ def run(command, **options):
     done = subprocess.run(
         command,
         check=False,
-        env={"PATH": "/usr/bin:/bin", "HOME": os.environ["HOME"]} | options.pop("env", {}),
+        env={
+            "PATH": "/usr/bin:/bin",
+            "HOME": os.environ["HOME"],
+            "ROS_LANG_DISABLE": "gencpp:genlisp",
+        }
+        | options.pop("env", {}),
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,

@@ -45,7 +45,8 @@ def outcome(*command: str | Path, cwd: Path) -> tuple[int, str]:
 def pip(python: Path, *arguments: str | Path, cwd: Path) -> None:
     # pip's own settings may say where packages come from, which counts here as everywhere else.
     settings = [f"{name}={value}" for name, value in os.environ.items() if name.startswith("PIP_")]
-    run("env", *settings, python, "-m", "pip", "--disable-pip-version-check", *arguments, cwd=cwd)
+    options = ("--python", python, "--disable-pip-version-check")
+    run("env", *settings, sys.executable, "-m", "pip", *options, *arguments, cwd=cwd)
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +66,7 @@ def python(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copytree(
             root / name, sources / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info")
         )
-    venv.create(folder / "venv", with_pip=True, system_site_packages=False)
+    venv.create(folder / "venv")  # pip in it would take seconds
     python = folder / "venv/bin/python3"
     packages = sysconfig.get_path("purelib")
     (folder / "venv/lib" / Path(packages).parent.name / "site-packages/workspace.pth").write_text(

@@ -1,22 +1,16 @@
 """A robot of one joint with an effort controller, through all of robot_envs, which knows no cart-pole."""
 
-import dataclasses
-import math
 import subprocess
 import sys
 
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
-from support.robots.pendulum import FILES, MOTOR, PENDULUM, STRONGEST, hanging, make_pendulum
+from support.robots.pendulum import MOTOR, PENDULUM, STRONGEST, hanging, make_pendulum
 
 from robot_envs.backends.in_process import InProcessWorld
-from robot_envs.errors import RobotEnvError
 from robot_envs.scene import Scene
-from robot_envs.testing import differences, rollout
+from robot_envs.testing import rollout
 from robot_envs.variation import LinkScale, Variation
-from robot_envs.vector import RobotVectorEnv
-from robot_envs.world_state import Pose
 
 MASS, LENGTH, DAMPING, GRAVITY = 0.5, 0.4, 0.01, 9.8  # kg, m, N m s/rad, m/s²
 INERTIA = MASS * LENGTH**2 / 3.0  # [kg m²] of the rod about its hinge
@@ -43,13 +37,6 @@ def backend():
     made = Plant()
     yield made
     made.close()
-
-
-def test_gymnasiums_checker_has_nothing_to_say(recwarn):
-    env = make_pendulum(varied=True, **NOISY)
-    check_env(env, skip_render_check=True)
-    env.close()
-    assert [str(warning.message) for warning in recwarn] == []
 
 
 def test_it_moves_as_the_equations_say(backend):
@@ -95,21 +82,6 @@ def test_the_strongest_action_is_what_the_task_makes_of_it():
     robot.close()
 
 
-def test_many_give_what_each_gives_alone():
-    options = {"sensor_noise": 0.01, "varied": True}
-    alone = []
-    for seed in (3, 4, 5):
-        env = make_pendulum(**options)
-        env.reset(seed=seed)
-        alone.append([env.step(np.array([0.2], np.float32))[0] for _ in range(20)])
-        env.close()
-    many = RobotVectorEnv(3, make_pendulum, **options)
-    many.reset(seed=3)
-    together = [many.step(np.full((3, 1), 0.2, np.float32))[0] for _ in range(20)]
-    many.close()
-    assert np.array_equal(np.swapaxes(together, 0, 1), alone)
-
-
 @pytest.mark.extras("mujoco")
 def test_on_mujoco_it_moves_nearly_the_same():
     runs = []
@@ -118,13 +90,6 @@ def test_on_mujoco_it_moves_nearly_the_same():
         runs.append(np.array([row[0] for row in rollout(env, 10, seed=2)[1:]]))
         env.close()
     assert 0.0 < np.abs(runs[0] - runs[1]).max() < 1e-3
-
-
-def test_the_same_seed_gives_the_same_bits():
-    env = make_pendulum(varied=True, sensor_noise=0.01, sensor_delay=2)
-    first, again = (rollout(env, 300, seed=6) for _ in range(2))
-    env.close()
-    assert differences(first, again) == ""
 
 
 def test_nothing_of_the_cart_pole_nor_of_ros_is_loaded():
@@ -141,26 +106,3 @@ def test_nothing_of_the_cart_pole_nor_of_ros_is_loaded():
         check=True,
     )
     assert shown.stdout.splitlines()[-1] == "[]"
-
-
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"run": ("wrist",)}, "there is no controller 'wrist'"),
-        ({"run": ("hinge_effort_controler",)}, f"did you mean '{MOTOR}'"),
-        ({"commanded": ("wrist",)}, "'wrist' is commanded, but not among the controllers that run"),
-        ({"urdf": FILES / "nowhere.urdf"}, "there is no file .*nowhere.urdf"),
-        ({"urdf": FILES / "pendulum.yaml"}, "can't read .*pendulum.yaml: syntax error"),
-        ({"controllers": FILES / "nowhere.yaml"}, "there is no file .*nowhere.yaml"),
-        ({"controllers": FILES / "pendulum.urdf"}, "pendulum.urdf"),
-        ({"urdf": "package://no_such_package/arm.urdf"}, "no package 'no_such_package'"),
-        ({"pose": Pose((math.nan, 0.0, 0.0))}, "its pose isn't finite"),
-        (
-            {"urdf": (FILES / "pendulum.urdf").read_text().replace("transmission", "nothing")},
-            "its URDF has no <transmission>",
-        ),
-    ],
-)
-def test_a_description_that_cannot_work_is_an_error_that_says_what_to_mend(changes, text):
-    with pytest.raises(RobotEnvError, match=text):
-        make_pendulum(robot=dataclasses.replace(PENDULUM, **changes))

@@ -26,15 +26,10 @@ TASKS = {
         Hold(observe=lambda state: np.zeros(3)),
         r"Hold.observe\(\) returned the shape \(3,\); its observation_space has \(2,\)",
     ),
-    "an observation of nothing": (
-        Hold(observe=lambda state: None),
-        r"Hold.observe\(\) returned the shape",
-    ),
     "an observation of no numbers": (
         Hold(observe=lambda state: {"a": 1}),
         r"Hold.observe\(\) returned {'a': 1}",
     ),
-    "an observation of text": (Hold(observe=lambda state: "ab"), r"Hold.observe\(\) returned 'ab'"),
     "a joint's wrong name": (
         Hold(observe=lambda state: state.joints["elbo"]),
         "the state has no joint 'elbo'; did you mean 'elbow'",
@@ -51,15 +46,10 @@ TASKS = {
         Hold(reward=lambda *_: NAN),
         r"Hold.reward\(\) returned nan; .* finite number",
     ),
-    "a reward of nothing": (Hold(reward=lambda *_: None), r"Hold.reward\(\) returned None"),
     "a reward of several": (Hold(reward=lambda *_: np.zeros(2)), r"Hold.reward\(\) returned array"),
     "an end of nothing": (
         Hold(is_terminal=lambda _: None),
         r"Hold.is_terminal\(\) returned None; .* True or False",
-    ),
-    "an end of several": (
-        Hold(is_terminal=lambda _: np.ones(2, bool)),
-        r"Hold.is_terminal\(\) returned array",
     ),
     "no info": (Hold(info=lambda _: None), r"Hold.info\(\) returned None; it must be a dict"),
     "no actions": (
@@ -74,25 +64,13 @@ TASKS = {
         Hold(apply=lambda *_: None),
         "commands are given by controller, {'pair': ...}, not None",
     ),
-    "the action as commands": (
-        Hold(apply=lambda action, _: action),
-        "commands are given by controller",
-    ),
     "a controller's wrong name": (
         Hold(apply=lambda *_: {"pear": (0, 0)}),
         "no controller 'pear' .* did you mean 'pair'",
     ),
-    "a joint for a controller": (
-        Hold(apply=lambda *_: {"elbow": 0.3}),
-        "no controller 'elbow' takes commands; there are pair",
-    ),
     "one number for a group": (
         Hold(apply=lambda *_: {"pair": 0.3}),
         "command of 'pair' must be 2 finite numbers, for elbow, shoulder, not 0.3",
-    ),
-    "too many numbers": (
-        Hold(apply=lambda *_: {"pair": [1, 2, 3]}),
-        r"2 finite numbers, .* not \[1, 2, 3\]",
     ),
     "a command that isn't finite": (
         Hold(apply=lambda *_: {"pair": [1, NAN]}),
@@ -109,10 +87,6 @@ TASKS = {
     "a beginning that isn't finite": (
         Hold(initial_state=lambda rng: InitialState({"elbow": NAN})),
         "puts the joint 'elbow' is a finite position, or one and a velocity, not nan",
-    ),
-    "a beginning with too much": (
-        Hold(initial_state=lambda rng: InitialState({"elbow": (0.1, 0.2, 0.3)})),
-        r"a finite position, or one and a velocity, not \(0.1, 0.2, 0.3\)",
     ),
     "a wrong model's beginning": (
         Hold(initial_state=lambda rng: InitialState(models={"arn": Pose()})),
@@ -143,10 +117,6 @@ TASKS = {
         Hold(query=StateQuery(links=(LinkQuery("tp"),))),
         "no link 'tp'; did you mean 'tip'",
     ),
-    "a frame's wrong name": (
-        Hold(query=StateQuery(links=(LinkQuery("tip", "bas"),))),
-        "no link 'bas'; did you mean 'base'",
-    ),
     "a name for models": (
         Hold(query=StateQuery(models="arm")),
         r"models lists names: \('arm',\), and not 'arm'",
@@ -162,10 +132,6 @@ TASKS = {
     "an object nowhere": (
         Hold(objects=(Object("box", PLINTH, (0, 0, 1)),)),
         r"the object 'box': its pose is a Pose",
-    ),
-    "an object at infinity": (
-        Hold(objects=(Object("box", PLINTH, Pose((0, 0, NAN))),)),
-        "'box': its pose isn't finite",
     ),
     "an object for objects": (
         Hold(objects=Object("box", PLINTH)),
@@ -183,25 +149,16 @@ TASKS = {
         Reach(goal=lambda *_: np.array([2.0, 0.0])),
         r"the goal \[2. 0.\] isn't one of Reach's goals: Box\(-1.0, 1.0, \(2,\), float32\)",
     ),
-    "a goal of another shape": (
-        Reach(goal=lambda *_: np.zeros(3)),
-        r"the goal \[0. 0. 0.\] isn't one of",
-    ),
     "no goal": (Reach(goal=lambda *_: None), "the goal None isn't one of Reach's goals"),
     "no goals": (Reach(goals=lambda: None), r"Reach.goals\(\) returned None"),
     "goals of another kind": (
         Reach(goals=lambda: gymnasium.spaces.Discrete(3)),
         r"Reach.goals\(\) .* must be a .*Box",
     ),
-    "something achieved of another shape": (
-        Reach(achieved=lambda _: np.zeros(3)),
-        r"Reach.achieved\(\) returned .* must be finite numbers of the shape \(2,\)",
-    ),
     "something achieved that isn't finite": (
         Reach(achieved=lambda _: np.full(2, NAN)),
         r"Reach.achieved\(\) returned array\(\[nan, nan\]\); it must be finite",
     ),
-    "steps of none": (Hold(max_steps=0), "max_steps must be at least 1, and a whole number, not 0"),
     "steps of a fraction": (
         Hold(max_steps=1.5),
         "max_steps must be at least 1, and a whole number, not 1.5",

@@ -1,5 +1,6 @@
 """ServiceClient against services that hang, fail, end and come back, under another master."""
 
+import itertools
 import math
 import signal
 import threading
@@ -12,6 +13,7 @@ from support.ros.ros_fakes import FakeService, failed, ok
 
 from ros_calls import master as ros_master
 from ros_calls.service import (
+    LOOK,
     ServiceClient,
     ServiceFailed,
     ServiceGone,
@@ -173,12 +175,16 @@ def test_without_a_limit_it_waits_until_the_shutdown(offer, client, monkeypatch)
     assert time.monotonic() - begin > 2 * LIMIT
 
 
-def test_without_a_limit_an_answer_may_come_late(offer, client):
-    def late(request):
-        time.sleep(2 * LIMIT)
-        return [ok(True)]
+def test_without_a_limit_an_answer_may_come_late(offer, client, monkeypatch):
+    looks, late = itertools.count(1), threading.Event()
 
-    offer(late)
+    def is_shutdown():
+        if next(looks) * LOOK > 2 * LIMIT:
+            late.set()
+        return False
+
+    monkeypatch.setattr(rospy, "is_shutdown", is_shutdown)
+    offer(lambda request: [ok(True)] if late.wait(BOUND) else None)
     assert client(timeout=math.inf)(True).success
 
 

@@ -1,8 +1,6 @@
 """Programs that ros_utils starts: remembered by all processes, ended completely, nobody else's."""
 
 import contextlib
-import dataclasses
-import json
 import os
 import signal
 import socket
@@ -17,7 +15,7 @@ import pytest
 from ros_utils import ros_launch, ros_node
 from ros_utils._internal import processes as _processes
 from ros_utils._internal import programs as _programs
-from ros_utils._internal.programs import CannotStart, Readiness, wait_until_ready
+from ros_utils._internal.programs import CannotStart
 
 SLEEP = ["sleep", "1000"]
 BOUND = 60.0  # [s] for anything that a test waits for
@@ -37,7 +35,7 @@ def place(tmp_path, monkeypatch):
         _processes, "LEFTOVERS", 0.3
     )  # a shell has its background jobs ignore SIGINT
     yield tmp_path
-    _programs.end(_processes.started())
+    _programs.end(_programs.started())
 
 
 def runs(pid):
@@ -77,11 +75,10 @@ sys.stdin.read()
 
 def test_what_is_started_is_remembered_and_forgotten_once_ended():
     handle = _programs.start(SLEEP, "node", "sleeper")
-    assert [entry.pid for entry in _processes.started()] == [handle.process.pid]
-    assert _programs.end(_processes.started())
+    assert _programs.started() == [handle.start]
+    assert _programs.end(_programs.started())
     assert not runs(handle.process.pid)
-    assert _processes.started() == []
-    assert not os.path.exists(_processes.list_path())
+    assert _programs.started() == []
 
 
 LINGERING = """
@@ -95,7 +92,7 @@ def test_a_program_whose_threads_outlive_its_main_thread_has_ended_when_it_is_sa
     handle = _programs.start([sys.executable, "-c", LINGERING], "node", "lingering")
     wait_until(lambda: not runs(handle.process.pid))  # for /proc it is a zombie already
     assert handle.exit_code() is None
-    assert _programs.end(_processes.started())
+    assert _programs.end(_programs.started())
     assert handle.exit_code() is not None
 
 
@@ -123,19 +120,6 @@ def test_orphans_of_a_killed_parent_are_ended_too(place):
     assert not runs(orphan)
 
 
-def test_a_recycled_process_id_is_not_touched():
-    stranger = subprocess.Popen(SLEEP)
-    try:
-        handle = _programs.start(SLEEP, "node", "sleeper")
-        _programs.end([handle.start])
-        _processes.add(dataclasses.replace(handle.start, pid=stranger.pid))
-        assert ros_node.ros_kill_all_processes()
-        assert stranger.poll() is None
-    finally:
-        stranger.kill()
-        stranger.wait()
-
-
 def test_another_masters_processes_are_not_touched(monkeypatch):
     handle = _programs.start(SLEEP, "node", "sleeper")
     mine = os.environ["ROS_MASTER_URI"]
@@ -146,11 +130,10 @@ def test_another_masters_processes_are_not_touched(monkeypatch):
 
 
 def test_names_of_this_machine_mean_the_same_master(monkeypatch):
-    path = _processes.list_path()
-    monkeypatch.setenv(
-        "ROS_MASTER_URI", os.environ["ROS_MASTER_URI"].replace("127.0.0.1", "localhost")
-    )
-    assert _processes.list_path() == path
+    handle = _programs.start(SLEEP, "node", "sleeper")
+    address = os.environ["ROS_MASTER_URI"].replace("127.0.0.1", "localhost")
+    monkeypatch.setenv("ROS_MASTER_URI", address)
+    assert _programs.started() == [handle.start]
 
 
 @pytest.mark.parametrize(
@@ -204,12 +187,12 @@ def test_a_launch_whose_caller_was_killed_is_waited_for(place, monkeypatch, stub
     code = "from ros_utils._internal import programs as p; import signal;"
     starter = python(f"{code} p.start({command!r}, 'launch', 'slow'); signal.pause()")
     read_number(place / "listens")
-    (entry,) = _processes.started()
-    assert _programs.end_orphans() and runs(entry.pid), "its caller lives"
+    (entry,) = _programs.started()
+    assert _programs.end_orphans() and _processes.family(entry.token), "its caller lives"
     starter.kill()
     starter.wait(BOUND)
-    assert _programs.end_orphans() and not runs(entry.pid)
-    assert _processes.started() == []
+    assert _programs.end_orphans() and not _processes.family(entry.token)
+    assert _programs.started() == []
 
 
 def test_a_program_of_ours_does_not_end_itself(place):
@@ -232,38 +215,32 @@ def test_killing_without_a_master_waits_for_nothing(monkeypatch):
     assert ros_launch.ros_kill_launch_process()
 
 
-def test_a_broken_registry_is_an_empty_one():
-    handle = _programs.start(SLEEP, "node", "sleeper")
-    Path(_processes.list_path()).write_text("{ not JSON")
-    assert _processes.started() == []
-    _processes.add(handle.start)
-    assert json.loads(Path(_processes.list_path()).read_text())[0]["pid"] == handle.process.pid
-
-
-def test_starts_at_the_same_time_are_all_remembered():
-    starters = [python(STARTER, "stay") for _ in range(4)]
-    pids = {int(starter.stdout.readline()) for starter in starters}
-    assert {entry.pid for entry in _processes.started()} == pids
-    assert ros_node.ros_kill_all_processes()
-    for starter in starters:
-        starter.send_signal(signal.SIGINT)
-        starter.wait(BOUND)
-        starter.stdout.close()
-
-
 def test_output_goes_to_a_log_and_its_error_is_the_reason():
     code = "echo one; echo 'ValueError: two'; echo three; exit 3"
     handle = _programs.start(["sh", "-c", code], "node", "talker")
-    assert wait_until_ready(lambda: False, handle, BOUND) is Readiness.ENDED
+    handle.process.wait(BOUND)
     assert handle.exit_code() == 3
     assert handle.reason() == "ValueError: two"
     assert handle.lines("t") == ["ValueError: two", "three"]
 
 
-def test_a_wait_has_a_bound():
-    handle = _programs.start(SLEEP, "node", "sleeper")
-    assert wait_until_ready(lambda: False, handle, 0.1) is Readiness.LATE
-    assert wait_until_ready(lambda: True, handle, 0.1) is Readiness.READY
+@pytest.mark.parametrize(
+    ("command", "is_there", "text"),
+    [
+        (SLEEP, False, "sleeper: not there after 0.1 s; ended it: it said nothing"),
+        (["sh", "-c", "exit 3"], False, "sleeper: ended with exit code 3"),
+        (["true"], False, "sleeper: ended with exit code 0"),
+        (SLEEP, True, ""),
+    ],
+)
+def test_a_start_is_waited_for(capsys, command, is_there, text):
+    handle = _programs.start(command, "node", "sleeper")
+    timeout = BOUND if command is not SLEEP else 0.1
+    started = _programs.await_start(
+        handle, lambda: is_there, "not there", timeout, None, may_end=False
+    )
+    assert bool(started) is is_there
+    assert text in capsys.readouterr().err
 
 
 def test_a_missing_program_is_refused():
@@ -279,7 +256,7 @@ def test_in_a_window_the_programs_exit_code_is_known(place, monkeypatch, code):
     monkeypatch.setenv("PATH", f"{place}:{os.environ['PATH']}")
     monkeypatch.setenv("DISPLAY", ":0")
     handle = _programs.start(["sh", "-c", f"exit {code}"], "node", "a 'quoted' name", window=True)
-    assert wait_until_ready(lambda: False, handle, BOUND) is Readiness.ENDED
+    handle.process.wait(BOUND)
     assert handle.exit_code() == code
 
 
@@ -287,4 +264,4 @@ def test_without_a_display_a_window_falls_back_to_a_log(capsys):
     handle = _programs.start(["echo", "hello"], "node", "greeter", window=True)
     handle.process.wait(BOUND)
     assert handle.lines() == ["hello"]
-    assert handle.start.log in capsys.readouterr().out
+    assert handle.log in capsys.readouterr().out

@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from xml.etree.ElementTree import Element
 
-from bullet_gazebo.physics.description import DescriptionError, LimitExceeded
+from bullet_gazebo.physics.description import DescriptionError, LimitExceeded, Plugin
+from bullet_gazebo.physics.pose import Vector
 from file_access.content import FileError, TooLarge
 from file_access.xml_text import parse
 
@@ -74,6 +75,15 @@ def numbers(text: str | None, where: str, count: int) -> tuple[float, ...]:
     return tuple(finite(word, where) for word in words)
 
 
+def direction(xyz: tuple[float, ...], what: str) -> Vector:
+    """Returns a vector scaled to length 1; `what` it is, for the error about one that has no direction."""
+    x, y, z = xyz
+    length = math.sqrt(x * x + y * y + z * z)
+    if not 0.0 < length < math.inf:
+        raise DescriptionError(f"{what} has length {length:g}")
+    return (x / length, y / length, z / length)
+
+
 def truth(text: str | None, default: bool = False) -> bool:
     """Returns the truth value of an element's text; `default` if it is empty."""
     word = (text or "").strip().lower()
@@ -109,3 +119,13 @@ def positive(sizes: tuple[float, ...], where: str) -> tuple[float, ...]:
     if min(sizes) <= 0.0:
         raise DescriptionError(f"{where}: sizes must be above 0, not {sizes}")
     return sizes
+
+
+def read_plugin(element: Element) -> Plugin:
+    return Plugin(element.get("filename", ""), element.get("name", ""), element)
+
+
+def name_sensor(element: Element, owner: str) -> str:
+    """Returns a description of a sensor that is left out."""
+    kind, name = shown(element.get("type", "unknown")), shown(element.get("name", ""))
+    return f"{kind} sensor '{name}' of {owner}"

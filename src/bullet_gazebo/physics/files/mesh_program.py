@@ -17,8 +17,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from bullet_gazebo.physics.description import DescriptionError, Mesh
-from bullet_gazebo.physics.files.elements import finite, numbers, place, shown
+from bullet_gazebo.physics.files.elements import numbers, place, shown
 from bullet_gazebo.physics.files.hull import hull_points
+from bullet_gazebo.physics.files.mesh_looks import axes_of, read_glb, read_parts
 from bullet_gazebo.physics.files.meshes import Submesh
 from file_access.content import FileError, read_file
 from file_access.xml_text import parse
@@ -40,10 +41,6 @@ READ = ("v", "f", "o", "g")
 
 # COLLADA
 SPACE = "http://www.collada.org/2005/11/COLLADASchema"
-UP_AXES = {  # turned so that z is up
-    "X_UP": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
-    "Y_UP": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
-}
 FACES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 OF_NODES = ("node", "instance_node", "instance_geometry",
             "matrix", "translate", "rotate", "scale", "lookat", "skew")  # fmt: skip
@@ -56,12 +53,18 @@ Part = tuple[np.ndarray, np.ndarray]
 
 
 def answer(request: bytes) -> bytes:
-    """Answers a request of `meshes.read_mesh`: the digest, vertices, faces and hulls of a file."""
-    path, submesh = json.loads(request)
-    mesh = load(Path(path), Submesh(*submesh) if submesh else None)
-    stream = BytesIO()
-    stream.write(mesh.digest.encode())
-    for array in (mesh.vertices, mesh.faces, *mesh.hulls):
+    """Answers a request of `meshes`: the digest, vertices, faces and hulls of a file, or its looks."""
+    what, name, submesh = json.loads(request)
+    path, stream = Path(name), BytesIO()
+    if what == "glb":
+        return read_glb(path)
+    if what == "parts":
+        arrays = read_parts(path)
+    else:
+        mesh = load(path, Submesh(*submesh) if submesh else None)
+        stream.write(mesh.digest.encode())
+        arrays = iter((mesh.vertices, mesh.faces, *mesh.hulls))
+    for array in arrays:
         np.save(stream, array, allow_pickle=False)
     return stream.getvalue()
 
@@ -290,15 +293,6 @@ def _read_collada(data: bytes, only: str) -> list[Part]:
         faces.append(part["faces"] + count)
         count += len(points)
     return [(np.concatenate(vertices), np.concatenate(faces))]
-
-
-def axes_of(root: Element) -> np.ndarray:
-    """Returns the matrix (3, 3) that takes a COLLADA file's coordinates to [m], z up."""
-    unit = root.find("asset/unit")
-    meters = 1.0 if unit is None else finite(unit.get("meter", "1"), "<unit meter>")
-    if not meters > 0.0:
-        raise DescriptionError(f"<unit meter>: a unit of {meters} m has no length")
-    return meters * UP_AXES.get(root.findtext("asset/up_axis", "").strip(), np.eye(3))
 
 
 def _leave_shapes(root: Element) -> None:

@@ -1,19 +1,26 @@
-"""Mesh files as checked triangles. A limited child process reads them (`mesh_program`)."""
+"""Mesh files as checked triangles, and with their colours and textures.
+
+A limited child process reads them (`mesh_program`, `mesh_looks`).
+"""
 
 import json
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from bullet_gazebo.physics.description import DescriptionError, Mesh
+from bullet_gazebo.physics.description import Color, DescriptionError, Mesh
 from bullet_gazebo.physics.files.elements import place
 from file_access.limited import LimitedProcess, Limits, RequestRefused
 
 SUFFIXES = (".stl", ".dae", ".obj")
+PLAIN = (".stl",)  # of files that have no materials
 LIMITS = Limits(processor_time=60, wall_time=120.0, memory=4 << 30, output=1 << 30)
 DIGEST = 32  # characters
+MOST_KEPT = 32  # files with their looks
 
 # It stays for further meshes: starting Python and importing trimesh takes longer than most files.
 _process = LimitedProcess("bullet_gazebo.physics.files.mesh_program:answer", LIMITS)
@@ -29,6 +36,54 @@ class Submesh(NamedTuple):
     centred: bool
 
 
+class MeshPart(NamedTuple):
+    """Triangles of one colour or texture: corners (n, 3, 3), and a colour, which also tints the texture.
+
+    `texture` (h, w, 3) is of uint8. `uvs` (n, 3, 2) are the corners' places in it, with v upwards; it repeats
+    beyond [0, 1].
+    """
+
+    triangles: np.ndarray
+    rgba: Color | None
+    texture: np.ndarray | None = None
+    uvs: np.ndarray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MeshLook:
+    """A mesh file as it is drawn: its triangles, and its materials if it has any that can be read."""
+
+    path: Path
+    mesh: Mesh
+
+    @cached_property
+    def glb(self) -> bytes | None:
+        """Binary glTF for a browser; None without materials, or if it is too large."""
+        return self._ask("glb") or None
+
+    @cached_property
+    def parts(self) -> list[MeshPart]:
+        """The parts for a renderer of triangles; none without materials."""
+        fields = iter(_arrays(BytesIO(self._ask("parts"))))
+        return [
+            MeshPart(
+                triangles,
+                (*rgba.tolist(),) if rgba.size else None,
+                texture if texture.size else None,
+                uvs if uvs.size else None,
+            )
+            for triangles, rgba, texture, uvs in zip(fields, fields, fields, fields, strict=True)
+        ]
+
+    def _ask(self, what: str) -> bytes:
+        if self.path.suffix.lower() in PLAIN:
+            return b""
+        try:
+            return _process.ask(json.dumps([what, str(self.path), None]).encode())
+        except RequestRefused:
+            return b""
+
+
 def read_mesh(path: Path, submesh: Submesh | None = None) -> Mesh:
     """Returns the mesh of an STL, COLLADA or OBJ file, or of one named part of it.
 
@@ -36,19 +91,40 @@ def read_mesh(path: Path, submesh: Submesh | None = None) -> Mesh:
         DescriptionError: if it can't be simulated: the file, the place in it and the fault, in one line.
     """
     check_mesh(path)
-    request = json.dumps([str(path), submesh])
     with place(f"mesh '{path}'"):
         try:
-            data = _process.ask(request.encode())
+            data = _process.ask(json.dumps(["mesh", str(path), submesh]).encode())
         except RequestRefused as error:
             raise DescriptionError(str(error)) from error
     stream = BytesIO(data)
-    digest, arrays = stream.read(DIGEST).decode(), []
-    while stream.tell() < len(data):
+    digest = stream.read(DIGEST).decode()
+    vertices, faces, *hulls = _arrays(stream)
+    return Mesh(vertices, faces, tuple(hulls), digest)
+
+
+def read_look(path: str) -> MeshLook:
+    """Reads the mesh file of a visual; the same one, unchanged, is read once.
+
+    Raises:
+        DescriptionError: it can't be shown; one line with the file and what is wrong.
+    """
+    check_mesh(Path(path))
+    found = Path(path).stat()
+    return _look(Path(path), found.st_mtime_ns, found.st_size)
+
+
+@lru_cache(MOST_KEPT)
+def _look(path: Path, _changed: int, _size: int) -> MeshLook:
+    return MeshLook(path, read_mesh(path))
+
+
+def _arrays(stream: BytesIO) -> list[np.ndarray]:
+    """Returns the arrays that the child process has written from here on."""
+    arrays = []
+    while stream.tell() < len(stream.getbuffer()):
         arrays.append(np.load(stream, allow_pickle=False))
         arrays[-1].setflags(write=False)
-    vertices, faces, *hulls = arrays
-    return Mesh(vertices, faces, tuple(hulls), digest)
+    return arrays
 
 
 def check_mesh(path: Path) -> None:

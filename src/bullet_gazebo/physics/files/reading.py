@@ -17,7 +17,6 @@ from file_access.xml_text import MAX_ELEMENTS
 MeshFile = tuple[str, Mesh | None]
 """A file's path, and its mesh if it was read."""
 
-
 # Limits on the text and all that it includes, counted each time it is included.
 MAX_FILES = 1000  # different ones
 MAX_MESH_BYTES = 400_000_000  # of different mesh files, which take about twice that of memory
@@ -84,44 +83,6 @@ class Resources:
             return []
 
 
-@dataclass
-class MeshFinder:
-    """Finds the mesh files of one model. Those of visuals may be missing, with a warning."""
-
-    resources: Resources
-    read: Callable[[Path, Submesh | None], Mesh]
-    folder: Path | None = None
-    warnings: list[str] = field(default_factory=list)
-
-    def find(
-        self, uri: str, where: str, needed: bool, submesh: Submesh | None = None
-    ) -> MeshFile | None:
-        """Returns the file's path and its mesh, or the `submesh`; None for one that is left out.
-
-        A visual's isn't `needed`: it is looked for but not read, since nothing is drawn here.
-
-        Raises:
-            DescriptionError: if it is `needed` and can't be used.
-        """
-        try:
-            if not uri.strip():
-                raise DescriptionError("the mesh has no file name")
-            path = self.resources.find(uri, self.folder).absolute()
-            if not needed:
-                check_mesh(path)
-                return str(path), None
-            return str(path), self.read(path, submesh)
-        except DescriptionError as error:
-            if needed:
-                raise type(error)(f"{where}: {error}") from error
-            self.warnings.append(f"{where}: {error}; it is left out")
-            return None
-
-
-def _never() -> bool:
-    return False
-
-
 class Reading:
     """Counts what reading one model or world takes, and ends it with LimitExceeded beyond a limit.
 
@@ -130,7 +91,7 @@ class Reading:
     read once.
     """
 
-    def __init__(self, cancelled: Callable[[], bool] = _never) -> None:
+    def __init__(self, cancelled: Callable[[], bool] = lambda: False) -> None:
         """
         Args:
             cancelled: ends the reading when it returns true. The reading thread makes this object, since
@@ -223,3 +184,37 @@ class Reading:
         if self._elements > MAX_ELEMENTS:
             raise LimitExceeded(f"more than {MAX_ELEMENTS} elements (MAX_ELEMENTS)")
         self.check()
+
+
+@dataclass
+class MeshFinder:
+    """Finds the mesh files of one model. Those of visuals may be missing, with a warning."""
+
+    resources: Resources
+    reading: Reading
+    folder: Path | None = None
+    warnings: list[str] = field(default_factory=list)
+
+    def find(
+        self, uri: str, where: str, needed: bool, submesh: Submesh | None = None
+    ) -> MeshFile | None:
+        """Returns the file's path and its mesh, or the `submesh`; None for one that is left out.
+
+        A visual's isn't `needed`: it is looked for but not read, since nothing is drawn here.
+
+        Raises:
+            DescriptionError: if it is `needed` and can't be used.
+        """
+        try:
+            if not uri.strip():
+                raise DescriptionError("the mesh has no file name")
+            path = self.resources.find(uri, self.folder).absolute()
+            if not needed:
+                check_mesh(path)
+                return str(path), None
+            return str(path), self.reading.mesh(path, submesh)
+        except DescriptionError as error:
+            if needed:
+                raise type(error)(f"{where}: {error}") from error
+            self.warnings.append(f"{where}: {error}; it is left out")
+            return None

@@ -4,7 +4,6 @@ Faults are treated as urdfdom and sdformat do (docs/differences.md lists excepti
 that can't be read is left out of its link with a warning; a joint that can't be read refuses the robot.
 """
 
-import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -19,17 +18,19 @@ from bullet_gazebo.physics.description import (
     LimitExceeded,
     Link,
     ModelDescription,
-    Plugin,
     Shape,
 )
 from bullet_gazebo.physics.engine_form import check_shapes
 from bullet_gazebo.physics.files import elements
 from bullet_gazebo.physics.files.elements import (
+    direction,
     files_named_by_a_model,
     finite,
+    name_sensor,
     named,
     numbers,
     positive,
+    read_plugin,
     shown,
 )
 from bullet_gazebo.physics.files.reading import MeshFinder, Reading, Resources
@@ -37,11 +38,6 @@ from bullet_gazebo.physics.lumping import check_count, find_roots, lump_fixed_jo
 from bullet_gazebo.physics.pose import Pose, from_rpy
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-UNUSED = {  # elements that urdfdom reads and the physics doesn't use, with their numbers
-    "mimic": ("multiplier", "offset"),
-    "calibration": ("rising", "falling"),
-    "safety_controller": ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"),
-}
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 Part = TypeVar("Part")
 YES = ("true", "yes", "1")
@@ -93,7 +89,6 @@ def read_joint(element: Element, warnings: list[str]) -> Joint:
     _set_axis(joint, element, place)
     _set_limit(joint, element, place, warnings)
     _set_dynamics(joint, element, place)
-    _check_unused(element, place)
     return joint
 
 
@@ -101,11 +96,7 @@ def _set_axis(joint: Joint, element: Element, place: str) -> None:
     axis = element.find("axis")
     if axis is None or not joint.movable:
         return
-    x, y, z = read_numbers(axis, "xyz", place, 3)
-    length = math.sqrt(x * x + y * y + z * z)
-    if not 0.0 < length < math.inf:
-        raise DescriptionError(f"{place}: the axis has length {length:g}")
-    joint.axis = (x / length, y / length, z / length)
+    joint.axis = direction(read_numbers(axis, "xyz", place, 3), f"{place}: the axis")
 
 
 def _set_limit(joint: Joint, element: Element, place: str, warnings: list[str]) -> None:
@@ -132,18 +123,6 @@ def _set_dynamics(joint: Joint, element: Element, place: str) -> None:
         joint.friction = read_number(dynamics, "friction", place)
 
 
-def _check_unused(element: Element, place: str) -> None:
-    """Refuses values that other programs couldn't read."""
-    for tag, keys in UNUSED.items():
-        child = element.find(tag)
-        if child is None:
-            continue
-        if tag == "mimic" and not child.get("joint"):
-            raise DescriptionError(f"{place}: <mimic joint=…> is missing")
-        for key in keys:
-            read_number(child, key, place)
-
-
 def _referred_link(element: Element, role: str, place: str) -> str:
     child = element.find(role)
     if child is None or not child.get("link"):
@@ -156,8 +135,6 @@ class LinkReader:
     """Reads the links of one robot."""
 
     meshes: MeshFinder
-    reading: Reading
-    warnings: list[str]
     _materials: dict[str, Color | None] = field(default_factory=dict)
 
     def learn_materials(self, robot: Element) -> None:
@@ -181,14 +158,17 @@ class LinkReader:
         Raises:
             DescriptionError: if it has no name, or a collision's mesh can't be used.
         """
-        self.reading.check()
+        self.meshes.reading.check()
         link = Link(named(element, "link"))
         place = f"link '{link.name}'"
         inertial = element.find("inertial")
         if inertial is not None:
-            link.inertia = self._or_none(_inertia, inertial, f"{place}, inertial")
-            if link.inertia is not None:
-                _check_possible(link.inertia, f"{place}, inertial")
+            link.inertia = found = self._or_none(_inertia, inertial, f"{place}, inertial")
+            # Gazebo's engine crashes over it.
+            if found is not None and min(found.mass, found.ixx, found.iyy, found.izz) < 0.0:
+                raise DescriptionError(
+                    f"{place}, inertial: mass and moments of inertia can't be negative"
+                )
         link.collisions = list(self._shapes(element, "collision", place))
         link.visuals = list(self._shapes(element, "visual", place))
         return link
@@ -202,13 +182,13 @@ class LinkReader:
         except LimitExceeded:
             raise
         except DescriptionError as error:
-            self.warnings.append(f"{error}; it is left out")
+            self.meshes.warnings.append(f"{error}; it is left out")
             return None
 
     def _shapes(self, link: Element, tag: str, place: str) -> Iterator[Shape]:
         place = f"{place}, {tag}"
         for element in link.findall(tag):
-            self.reading.check()
+            self.meshes.reading.check()
             shape = self._or_none(_shape, element, place)
             if shape is not None and shape.kind == "mesh":
                 shape = self._with_mesh(shape, element, place)
@@ -224,7 +204,7 @@ class LinkReader:
         except DescriptionError as error:
             if needed:
                 raise
-            self.warnings.append(f"{error}; it is left out")
+            self.meshes.warnings.append(f"{error}; it is left out")
             return None
         return None if found is None else replace(shape, mesh=found[0], solid=found[1])
 
@@ -245,12 +225,6 @@ def _inertia(inertial: Element, place: str) -> Inertia:
     moments = {key: read_number(tensor, key, place) for key in MOMENTS}
     value = read_number(mass, "value", place, required=True)
     return Inertia(mass=value, com=read_origin(inertial, place), **moments)
-
-
-def _check_possible(inertia: Inertia, place: str) -> None:
-    """Refuses a negative mass or moment of inertia: Gazebo's engine crashes over it."""
-    if min(inertia.mass, inertia.ixx, inertia.iyy, inertia.izz) < 0.0:
-        raise DescriptionError(f"{place}: mass and moments of inertia can't be negative")
 
 
 def _shape(element: Element, place: str) -> Shape:
@@ -313,16 +287,6 @@ def apply_extensions(model: ModelDescription, robot: Element) -> None:
             model.warnings.append(
                 f"<gazebo reference='{shown(reference)}'> refers to no link or joint"
             )
-
-
-def read_plugin(element: Element) -> Plugin:
-    return Plugin(element.get("filename", ""), element.get("name", ""), element)
-
-
-def name_sensor(element: Element, owner: str) -> str:
-    """Returns a description of a sensor that is left out."""
-    kind, name = shown(element.get("type", "unknown")), shown(element.get("name", ""))
-    return f"{kind} sensor '{name}' of {owner}"
 
 
 def _apply_to_model(model: ModelDescription, block: Element) -> None:
@@ -400,7 +364,7 @@ def read_urdf(robot: Element, resources: Resources, reading: Reading) -> ModelDe
     if robot.tag != "robot":
         raise DescriptionError(f"the root element is <{shown(robot.tag)}>, not <robot>")
     warnings: list[str] = []
-    reader = LinkReader(MeshFinder(resources, reading.mesh, warnings=warnings), reading, warnings)
+    reader = LinkReader(MeshFinder(resources, reading, warnings=warnings))
     reader.learn_materials(robot)
     found = robot.findall("link")
     check_count(len(found))

@@ -23,7 +23,7 @@ from bullet_gazebo.physics.files.sdf import (
     renamed,
     sdf_version,
 )
-from bullet_gazebo.physics.files.sdf_links import read_color, read_pose, value
+from bullet_gazebo.physics.files.sdf_parts import read_color, read_pose, value
 from bullet_gazebo.physics.files.urdf import read_urdf
 from bullet_gazebo.physics.pose import Pose, Vector
 from bullet_gazebo.physics.world import GRAVITY, TIME_STEP, ground_plane

@@ -13,7 +13,7 @@ import rosgraph
 from ros_calls import master
 
 NODE = "gazebo"
-METHOD = "gazeboWorld"  # of the node's XML-RPC server; node/world_control.py answers it
+METHOD = "gazeboWorld"  # of the node's XML-RPC server; `world_services.WorldControl` answers it
 CHUNK = 1000  # steps in one call, so that an interrupted client stops soon
 TIMEOUT = 60.0  # [s] for one call
 

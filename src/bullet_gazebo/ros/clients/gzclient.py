@@ -19,7 +19,7 @@ from bullet_gazebo.ros.common.node_process import (
     one_at_a_time,
     wait_for_master,
 )
-from bullet_gazebo.ros.common.rospy_node import stop_hearing_clock
+from bullet_gazebo.ros.common.rospy_internals import stop_hearing_clock
 from ros_calls.master import NoAnswer, living_address
 from ros_calls.requirements import WINDOW, lack
 from web_viewer.address import PortInUse, add_flags, find_address

@@ -1,15 +1,25 @@
 """The commands `controller_manager` and `controller_group` (docs/contract/ros_control.md 2).
 
-Both print what the manager did. They end with 0, even if it refused; with 1 if there is no manager or no such
-group; with 2 for a wrong command line.
+They end with 0, even if the manager refused; with 1 if there is no manager or no such group; with 2 for a
+wrong command line.
 """
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 
 import rospy
+from controller_manager.controller_manager_interface import (
+    list_controller_types,
+    list_controllers,
+    load_controller,
+    loaded_controllers,
+    reload_libraries,
+    start_controller,
+    stop_controller,
+    switch_controllers,
+    unload_controller,
+)
 
-from bullet_gazebo.ros.clients import manager_interface as manager
 from ros_calls import master
 from ros_calls.waiting import service_comes_up
 
@@ -46,34 +56,9 @@ controller in no group is left alone.
 The manager is the one in this program's namespace; another one: __ns:=/NAMESPACE"""
 HELP = ("-h", "--help")
 SAME = {"sp": "spawn", "kl": "kill", "lc": "list", "lt": "list-types"}
-
-Step = tuple[str, Callable[[str], bool]]
-LOAD: Step = ("load_controller", manager.load_controller)
-UNLOAD: Step = ("unload_controller", manager.unload_controller)
-START: Step = ("switch_controller", manager.start_controller)
-STOP: Step = ("switch_controller", manager.stop_controller)
-ON_CONTROLLERS = {  # command: service and function of each of its steps
-    "load": [LOAD],
-    "unload": [UNLOAD],
-    "start": [START],
-    "stop": [STOP],
-    "spawn": [LOAD, START],
-    "kill": [STOP, UNLOAD],
-}
-ON_MANAGER: dict[tuple[str, ...], tuple[list[str], Callable[[], object]]] = {
-    ("list",): (["list_controllers"], manager.list_controllers),
-    ("list-types",): (["list_controller_types"], manager.list_controller_types),
-    ("reload-libraries",): (
-        ["reload_controller_libraries"],
-        lambda: manager.reload_libraries(force_kill=True),
-    ),
-    ("reload-libraries", "--restore"): (
-        ["reload_controller_libraries", "list_controllers", "load_controller", "switch_controller"],
-        lambda: manager.reload_libraries(force_kill=True, restore=True),
-    ),
-}
 PARAMETER = "controller_groups"
-PATIENCE = 30.0  # [s] for each service; launch files start scripts before there is a manager
+LAST = "controller_manager/reload_controller_libraries"  # of a manager's services to come up
+PATIENCE = 30.0  # [s]; launch files start scripts before there is a manager
 NOTICE = 2.0  # [s] until the command prints which service it waits for
 
 Groups = dict[str, list[str]]
@@ -83,17 +68,32 @@ class CommandFailed(Exception):
     """There is no master, no manager, or no such group; the text says which."""
 
 
+ON_CONTROLLERS: dict[str, tuple[Callable[[str], bool], ...]] = {
+    "load": (load_controller,),
+    "unload": (unload_controller,),
+    "start": (start_controller,),
+    "stop": (stop_controller,),
+    "spawn": (load_controller, start_controller),
+    "kill": (stop_controller, unload_controller),
+}
+ON_MANAGER: dict[tuple[str, ...], Callable[[], object]] = {
+    ("list",): list_controllers,
+    ("list-types",): list_controller_types,
+    ("reload-libraries",): lambda: reload_libraries(force_kill=True),
+    ("reload-libraries", "--restore"): lambda: reload_libraries(force_kill=True, restore=True),
+}
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs `controller_manager`; returns its exit code."""
     arguments = rospy.myargv(list(sys.argv if argv is None else argv))[1:]
-    command, *rest = arguments or [""]
+    command, *names = arguments or [""]
     command = SAME.get(command, command)
-    if command in ON_CONTROLLERS and rest:
+    if command in ON_CONTROLLERS and names:
         steps = ON_CONTROLLERS[command]
-        return _run("controller_manager", lambda: _on_controllers(steps, rest))
-    if (command, *rest) in ON_MANAGER:
-        services, act = ON_MANAGER[command, *rest]
-        return _run("controller_manager", lambda: _on_manager(services, act))
+        return _run("controller_manager", lambda: _on_controllers(steps, names))
+    if (command, *names) in ON_MANAGER:
+        return _run("controller_manager", lambda: _on_manager(ON_MANAGER[command, *names]))
     print(MANAGER_USAGE)
     return 0 if command in HELP else 2
 
@@ -105,7 +105,8 @@ def group_main(argv: Sequence[str] | None = None) -> int:
         case ["list"]:
             return _run("controller_group", lambda: _list_groups(_read_groups()))
         case ["spawn", group]:
-            return _run("controller_group", lambda: _on_controllers([LOAD, START], _group(group)))
+            steps = ON_CONTROLLERS["spawn"]
+            return _run("controller_group", lambda: _on_controllers(steps, _group(group)))
         case ["switch", group]:
             return _run("controller_group", lambda: _switch_to(_group(group)))
     print(GROUP_USAGE)
@@ -121,40 +122,43 @@ def _run(name: str, act: Callable[[], object]) -> int:
     return 0
 
 
-def _on_manager(services: Sequence[str], act: Callable[[], object]) -> None:
-    _require(services)
+def _on_manager(act: Callable[[], object]) -> None:
+    _require_manager()
     act()
 
 
-def _on_controllers(steps: Sequence[Step], names: Sequence[str]) -> None:
-    _require(service for service, _ in steps)
-    for _, step in steps:
+def _on_controllers(steps: Sequence[Callable[[str], bool]], names: Sequence[str]) -> None:
+    _require_manager()
+    for step in steps:
         for name in names:
             step(name)
 
 
-def _require(services: Iterable[str]) -> None:
-    """Waits until services of the manager in the program's namespace are offered.
-
-    Raises:
-        CommandFailed: one of them isn't there in time.
-    """
+def _require_master() -> None:
     if not master.is_up():
         raise CommandFailed(f"there is no ROS master at {master.uri()}")
-    for service in services:
-        name = str(rospy.resolve_name(f"controller_manager/{service}"))
-        if service_comes_up(name, NOTICE):
-            continue
-        print(f"waiting up to {PATIENCE:g} s for the service {name}", file=sys.stderr)
-        if not service_comes_up(name, PATIENCE - NOTICE):
-            raise CommandFailed(
-                f"there is no controller manager: nobody offers the service {name}. Is the robot"
-                " spawned, and is its manager in this namespace? (Another one: __ns:=/NAMESPACE)"
-            )
+
+
+def _require_manager() -> None:
+    """Waits for the manager in the program's namespace.
+
+    Raises:
+        CommandFailed: it doesn't come up in time.
+    """
+    _require_master()
+    name = str(rospy.resolve_name(LAST))
+    if service_comes_up(name, NOTICE):
+        return
+    print(f"waiting up to {PATIENCE:g} s for the service {name}", file=sys.stderr)
+    if not service_comes_up(name, PATIENCE - NOTICE):
+        raise CommandFailed(
+            f"there is no controller manager: nobody offers the service {name}. Is the robot"
+            " spawned, and is its manager in this namespace? (Another one: __ns:=/NAMESPACE)"
+        )
 
 
 def _read_groups() -> Groups:
-    _require(())  # just the master, for its parameters
+    _require_master()
     found = rospy.get_param(PARAMETER, None)
     place = f"the parameter {rospy.resolve_name(PARAMETER)}"
     if found is None:
@@ -185,11 +189,11 @@ def _list_groups(groups: Groups) -> None:
 
 
 def _switch_to(wanted: Sequence[str]) -> None:
-    _require(("list_controllers", "load_controller", "switch_controller"))
-    states = {each.name: each.state for each in manager.loaded_controllers()}
+    _require_manager()
+    states = {each.name: each.state for each in loaded_controllers()}
     for name in wanted:
         if name not in states:
-            manager.load_controller(name)
+            load_controller(name)
     start = [name for name in wanted if states.get(name) != "running"]
     grouped = {name for names in _read_groups().values() for name in names}
     stop = [
@@ -198,4 +202,4 @@ def _switch_to(wanted: Sequence[str]) -> None:
         if state == "running" and name in grouped and name not in wanted
     ]
     if start or stop:
-        manager.switch_controllers(start, stop)
+        switch_controllers(start, stop)

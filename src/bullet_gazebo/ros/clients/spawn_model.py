@@ -12,10 +12,15 @@ from xml.etree import ElementTree
 
 import rospy
 from gazebo_msgs.srv import DeleteModel, GetWorldProperties
+from gazebo_ros.gazebo_interface import (
+    set_model_configuration_client,
+    spawn_sdf_model_client,
+    spawn_urdf_model_client,
+    wait_for_service,
+)
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import Empty
 
-from bullet_gazebo.ros.clients import gazebo_interface
 from bullet_gazebo.ros.common.node_process import SignalHandler, init_node
 from file_access.content import MAX_BYTES, FileError, read_file
 from file_access.xml_text import decode
@@ -23,10 +28,10 @@ from file_access.xml_text import parse as parse_xml
 from ros_calls.service import ServiceClient, ServiceFailed
 from ros_calls.waiting import wait_until
 
-REMIND = 10.0  # [s of wall time]
 FAREWELL = 3.0  # [s] for the end of spawning and for a call during shutdown
 INTERRUPTED = -1
 INCLUDE = '<sdf version="1.6"><world name="default"><include><uri>model://{}</uri></include></world></sdf>'
+REMIND = 10.0  # [s of wall time]
 
 
 class CannotSpawn(Exception):
@@ -113,10 +118,13 @@ def _run(options: argparse.Namespace, piped: bytes) -> int:
     if options.wait:
         _wait_for_model(gazebo, options.wait)
     xml = _prepared(_read(options, piped), options.package_to_model)
-    gazebo_interface.wait_for_service(f"{gazebo}/spawn_{'urdf' if options.urdf else 'sdf'}_model")
+    wait_for_service(f"{gazebo}/spawn_{'urdf' if options.urdf else 'sdf'}_model")
     with _Bond(gazebo, options.model) if options.bond else contextlib.nullcontext():
         _spawn(options, xml, gazebo)
-    placed = _place_joints(options, gazebo)
+    placed = True
+    if options.joints:
+        names, positions = zip(*options.joints, strict=True)
+        placed = bool(set_model_configuration_client(options.model, "", names, positions, gazebo))
     if options.unpause:
         _call(f"{gazebo}/unpause_physics", Empty)
     if options.bond:
@@ -126,11 +134,7 @@ def _run(options: argparse.Namespace, piped: bytes) -> int:
 
 
 def _spawn(options: argparse.Namespace, xml: str, gazebo: str) -> None:
-    spawn = (
-        gazebo_interface.spawn_urdf_model_client
-        if options.urdf
-        else gazebo_interface.spawn_sdf_model_client
-    )
+    spawn = spawn_urdf_model_client if options.urdf else spawn_sdf_model_client
     namespace = options.robot_namespace
     if namespace is None:
         namespace = rospy.get_namespace()
@@ -163,20 +167,10 @@ class _Bond:
             print(f"spawn_model: '{self._model}' was not deleted: {fault}", file=sys.stderr)
 
 
-def _place_joints(options: argparse.Namespace, gazebo: str) -> bool:
-    if not options.joints:
-        return True
-    names = [name for name, _ in options.joints]
-    positions = [position for _, position in options.joints]
-    return bool(
-        gazebo_interface.set_model_configuration_client(options.model, "", names, positions, gazebo)
-    )
-
-
 def _wait_for_model(gazebo: str, name: str) -> None:
     """Waits for a model, also in a paused world, whose state topics are silent."""
     service = f"{gazebo}/get_world_properties"
-    gazebo_interface.wait_for_service(service)
+    wait_for_service(service)
     rospy.loginfo("spawn_model: waiting for model '%s'", name)
 
     def is_there() -> bool:

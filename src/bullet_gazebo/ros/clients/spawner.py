@@ -13,23 +13,81 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import rosparam
 import rospy
+from controller_manager_msgs import srv
 from std_msgs.msg import Bool
 
-from bullet_gazebo.ros.clients.manager_interface import BEST_EFFORT, STRICT, ManagerClient
 from bullet_gazebo.ros.common.node_process import SignalHandler, init_node
 from file_access.content import FileError, read_file
 from file_access.yaml_text import load_parameters
-from ros_calls.service import ServiceFailed
-from ros_calls.waiting import wait_until
+from ros_calls.service import ServiceClient, ServiceFailed
+from ros_calls.waiting import service_comes_up, wait_until
 
+BEST_EFFORT = srv.SwitchControllerRequest.BEST_EFFORT
+STRICT = srv.SwitchControllerRequest.STRICT
 PERIOD = 3.0  # [s of wall time]: simulated time may jump back
 PATIENCE = 30.0  # [s] for the services to come up
 ANSWER = 10.0  # [s] for one call of unspawner's
 SERVICES = ("load_controller", "switch_controller", "unload_controller")
 FAREWELL = 3.0  # [s] for a call during shutdown; the simulator may have gone before us
+
+
+class ManagerClient:
+    """The services of the controller manager in one namespace. A call raises ServiceFailed."""
+
+    def __init__(self, namespace: str = "", user: str = "Controller Spawner") -> None:
+        """`user` names the waiting program in the log."""
+        self._user = user
+        self._prefix = (
+            f"{namespace.rstrip('/')}/controller_manager" if namespace else "controller_manager"
+        )
+
+    def wait(self, services: Sequence[str], timeout: float) -> str | None:
+        """Waits until all of the services are offered.
+
+        Args:
+            services: names relative to the manager's.
+            timeout: bound for each of them [wall-clock s], or infinity.
+
+        Returns:
+            The first one that isn't offered in time, or None.
+        """
+        for service in services:
+            name = str(rospy.resolve_name(f"{self._prefix}/{service}"))
+            rospy.loginfo("%s: Waiting for service %s/%s", self._user, self._prefix, service)
+            if not service_comes_up(name, timeout):
+                return name
+        return None
+
+    def load(self, name: str, timeout: float = math.inf) -> bool:
+        return bool(self._call("load_controller", srv.LoadController, name, timeout=timeout).ok)
+
+    def unload(self, name: str, timeout: float = math.inf) -> bool:
+        return bool(self._call("unload_controller", srv.UnloadController, name, timeout=timeout).ok)
+
+    def switch(
+        self,
+        start: Sequence[str],
+        stop: Sequence[str],
+        strictness: int,
+        timeout: float = math.inf,
+    ) -> bool:
+        """Starts and stops controllers in one step; no time limit for the manager itself."""
+        request = (list(start), list(stop), strictness, False, 0.0)
+        return bool(
+            self._call("switch_controller", srv.SwitchController, *request, timeout=timeout).ok
+        )
+
+    def running(self, timeout: float = math.inf) -> list[str]:
+        """Returns the names of the running controllers."""
+        answer = self._call("list_controllers", srv.ListControllers, timeout=timeout)
+        return [each.name for each in answer.controller if each.state == "running"]
+
+    def _call(self, service: str, kind: Any, *request: Any, timeout: float) -> Any:
+        return ServiceClient(f"{self._prefix}/{service}", kind, timeout=timeout)(*request)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

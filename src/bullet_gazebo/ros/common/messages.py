@@ -1,6 +1,7 @@
 """Conversions between our records and ROS messages, and the check of numbers in requests."""
 
 import math
+from collections.abc import Sequence
 
 import genpy
 from control_msgs.msg import JointControllerState
@@ -12,6 +13,7 @@ from std_msgs.msg import Header
 
 from bullet_gazebo.control.controllers.joint_state import JointStateSample
 from bullet_gazebo.control.controllers.pid_controllers import JointControllerSample
+from bullet_gazebo.control.errors import ControlError
 from bullet_gazebo.physics import pose as poses
 from bullet_gazebo.physics.pose import Pose
 from bullet_gazebo.state import ContactPair
@@ -75,6 +77,21 @@ def to_contact_state(pair: ContactPair) -> ContactState:
 
 def to_wrench_msg(force: poses.Vector, torque: poses.Vector) -> Wrench:
     return Wrench(Vector3(*force), Vector3(*torque))
+
+
+def check_numbers(what: str, values: Sequence[float]) -> None:
+    """Refuses numbers that no world can hold.
+
+    Raises:
+        ControlError: for a number that isn't finite or is too large.
+    """
+    if all(map(math.isfinite, values)) and max(map(abs, values), default=0.0) <= LARGEST:
+        return
+    for value in values:
+        if not math.isfinite(value):
+            raise ControlError(f"{what} has {value}, which is not finite")
+        if abs(value) > LARGEST:
+            raise ControlError(f"{what} has {value}; it can't be beyond {LARGEST:g}")
 
 
 def bad_number(message: genpy.Message, largest: float = LARGEST) -> str:

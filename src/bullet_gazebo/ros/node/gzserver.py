@@ -34,23 +34,21 @@ from bullet_gazebo.ros.common.rospy_connections import (
     bound_messages,
     hang_up_on_nonsense,
 )
-from bullet_gazebo.ros.common.rospy_topics import free_polls_at_once
+from bullet_gazebo.ros.common.rospy_internals import free_polls_at_once
 from bullet_gazebo.ros.node.master_watch import MasterWatch, NameLoss, NodeNameTaken, refuse_twin
 from bullet_gazebo.ros.node.state_topics import advertise_states
 from bullet_gazebo.ros.node.watchdog import Watchdog
-from bullet_gazebo.ros.node.world_control import WorldControl
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.ros.scene import SceneOffer
+from bullet_gazebo.ros.services.advance_service import AdvanceService
 from bullet_gazebo.ros.services.spawn_services import (
     SpawnServices,
     fill_world,
     load_plugins,
     read_world,
 )
-from bullet_gazebo.ros.services.stepping.advance_service import AdvanceService
-from bullet_gazebo.ros.services.stepping.friction_service import FrictionService
-from bullet_gazebo.ros.services.stepping.step_service import StepService
-from bullet_gazebo.ros.services.world_services import advertise_world_services
+from bullet_gazebo.ros.services.step_service import StepService
+from bullet_gazebo.ros.services.world_services import WorldControl, advertise_world_services
 from bullet_gazebo.simulator import Simulator
 from ros_calls import master
 
@@ -139,7 +137,7 @@ class GazeboNode:
 
     def _advertise(self, network: bool) -> None:
         scene = SceneOffer(self.sim)
-        WorldControl(self.sim, self._watchdog, scene.show if network else None).offer()
+        WorldControl(self.sim, self._watchdog, scene.show if network else None)
         free_polls_at_once()
         bound_messages()
         bound_calls()
@@ -158,7 +156,6 @@ class GazeboNode:
             stepping = [
                 StepService(self.sim, self._watchdog, one_at_a_time),
                 AdvanceService(self.sim, self._watchdog, thinner, one_at_a_time),
-                FrictionService(self.sim),
             ]
         self._services = [
             *stepping,
@@ -247,11 +244,7 @@ def main(argv: list[str] | None = None) -> int:
     args = parse_args([*more, *rospy.myargv(command_line)[1:]])
     name = full_name(command_line, NAME)
     try:
-        wait_for_master(NAME)
-        with one_at_a_time(name):
-            if not args.replace:
-                refuse_twin(name)
-            init_node(NAME, command_line, anonymous=False)
+        _register(name, command_line, args.replace)
     except NodeNameTaken as error:
         print(f"gzserver: {error}", file=sys.stderr)
         return 1
@@ -274,6 +267,15 @@ def main(argv: list[str] | None = None) -> int:
         code = code or 1
     end_within(EXIT_TIMEOUT, code)
     return code
+
+
+def _register(name: str, command_line: Sequence[str], replace: bool) -> None:
+    """Becomes the node; raises NodeNameTaken if there is one already that isn't to be replaced."""
+    wait_for_master(NAME)
+    with one_at_a_time(name):
+        if not replace:
+            refuse_twin(name)
+        init_node(NAME, command_line, anonymous=False)
 
 
 def main_with_window(argv: Sequence[str] | None = None) -> int:

@@ -6,7 +6,7 @@ from urllib.parse import urlsplit
 
 import rospy
 
-from bullet_gazebo.ros.common.rospy_node import register_again, witness
+from bullet_gazebo.ros.common.rospy_internals import register_again, witness
 from ros_calls import master
 from ros_calls.master import NoAnswer, Refused, living_address
 

@@ -9,7 +9,7 @@ from rosgraph_msgs.msg import Clock
 
 from bullet_gazebo.ros.common.messages import to_pose_msg, to_time, to_twist_msg
 from bullet_gazebo.ros.common.publishing import SubscriberCount, ThinnedTopic, Thinner
-from bullet_gazebo.ros.common.rospy_node import set_time, stop_hearing_clock
+from bullet_gazebo.ros.common.rospy_internals import set_time, stop_hearing_clock
 from bullet_gazebo.simulator import Simulator
 
 QUEUE = 10

@@ -1,1 +1,39 @@
-"""The services of the node `gazebo`, grouped as in docs/contract/gazebo.md."""
+"""Gazebo's services, and those of a world in lock-step."""
+
+from collections.abc import Callable
+from typing import Any
+
+import genpy
+import rospy
+
+from bullet_gazebo.ros.common.messages import LARGEST, bad_number
+
+
+class Refused(Exception):
+    """A request can't be carried out, and nothing has changed; the text says why."""
+
+
+def offer(name: str, kind: type, act: Callable[[Any], str]) -> rospy.Service:
+    """Offers a service whose answer has `success` and `status_message`.
+
+    Args:
+        name: of the service.
+        kind: its type; the name of the type begins the text of a refusal.
+        act: carries out a request and returns the answer's text, or raises Refused.
+    """
+    answer: Any = kind
+
+    def handle(request: genpy.Message) -> genpy.Message:
+        try:
+            return answer._response_class(True, act(request))
+        except Refused as refusal:
+            return answer._response_class(False, f"{kind.__name__}: {refusal}")
+
+    return rospy.Service(name, kind, handle)
+
+
+def check_message(message: genpy.Message, largest: float = LARGEST) -> None:
+    """Raises Refused for a message with a number that the world can't take."""
+    fault = bad_number(message, largest)
+    if fault:
+        raise Refused(fault)

@@ -7,8 +7,10 @@ import rospy
 from gazebo_msgs import srv
 
 from bullet_gazebo.applied_forces import ActingTime, AppliedEffort, AppliedWrench, in_world
+from bullet_gazebo.physics.model import Model
 from bullet_gazebo.physics.properties import JointProperties, PropertyError, set_joint_properties
-from bullet_gazebo.ros.common.messages import bad_number, to_vector
+from bullet_gazebo.ros.common.messages import to_vector
+from bullet_gazebo.ros.services import Refused, check_message, offer
 from bullet_gazebo.simulator import Simulator
 
 LONGEST_NAME = 80  # of a joint in the log
@@ -23,10 +25,8 @@ class JointServices:
         self._sim = sim
         self._services = [
             rospy.Service("~get_joint_properties", srv.GetJointProperties, self._get_properties),
-            rospy.Service("~set_joint_properties", srv.SetJointProperties, self._set_properties),
-            rospy.Service(
-                "~set_model_configuration", srv.SetModelConfiguration, self._set_configuration
-            ),
+            offer("~set_joint_properties", srv.SetJointProperties, self._set_properties),
+            offer("~set_model_configuration", srv.SetModelConfiguration, self._set_configuration),
         ]
 
     def _get_properties(
@@ -49,20 +49,11 @@ class JointServices:
             status_message="GetJointProperties: got properties",
         )
 
-    def _set_properties(
-        self, request: srv.SetJointPropertiesRequest
-    ) -> srv.SetJointPropertiesResponse:
-        def refused(fault: str) -> srv.SetJointPropertiesResponse:
-            return srv.SetJointPropertiesResponse(False, f"SetJointProperties: {fault}")
-
+    def _set_properties(self, request: srv.SetJointPropertiesRequest) -> str:
         with self._sim.lock:
-            found = self._sim.world.joint(request.joint_name)
-            if found is None:
-                return refused("joint not found")
+            found = _find_joint(self._sim, request.joint_name)
             ode = request.ode_joint_config
-            fault = bad_number(ode, INFINITE)
-            if fault:
-                return refused(fault)
+            check_message(ode, INFINITE)
             # Element i is for axis i, and no joint here has a second one. An empty list changes nothing.
             # The other fields (erp, cfm, stop_erp, stop_cfm, fudge_factor) have no getter and no effect.
             wanted = JointProperties(
@@ -74,24 +65,19 @@ class JointServices:
             try:
                 set_joint_properties(*found, wanted, self._sim.world.time_step)
             except PropertyError as error:
-                return refused(str(error))
-        return srv.SetJointPropertiesResponse(True, "SetJointProperties: properties set")
+                raise Refused(str(error)) from error
+        return "SetJointProperties: properties set"
 
-    def _set_configuration(
-        self, request: srv.SetModelConfigurationRequest
-    ) -> srv.SetModelConfigurationResponse:
-        def refused(fault: str) -> srv.SetModelConfigurationResponse:
-            return srv.SetModelConfigurationResponse(False, f"SetModelConfiguration: {fault}")
-
+    def _set_configuration(self, request: srv.SetModelConfigurationRequest) -> str:
         names, positions = request.joint_names, request.joint_positions
         with self._sim.lock:
             model = self._sim.world.model(request.model_name)
             if model is None:
-                return refused("model does not exist")
+                raise Refused("model does not exist")
             if len(names) != len(positions):
-                return refused("joint name and position list have different lengths")
+                raise Refused("joint name and position list have different lengths")
             if not all(math.isfinite(position) for position in positions):
-                return refused(f"joint positions must be finite, not {list(positions)}")
+                raise Refused(f"joint positions must be finite, not {list(positions)}")
             plain = [name.removeprefix(f"{model.name}::") for name in names]
             self._sim.set_joint_positions(model, dict(zip(plain, positions, strict=True)))
         unknown = sorted(set(plain) - set(model.joint_names))
@@ -100,7 +86,7 @@ class JointServices:
             more = f" and {len(unknown) - MOST_NAMES} more" if len(unknown) > MOST_NAMES else ""
             text = "SetModelConfiguration: model '%s' has no joint %s%s"
             rospy.logwarn(text, model.name, some, more)
-        return srv.SetModelConfigurationResponse(True, "SetModelConfiguration: success")
+        return "SetModelConfiguration: success"
 
 
 class ForceServices:
@@ -109,39 +95,30 @@ class ForceServices:
     def __init__(self, sim: Simulator) -> None:
         self._sim = sim
         self._services = [
-            rospy.Service("~apply_joint_effort", srv.ApplyJointEffort, self._apply_effort),
-            rospy.Service("~apply_body_wrench", srv.ApplyBodyWrench, self._apply_wrench),
+            offer("~apply_joint_effort", srv.ApplyJointEffort, self._apply_effort),
+            offer("~apply_body_wrench", srv.ApplyBodyWrench, self._apply_wrench),
             rospy.Service("~clear_joint_forces", srv.JointRequest, self._clear_efforts),
             rospy.Service("~clear_body_wrenches", srv.BodyRequest, self._clear_wrenches),
         ]
 
-    def _apply_effort(self, request: srv.ApplyJointEffortRequest) -> srv.ApplyJointEffortResponse:
+    def _apply_effort(self, request: srv.ApplyJointEffortRequest) -> str:
         with self._sim.lock:
-            found = self._sim.world.joint(request.joint_name)
-            if found is None:
-                return srv.ApplyJointEffortResponse(False, "ApplyJointEffort: joint not found")
-            fault = bad_number(request)
-            if fault:
-                return srv.ApplyJointEffortResponse(False, f"ApplyJointEffort: {fault}")
+            found = _find_joint(self._sim, request.joint_name)
+            check_message(request)
             interval = self._interval(request.start_time, request.duration)
-            self._sim.applied.add_effort(AppliedEffort(*found, request.effort, interval))
-        return srv.ApplyJointEffortResponse(True, "ApplyJointEffort: effort set")
+            self._sim.applied.efforts.append(AppliedEffort(*found, request.effort, interval))
+        return "ApplyJointEffort: effort set"
 
-    def _apply_wrench(self, request: srv.ApplyBodyWrenchRequest) -> srv.ApplyBodyWrenchResponse:
-        def refused(fault: str) -> srv.ApplyBodyWrenchResponse:
-            return srv.ApplyBodyWrenchResponse(False, f"ApplyBodyWrench: {fault}")
-
+    def _apply_wrench(self, request: srv.ApplyBodyWrenchRequest) -> str:
         with self._sim.lock:
             world = self._sim.world
             found = world.link(request.body_name)
             if found is None:
-                return refused("body does not exist")
+                raise Refused("body does not exist")
             frame = world.frame(request.reference_frame)
             if frame is None:
-                return refused("reference_frame not found")
-            fault = bad_number(request)
-            if fault:
-                return refused(fault)
+                raise Refused("reference_frame not found")
+            check_message(request)
             wrench = in_world(
                 (to_vector(request.wrench.force), to_vector(request.wrench.torque)),
                 to_vector(request.reference_point),
@@ -149,8 +126,8 @@ class ForceServices:
                 None if world.is_world_frame(request.reference_frame) else frame[0],
             )
             interval = self._interval(request.start_time, request.duration)
-            self._sim.applied.add_wrench(AppliedWrench(*found, wrench, interval))
-        return srv.ApplyBodyWrenchResponse(True, "")
+            self._sim.applied.wrenches.append(AppliedWrench(*found, wrench, interval))
+        return ""
 
     def _interval(self, start: genpy.Time, duration: genpy.Duration) -> ActingTime:
         """Returns when a force acts; a start in the past means now."""
@@ -165,3 +142,11 @@ class ForceServices:
         with self._sim.lock:
             self._sim.applied.clear_wrenches(request.body_name)
         return srv.BodyRequestResponse()
+
+
+def _find_joint(sim: Simulator, name: str) -> tuple[Model, str]:
+    """Returns the model and plain name of a joint; raises Refused if there is none."""
+    found = sim.world.joint(name)
+    if found is None:
+        raise Refused("joint not found")
+    return found

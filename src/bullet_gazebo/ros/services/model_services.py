@@ -1,5 +1,6 @@
 """State and properties of models and links (docs/contract/gazebo.md 2.7 to 2.9 and 2.11 to 2.15)."""
 
+import contextlib
 from collections import Counter
 from dataclasses import replace
 
@@ -16,7 +17,6 @@ from bullet_gazebo.physics.pose import Pose, rotate, subtract
 from bullet_gazebo.physics.properties import PropertyError, link_inertia, set_link_properties
 from bullet_gazebo.physics.world import WORLD_FRAMES, seen_from
 from bullet_gazebo.ros.common.messages import (
-    bad_number,
     from_pose_msg,
     from_twist_msg,
     to_pose_msg,
@@ -24,6 +24,7 @@ from bullet_gazebo.ros.common.messages import (
     to_twist_msg,
     to_vector,
 )
+from bullet_gazebo.ros.services import Refused, check_message, offer
 from bullet_gazebo.simulator import Simulator
 
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -46,7 +47,7 @@ class ModelServices:
         self._services = [
             rospy.Service("~get_model_state", srv.GetModelState, self._get_state),
             rospy.Service("~get_model_properties", srv.GetModelProperties, self._get_properties),
-            rospy.Service("~set_model_state", srv.SetModelState, self._set_state),
+            offer("~set_model_state", srv.SetModelState, self._set_state),
         ]
         self._topic = rospy.Subscriber("~set_model_state", ModelState, self._hear, queue_size=QUEUE)
 
@@ -101,31 +102,26 @@ class ModelServices:
         return rospy.get_rostime() if rospy.rostime.is_wallclock() else to_time(self._sim.now)
 
     def _hear(self, state: ModelState) -> None:
-        self._set_state(srv.SetModelStateRequest(state))
+        with contextlib.suppress(Refused):
+            self._set_state(srv.SetModelStateRequest(state))
 
-    def _set_state(self, request: srv.SetModelStateRequest) -> srv.SetModelStateResponse:
+    def _set_state(self, request: srv.SetModelStateRequest) -> str:
         wanted = request.model_state
-
-        def refused(fault: str) -> srv.SetModelStateResponse:
-            return srv.SetModelStateResponse(False, f"SetModelState: {fault}")
-
         with self._sim.lock:
             model = self._sim.world.model(wanted.model_name)
             if model is None:
-                return refused("model does not exist")
+                raise Refused("model does not exist")
             frame = self._sim.world.frame(wanted.reference_frame)
             if frame is None:
-                return refused("specified reference frame entity does not exist")
-            fault = bad_number(wanted)
-            if fault:
-                return refused(fault)
+                raise Refused("specified reference frame entity does not exist")
+            check_message(wanted)
             # The twist is turned with the frame; the frame's own velocity is not added.
             linear, angular = (
                 rotate(frame[0].orientation, part) for part in from_twist_msg(wanted.twist)
             )
             pose = frame[0].compose(from_pose_msg(wanted.pose))
             self._sim.place_model(model, pose, (linear, angular))
-        return srv.SetModelStateResponse(True, "SetModelState: set model state done")
+        return "SetModelState: set model state done"
 
 
 class LinkServices:
@@ -135,9 +131,9 @@ class LinkServices:
         self._sim = sim
         self._services = [
             rospy.Service("~get_link_properties", srv.GetLinkProperties, self._get_properties),
-            rospy.Service("~set_link_properties", srv.SetLinkProperties, self._set_properties),
+            offer("~set_link_properties", srv.SetLinkProperties, self._set_properties),
             rospy.Service("~get_link_state", srv.GetLinkState, self._get_state),
-            rospy.Service("~set_link_state", srv.SetLinkState, self._set_state),
+            offer("~set_link_state", srv.SetLinkState, self._set_state),
         ]
         self._topic = rospy.Subscriber("~set_link_state", LinkState, self._hear, queue_size=QUEUE)
 
@@ -160,19 +156,12 @@ class LinkServices:
             **{key: getattr(inertia, key) for key in TENSOR},
         )
 
-    def _set_properties(
-        self, request: srv.SetLinkPropertiesRequest
-    ) -> srv.SetLinkPropertiesResponse:
-        def refused(fault: str) -> srv.SetLinkPropertiesResponse:
-            return srv.SetLinkPropertiesResponse(False, f"SetLinkProperties: {fault}")
-
+    def _set_properties(self, request: srv.SetLinkPropertiesRequest) -> str:
         with self._sim.lock:
             found = self._sim.world.link(request.link_name)
             if found is None:
-                return refused(f"link not found, {SCOPE}")
-            fault = bad_number(request)
-            if fault:
-                return refused(fault)
+                raise Refused(f"link not found, {SCOPE}")
+            check_message(request)
             old = link_inertia(*found)
             inertia = replace(
                 old,
@@ -183,8 +172,8 @@ class LinkServices:
             try:
                 set_link_properties(self._sim.world, *found, inertia, request.gravity_mode)
             except (PropertyError, DescriptionError) as error:
-                return refused(str(error))
-        return srv.SetLinkPropertiesResponse(True, "SetLinkProperties: properties set")
+                raise Refused(str(error)) from error
+        return "SetLinkProperties: properties set"
 
     def _get_state(self, request: srv.GetLinkStateRequest) -> srv.GetLinkStateResponse:
         with self._sim.lock:
@@ -206,25 +195,24 @@ class LinkServices:
         return srv.GetLinkStateResponse(state, True, "GetLinkState: got state")
 
     def _hear(self, state: LinkState) -> None:
-        self._set_state(srv.SetLinkStateRequest(state))
+        with contextlib.suppress(Refused):
+            self._set_state(srv.SetLinkStateRequest(state))
 
-    def _set_state(self, request: srv.SetLinkStateRequest) -> srv.SetLinkStateResponse:
+    def _set_state(self, request: srv.SetLinkStateRequest) -> str:
         wanted = request.link_state
         with self._sim.lock:
             found = self._sim.world.link(wanted.link_name)
             if found is None:
-                return srv.SetLinkStateResponse(False, "SetLinkState: link does not exist")
+                raise Refused("link does not exist")
             frame = self._frame(wanted.reference_frame)
             if frame is None:
-                return srv.SetLinkStateResponse(False, "SetLinkState: failed")
-            fault = bad_number(wanted)
-            if fault:
-                return srv.SetLinkStateResponse(False, f"SetLinkState: {fault}")
+                raise Refused("failed")
+            check_message(wanted)
             linear, angular = from_twist_msg(wanted.twist)
             # Gazebo subtracts the frame's velocity, and doesn't turn the request's.
             twist = (subtract(linear, frame[1][0]), subtract(angular, frame[1][1]))
             self._sim.place_link(*found, frame[0].compose(from_pose_msg(wanted.pose)), twist)
-        return srv.SetLinkStateResponse(True, "SetLinkState: success")
+        return "SetLinkState: success"
 
     def _frame(self, name: str) -> tuple[Pose, Twist] | None:
         """Returns the state of a link or the world; a model is no frame here."""

@@ -1,10 +1,16 @@
-"""What comes into the world: the world file, spawn_urdf_model, spawn_sdf_model, and delete_model
-(docs/contract/gazebo.md 2.3 to 2.5)."""
+"""What comes into the world: the world file, spawn_urdf_model, spawn_sdf_model, and delete_model.
 
+See docs/contract/gazebo.md 2.3 to 2.5, and gazebo_launch.md 4.1 and 4.2 for the search paths.
+"""
+
+import contextlib
+import functools
+import os
 import re
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import rospkg
 import rospy
@@ -12,7 +18,7 @@ from gazebo_msgs import srv
 
 from bullet_gazebo.physics.description import DescriptionError, Light, ModelDescription
 from bullet_gazebo.physics.files.elements import shown
-from bullet_gazebo.physics.files.reading import Reading
+from bullet_gazebo.physics.files.reading import Reading, Resources
 from bullet_gazebo.physics.files.world_file import (
     UnknownFormat,
     WorldDescription,
@@ -24,9 +30,10 @@ from bullet_gazebo.physics.pose import Pose, is_finite
 from bullet_gazebo.physics.world import NameTaken
 from bullet_gazebo.ros.common.messages import from_pose_msg
 from bullet_gazebo.ros.plugins.plugin_loader import PluginRegistry
-from bullet_gazebo.ros.services.resource_paths import find_world, resources
+from bullet_gazebo.ros.services import Refused, offer
 from bullet_gazebo.simulator import Simulator
-from file_access.content import MAX_BYTES
+from file_access.content import MAX_BYTES, FileError, read_file
+from file_access.xml_text import decode, parse
 
 ROOT_TAG = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
 PACKAGE = re.compile(r"package://([^/\"'<>\s]+)")
@@ -37,6 +44,10 @@ UNKNOWN_FORMAT = (
 TAKEN = "SpawnModel: Failure - entity already exists."
 MOST_WARNINGS = 20  # of one model
 FURTHEST = 1e6  # [m] from the origin; the engine keeps some figures as 32-bit floats
+RESOURCES = "GAZEBO_RESOURCE_PATH"
+MODELS = "GAZEBO_MODEL_PATH"
+EXPORT = "gazebo_model_path"
+HOME_MODELS = "~/.gazebo/models"
 
 
 class SpawnServices:
@@ -51,7 +62,7 @@ class SpawnServices:
         self._services = [
             rospy.Service("~spawn_urdf_model", srv.SpawnModel, self._spawn_urdf),
             rospy.Service("~spawn_sdf_model", srv.SpawnModel, self._spawn_sdf),
-            rospy.Service("~delete_model", srv.DeleteModel, self._delete),
+            offer("~delete_model", srv.DeleteModel, self._delete),
         ]
 
     def _spawn_urdf(self, request: srv.SpawnModelRequest) -> srv.SpawnModelResponse:
@@ -121,18 +132,18 @@ class SpawnServices:
             with self._sim.lock:
                 model = world.spawn(name, entity, pose)
             self._plugins.load(model, request.robot_namespace)
-        _warn(model.name, entity)
+        _log(f"Model '{shown(name)}'", entity)
 
-    def _delete(self, request: srv.DeleteModelRequest) -> srv.DeleteModelResponse:
+    def _delete(self, request: srv.DeleteModelRequest) -> str:
         with self._one_at_a_time:
             with self._sim.lock:
                 model = self._sim.world.model(request.model_name)
             if model is None:
-                return srv.DeleteModelResponse(False, "DeleteModel: model does not exist")
+                raise Refused("model does not exist")
             self._plugins.unload(model)
             with self._sim.lock:
                 self._sim.delete_model(model)
-        return srv.DeleteModelResponse(True, "DeleteModel: successfully deleted model")
+        return "DeleteModel: successfully deleted model"
 
 
 def read_world(name: str, interrupted: Callable[[], bool]) -> WorldDescription:
@@ -151,7 +162,7 @@ def read_world(name: str, interrupted: Callable[[], bool]) -> WorldDescription:
     except DescriptionError as error:
         rospy.logerr("%s. The world is empty but for a ground plane", error)
         return empty_world()
-    _log(f"World '{path}'", world.warnings, world.left_out)
+    _log(f"World '{path}'", world)
     return world
 
 
@@ -181,25 +192,19 @@ def load_plugins(sim: Simulator, plugins: PluginRegistry) -> None:
     with plugins.time_held("the world"):
         for model in list(sim.world.models.values()):
             plugins.load(model, "")
-            _warn(model.name, model.description)
+            _log(f"Model '{shown(model.name)}'", model.description)
 
 
-def _warn(name: str, description: ModelDescription) -> None:
-    _log(f"Model '{shown(name)}'", description.warnings, description.left_out)
-
-
-def _log(what: str, warnings: list[str], left_out: list[str]) -> None:
+def _log(what: str, found: WorldDescription | ModelDescription) -> None:
     """Logs a file's warnings, and what was left out of the world."""
-    for warning in _at_most(warnings):
+    for warning in _at_most(found.warnings):
         rospy.logwarn("%s: %s", what, warning)
-    if left_out:
-        rospy.logwarn(
-            "%s: not simulated here, so left out: %s", what, ", ".join(_at_most(left_out))
-        )
+    if found.left_out:
+        text = ", ".join(_at_most(found.left_out))
+        rospy.logwarn("%s: not simulated here, so left out: %s", what, text)
 
 
 def _at_most(texts: list[str]) -> list[str]:
-    """Returns the first of `texts`: a file may have any number of the same fault."""
     rest = len(texts) - MOST_WARNINGS
     return texts if rest <= 0 else [*texts[:MOST_WARNINGS], f"and {rest} more of the kind"]
 
@@ -238,3 +243,68 @@ def _refused(reason: str) -> rospy.ServiceException:
     """Returns an exception: here Gazebo fails the call itself, instead of answering success=false."""
     rospy.logerr("SpawnModel: Failure - %s", reason)
     return rospy.ServiceException(f"SpawnModel: Failure - {reason}")
+
+
+def resources() -> Resources:
+    """Returns the look-up of this process's environment; packages are found as rospack finds them."""
+    return Resources(_model_folders(), tuple(_environment_paths()), _package)
+
+
+@functools.cache
+def _model_folders() -> tuple[Path, ...]:
+    """Reads them once, as Gazebo does: reading all packages takes long in a large workspace."""
+    return tuple(Path(path) for path in [*model_paths(), os.path.expanduser(HOME_MODELS)])
+
+
+def _package(name: str) -> str:
+    try:
+        return str(rospkg.RosPack().get_path(name))
+    except rospkg.ResourceNotFound as error:
+        raise LookupError(name) from error
+
+
+def _environment_paths() -> list[Path]:
+    return [Path(path) for path in os.environ.get(RESOURCES, "").split(os.pathsep) if path]
+
+
+def model_paths() -> list[str]:
+    """Returns the existing folders of GAZEBO_MODEL_PATH, then those that packages export.
+
+    A package exports folders, separated by colons, in its package.xml:
+    ``<export><gazebo_ros gazebo_model_path="${prefix}/models"/></export>``.
+    """
+    folders = os.environ.get(MODELS, "").split(os.pathsep)
+    packages = rospkg.RosPack()
+    for name in packages.list():
+        folders += _exported(packages.get_path(name))
+    return [folder for folder in dict.fromkeys(folders) if folder and os.path.isdir(folder)]
+
+
+def _exported(package: str) -> list[str]:
+    # There may be hundreds of packages, and few export anything: only those are parsed.
+    try:
+        text = decode(read_file(Path(package, "package.xml")))
+        if EXPORT not in text:
+            return []
+        root = parse(text)
+    except FileError:  # somebody else's broken package
+        return []
+    return [
+        folder.replace("${prefix}", package)
+        for element in root.iterfind("export/gazebo_ros")
+        for folder in element.get(EXPORT, "").split(os.pathsep)
+    ]
+
+
+def find_world(name: str) -> Path | None:
+    """Finds a world file: as given, on the resource paths and in package gazebo_ros, or in their folders
+    `worlds`."""
+    given = Path(os.path.expanduser(name))
+    folders = _environment_paths()
+    with contextlib.suppress(rospkg.ResourceNotFound):
+        folders.append(Path(rospkg.RosPack().get_path("gazebo_ros")))
+    tried = (given, *(f / given for f in folders), *(f / "worlds" / given for f in folders))
+    try:
+        return next((path for path in tried if path.is_file()), None)
+    except (OSError, ValueError):  # no name for a file
+        return None

@@ -1,6 +1,10 @@
-"""Time, physics and lights of the world (docs/contract/gazebo.md 1.5, 2.1, 2.2, 2.6, 2.9, 2.20 and 2.21)."""
+"""Time, physics and lights of the world: Gazebo's services, and the call that `gz world` makes.
+
+See docs/contract/gazebo.md 1.5, 2.1, 2.2, 2.6, 2.9, 2.20 and 2.21.
+"""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any
 
 import rospy
@@ -12,8 +16,11 @@ from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from bullet_gazebo.physics.world import SolverSettings
+from bullet_gazebo.ros.clients.gz import CHUNK, METHOD
 from bullet_gazebo.ros.common.dynamic_server import FIRST, DynamicServer, Parameter
 from bullet_gazebo.ros.common.messages import bad_number, from_pose_msg, to_vector
+from bullet_gazebo.ros.common.rospy_internals import answer_xmlrpc
+from bullet_gazebo.ros.services import Refused, check_message, offer
 from bullet_gazebo.ros.services.joint_services import ForceServices, JointServices
 from bullet_gazebo.ros.services.model_services import LinkServices, ModelServices
 from bullet_gazebo.simulator import Simulator
@@ -49,6 +56,8 @@ PARAMETERS = [
 ]
 ODE = list(ODEPhysics.__slots__)
 AXES = ("x", "y", "z")
+Answer = tuple[int, str, int]
+LONGEST = 80  # of an unknown command in an answer
 
 
 def advertise_world_services(sim: Simulator) -> list[object]:
@@ -89,7 +98,7 @@ class PhysicsServices:
         self._services = [
             rospy.Service("~get_world_properties", srv.GetWorldProperties, self._get_world),
             rospy.Service("~get_physics_properties", srv.GetPhysicsProperties, self.get),
-            rospy.Service("~set_physics_properties", srv.SetPhysicsProperties, self.set),
+            offer("~set_physics_properties", srv.SetPhysicsProperties, self.set),
         ]
 
     def _get_world(self, request: srv.GetWorldPropertiesRequest) -> srv.GetWorldPropertiesResponse:
@@ -116,16 +125,14 @@ class PhysicsServices:
                 status_message="GetPhysicsProperties: got properties",
             )
 
-    def set(self, request: srv.SetPhysicsPropertiesRequest) -> srv.SetPhysicsPropertiesResponse:
+    def set(self, request: srv.SetPhysicsPropertiesRequest) -> str:
         """Sets all fields, none of which is optional; one bad value refuses the whole request."""
-        fault = bad_number(request)
-        if not fault and not SHORTEST_STEP <= request.time_step <= LONGEST_STEP:
-            fault = (
+        check_message(request)
+        if not SHORTEST_STEP <= request.time_step <= LONGEST_STEP:
+            raise Refused(
                 f"time_step is {request.time_step}; "
                 f"it must be between {SHORTEST_STEP:g} and {LONGEST_STEP:g} s"
             )
-        if fault:
-            return srv.SetPhysicsPropertiesResponse(False, f"SetPhysicsProperties: {fault}")
         ode = request.ode_config
         with self._sim.lock:
             world = self._sim.world
@@ -133,7 +140,7 @@ class PhysicsServices:
             self._sim.set_time_step(request.time_step)
             self._sim.max_update_rate = request.max_update_rate
             world.set_solver(SolverSettings(**{o: getattr(ode, k) for k, o in FIELDS.items()}))
-        return srv.SetPhysicsPropertiesResponse(True, "physics engine updated")
+        return "physics engine updated"
 
 
 class PhysicsReconfigure(DynamicServer):
@@ -158,9 +165,10 @@ class PhysicsReconfigure(DynamicServer):
             gravity=Vector3(*(config[f"gravity_{axis}"] for axis in AXES)),
             ode_config=ODEPhysics(**{name: config[name] for name in ODE}),
         )
-        answer = self._physics.set(request)
-        if not answer.success:
-            rospy.logwarn("set_parameters: %s", answer.status_message)
+        try:
+            self._physics.set(request)
+        except Refused as refusal:
+            rospy.logwarn("set_parameters: %s", refusal)
             config.update(self._in_force())
         return config
 
@@ -231,3 +239,64 @@ class LightServices:
 
 def _color(msg: ColorRGBA) -> tuple[float, float, float, float]:
     return (msg.r, msg.g, msg.b, msg.a)
+
+
+class WorldControl:
+    """The XML-RPC call `gazeboWorld` of the node: the other side of `clients.gz.RemoteWorld`.
+
+    Every ROS node answers XML-RPC calls of master and tools. The simulator answers one more: any machine
+    finds it by the node's name, and it is neither a topic nor a service, of which there must be only
+    Gazebo's own (docs/contract/gazebo.md 7).
+    """
+
+    def __init__(
+        self,
+        sim: Simulator,
+        watchdog: AbstractContextManager[object],
+        show: Callable[[], None] | None = None,
+    ) -> None:
+        """A fault in a block of `watchdog` ends the node. `show` opens the scene for a window."""
+        self._sim = sim
+        self._watchdog = watchdog
+        self._commands = {
+            "pause": sim.pause,
+            "unpause": sim.unpause,
+            "reset": sim.reset_simulation,
+            "reset_models": sim.reset_world,
+            "reset_time": sim.reset_time,
+        }
+        if show is not None:
+            self._commands["show"] = show
+        answer_xmlrpc(METHOD, self.answer)
+
+    def answer(self, *arguments: object) -> Answer:
+        """Runs a command; returns code (1 is success), text, ticks done.
+
+        Args:
+            arguments: the command; for "step" also the number of ticks, 1 by default. XML-RPC has no
+                signatures: any number of arguments may come, of any of its types.
+        """
+        if not 1 <= len(arguments) <= 2:
+            return _refused(
+                f"{len(arguments)} arguments: a command, and for step a number of steps"
+            )
+        command, count = (*arguments, 1)[:2]
+        # A bool is an int in Python, and no number here.
+        if not isinstance(command, str) or type(count) is not int:
+            kinds = " and ".join(type(each).__name__ for each in arguments)
+            return _refused(f"{kinds}: a command is a string, a number of steps an integer")
+        if command == "step":
+            if not 1 <= count <= CHUNK:
+                return _refused(f"{count} steps: one call does 1 to {CHUNK}")
+            with self._watchdog:
+                self._sim.step(count)
+            return 1, "step", count
+        if command not in self._commands:
+            return _refused(f"unknown command {command[:LONGEST]!a}")
+        with self._watchdog:
+            self._commands[command]()
+        return 1, command, 0
+
+
+def _refused(reason: str) -> Answer:
+    return -1, reason, 0

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import viser
 
+from bullet_gazebo.physics.description import Joint
 from bullet_gazebo.physics.files.elements import shown
-from bullet_gazebo.pictures.page import DrawnModel
-from bullet_gazebo.pictures.visuals import VisibleJoint
+from bullet_gazebo.pictures.visuals import VisibleModel
 from bullet_gazebo.ros.window.panels import Attempt, Controllers
 from bullet_gazebo.ros.window.remote_scene import Commands
 from ros_calls.service import ServiceFailed
@@ -48,7 +48,7 @@ class ModelPanel:
         self._controllers = controllers
         self._attempt = attempt
         self._stands = stands
-        self._models: dict[str, DrawnModel] = {}
+        self._models: dict[str, VisibleModel] = {}
         self._positions: dict[str, list[float]] = {}  # of joints, by model
         self._chosen = NONE  # the model that has sliders; a click may choose another at any time
         self._start: np.ndarray | None = None  # [m] where the followed model was at first
@@ -65,9 +65,9 @@ class ModelPanel:
         self._unmoved = server.gui.add_html("", visible=False)  # joints whose sliders move nothing
         self._list = server.gui.add_html("")
 
-    def set_models(self, models: Sequence[DrawnModel]) -> None:
+    def set_models(self, models: Sequence[VisibleModel]) -> None:
         """Lists these models."""
-        self._models = {each.seen.name: each for each in models}
+        self._models = {each.name: each for each in models}
         names = [NONE, *self._models]
         if list(self._choice.options) != names:
             kept = self._choice.value
@@ -80,7 +80,7 @@ class ModelPanel:
         """Makes sliders for the chosen model."""
         self._chosen = self._choice.value
         model = self._models.get(self._chosen)
-        joints = list(model.seen.joints)[:MOST_SLIDERS] if model is not None else []
+        joints = list(model.joints)[:MOST_SLIDERS] if model is not None else []
         self._joints.visible = bool(joints)
         for slider in self._sliders.values():
             slider.remove()
@@ -89,7 +89,7 @@ class ModelPanel:
             for joint in joints:
                 self._sliders[joint.name] = self._slider(self._chosen, joint)
 
-    def _slider(self, model: str, joint: VisibleJoint) -> viser.GuiSliderHandle[float]:
+    def _slider(self, model: str, joint: Joint) -> viser.GuiSliderHandle[float]:
         low, high = _range(joint)
         slider = self._server.gui.add_slider(
             shown(joint.name), low, high, (high - low) / PARTS, min(max(0.0, low), high),
@@ -122,7 +122,7 @@ class ModelPanel:
         drawn = self._models.get(model)
         if drawn is None:
             raise ServiceFailed(f"{model} is gone")
-        names = [each.name for each in drawn.seen.joints]
+        names = [each.name for each in drawn.joints]
         positions = dict(zip(names, self._positions.get(model, []), strict=False))
         self._controllers.command(holder, joint, positions | {joint: position})
 
@@ -186,14 +186,14 @@ class ModelPanel:
         Moving all cameras instead would fight with browsers that meanwhile report where theirs were.
         """
         model = self._models.get(self._chosen)
-        if not self._follow.value or model is None or model.seen.name not in links:
+        if not self._follow.value or model is None or model.name not in links:
             self._let_go()
             return
-        if self._followed != model.seen.name:
+        if self._followed != model.name:
             self._let_go()
-        place = np.array(model.pose(links[model.seen.name]).position)
+        place = np.array(model.pose(links[model.name]).position)
         if self._start is None:
-            self._start, self._followed = place, model.seen.name
+            self._start, self._followed = place, model.name
         if np.isfinite(place).all():
             self._world.position = self._start - place
 
@@ -208,7 +208,7 @@ class ModelPanel:
                 client.camera.position = client.camera.position + way
 
 
-def _range(joint: VisibleJoint) -> tuple[float, float]:
+def _range(joint: Joint) -> tuple[float, float]:
     """Returns the slider's ends [rad, m]: the joint's limits, or defaults for its kind."""
     reach = REACH.get(joint.kind, 1.0)
     if joint.lower >= joint.upper:

@@ -8,10 +8,10 @@ from typing import Any
 import rospy
 import viser
 from controller_manager_msgs.msg import ControllerState
+from controller_manager_msgs.utils import ControllerLister, ControllerManagerLister
 from std_msgs.msg import Float64, Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from bullet_gazebo.ros.clients.controller_lists import ControllerLister, ControllerManagerLister
 from bullet_gazebo.ros.window.remote_scene import Commands
 from ros_calls.service import ServiceFailed
 from ros_calls.waiting import wait_until

@@ -18,7 +18,7 @@ from PIL import Image
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.page_batches import NUMBERS
 from bullet_gazebo.ros.clients.gz import ControlFailed
-from bullet_gazebo.ros.scene_messages import from_light, from_model
+from bullet_gazebo.ros.scene import from_light, from_model
 from bullet_gazebo.ros.window.model_panel import ModelPanel
 from bullet_gazebo.ros.window.panels import Controllers, TimePanel
 from bullet_gazebo.ros.window.remote_scene import Commands, RemoteScene

@@ -1,21 +1,26 @@
-"""The running simulator: calls to it, whether it is still the same one, and what is in its world."""
+"""The running simulator: calls to it, what is in its world, what it reports, and who has it."""
 
 import contextlib
-from collections.abc import Callable
-from types import TracebackType
-from typing import Any
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+from weakref import WeakSet
 
 import rospy
 from gazebo_msgs.srv import GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Point, Quaternion
 from geometry_msgs.msg import Pose as PoseMsg
+from sensor_msgs.msg import JointState as JointStateMsg
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.ros import node
 from robot_envs.backends.world_files import world_models
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, SimulatorHangs
-from robot_envs.files import Source, is_text, locate
+from robot_envs.files import Source, is_text, locate, read_text
 from robot_envs.robot import EMPTY, Robot
+from robot_envs.scene import Scene
+from robot_envs.task import Object
+from robot_envs.world_state import Joints, JointState
 from ros_calls import master, service
 from ros_calls.master import NoAnswer, Refused, living_address
 from ros_utils import ros_gazebo
@@ -49,6 +54,12 @@ def _fault(error: service.ServiceFailed) -> SimulatorFault:
     return SimulatorHangs(str(error)) if hangs else SimulatorFault(str(error))
 
 
+def check_success(answer: Any, what: str) -> None:
+    """Raises SimulatorError, which begins with `what`, unless an answer reports success."""
+    if not answer.success:
+        raise SimulatorError(f"{what}: {answer.status_message}")
+
+
 class RunningSimulator:
     """Remembers the simulator that runs when it is made.
 
@@ -66,12 +77,7 @@ class RunningSimulator:
     def __enter__(self) -> None:
         pass
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if not isinstance(error, (SimulatorError, rospy.ROSException)):
             return
         if rospy.is_shutdown():
@@ -191,3 +197,165 @@ def spawn(name: str, text: str, pose: Pose, namespace: str = "") -> Undo:
     if not answer.success:
         raise RobotEnvError(f"'{name}' can't be spawned: {answer.status_message}")
     return lambda: ros_gazebo.gazebo_delete_model(name)
+
+
+class SharedBackend(Protocol):
+    """One of the backends that move the same robots."""
+
+    scene: Scene
+
+    def restore(self) -> None:
+        """Undoes this backend's variations of the robots."""
+        ...
+
+
+class SharedWorld:
+    """Knows which backend began the latest episode, and keeps its objects in the world.
+
+    Models of the same names that were there before are used, and left there.
+    """
+
+    def __init__(self) -> None:
+        self._holder: SharedBackend | None = None
+        self._users: WeakSet[SharedBackend] = WeakSet()  # a dropped backend has left, too
+        self._objects: list[Object] = []
+        self._spawned: list[str] = []
+
+    @property
+    def is_used(self) -> bool:
+        """Whether a backend has joined, and not left."""
+        return bool(self._users)
+
+    def join(self, user: SharedBackend) -> None:
+        """Registers a backend, until `leave`."""
+        self._users.add(user)
+
+    def claim_if_free(self, user: SharedBackend) -> bool:
+        """Claims the world unless another backend holds it; returns whether `user` holds it now."""
+        if self._holder is None:
+            self.claim(user)
+        return self._holder is user
+
+    def claim(self, user: SharedBackend) -> None:
+        """Begins an episode: those of others end, and their variations are undone.
+
+        Raises:
+            RobotEnvError: if an object can't be read or spawned, or the simulator doesn't answer.
+        """
+        before, self._holder = self._holder, None  # nobody's, if something fails
+        if before is not None and before is not user:
+            before.restore()
+        self.place_objects(user.scene.objects)
+        self._holder = user
+
+    def leave(self, user: SharedBackend) -> None:
+        """Unregisters a backend, and removes its objects."""
+        self._users.discard(user)
+        if self._holder is user:
+            self._holder = None
+            self.place_objects(())
+
+    def check_holder(self, user: SharedBackend) -> None:
+        """Raises SimulatorError if another backend has begun an episode since."""
+        if self._holder is not user:
+            raise SimulatorError(
+                "another environment of this process has moved the same robot since this one's reset(); "
+                "over ROS use them one after the other, each beginning with reset(), or each in a simulator "
+                'of its own: backend="ros-own"'
+            )
+
+    def place_objects(self, wanted: Sequence[Object]) -> None:
+        """Spawns these objects, in this order, in place of all others that were spawned here.
+
+        Raises:
+            RobotEnvError: if one can't be read or spawned, or the simulator doesn't answer.
+        """
+        if list(wanted) == self._objects:
+            return
+        # All are spawned anew: the order of a world's models affects its bits.
+        self._remove_objects()
+        try:
+            present = models() if wanted else []
+            for each in wanted:
+                if each.name not in present:
+                    spawn(each.name, read_text(each.file), each.pose)
+                    self._spawned.append(each.name)
+        except BaseException:
+            self._remove_objects()
+            raise
+        self._objects = list(wanted)
+
+    def _remove_objects(self) -> None:
+        self._objects = []
+        while self._spawned:
+            ros_gazebo.gazebo_delete_model(self._spawned.pop())
+
+
+class JointStateReader:
+    """Reads a scene's joints from joint states, whose names may be plain or model::joint.
+
+    Args:
+        scene: the robots.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._wanted = {
+            scene.joint(robot, name): (name, f"{robot.model}::{name}", scene.several)
+            for robot in scene.robots
+            for name in robot.joints
+        }
+        self._names: Sequence[str] = []  # of the message before
+        self._places: list[tuple[str, int]] = []
+
+    def __call__(self, message: JointStateMsg) -> Joints:
+        """Returns the joints of a message. See `read`."""
+        return self.read(message.name, message.position, message.velocity, message.effort)
+
+    def read(
+        self,
+        names: Sequence[str],
+        positions: Sequence[float],
+        velocities: Sequence[float],
+        efforts: Sequence[float],
+    ) -> Joints:
+        """Returns the joints under the names that they have in a state.
+
+        Raises:
+            SimulatorFault: if a joint is missing or a value isn't finite.
+        """
+        if names != self._names:
+            self._places = self._found(names)
+            self._names = names
+        total, joints = 0.0, Joints()
+        try:
+            for name, index in self._places:
+                position, velocity = positions[index], velocities[index]
+                effort = efforts[index] if efforts else 0.0
+                joints[name] = JointState(position, velocity, effort)
+                total += position + velocity
+        except IndexError:
+            raise SimulatorFault(f"a joint state has fewer numbers than names: {names}") from None
+        if not math.isfinite(total):
+            raise SimulatorFault(f"the joint state isn't finite: {joints}")
+        return joints
+
+    def _found(self, names: Sequence[str]) -> list[tuple[str, int]]:
+        places, missing = [], []
+        for key, (plain, full, several) in self._wanted.items():
+            if full in names:
+                places.append((key, names.index(full)))
+            elif plain in names and not several:
+                places.append((key, names.index(plain)))
+            else:
+                missing.append(key)
+        if missing:
+            raise SimulatorFault(
+                f"the joint state lacks {' and '.join(missing)}; it has: {list(names)}"
+            )
+        return places
+
+
+def pose_of(message: PoseMsg) -> Pose:
+    """Reads a pose."""
+    place, turn = message.position, message.orientation
+    return Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))

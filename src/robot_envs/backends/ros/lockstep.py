@@ -1,37 +1,41 @@
 """Robots in a simulator over ROS that moves in lock-step."""
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
+from gazebo_msgs.msg import ContactState
+from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
+from geometry_msgs.msg import Pose as PoseMsg
 
-from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.pose import Pose, Vector
 from robot_envs.backends.ros.bringup import full_name, ready
-from robot_envs.backends.ros.gazebo import STEP_SERVICE, RunningSimulator, SimulatorService
-from robot_envs.backends.ros.messages import (
+from robot_envs.backends.ros.gazebo import (
+    STEP_SERVICE,
     JointStateReader,
-    contact_of,
-    fill_models,
-    motions_of,
+    RunningSimulator,
+    SharedWorld,
+    SimulatorService,
 )
 from robot_envs.backends.ros.properties import RosVariation
-from robot_envs.backends.ros.shared_world import SharedWorld
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
 from robot_envs.world_state import (
     Commands,
+    ContactPair,
     InitialState,
     LinkQuery,
     Links,
     Models,
+    Motion,
     StateQuery,
     WorldState,
     link_keys,
 )
 from ros_calls.service import TIMEOUT
-from ros_utils.step_client import PreparedSteps, StepAnswer, StepNames, StepRefused, time_of
+from ros_utils.step_client import MOTION, PreparedSteps, StepAnswer, StepNames, StepRefused, time_of
 
 
 class LockstepWorld:
@@ -89,7 +93,7 @@ class LockstepWorld:
         request = StepWorldRequest(reset=StepWorldRequest.WORLD, joints=self._moved)
         request.positions = [position for position, _ in joints]
         request.velocities = [velocity for _, velocity in joints]
-        fill_models(request, self.scene.placed_models(initial))
+        _fill_models(request, self.scene.placed_models(initial))
         with self._simulator:
             self._world.claim(self)
         answer = self._call(self._reset, request)
@@ -140,7 +144,7 @@ class LockstepWorld:
         time = (answer.now - self._begun) / 1e9  # [s]
         if len(numbers) == 3 * count and not answer.contacts:
             return WorldState(time, joints, self._held)
-        motions = list(motions_of(numbers[3 * count :]))
+        motions = list(_motions_of(numbers[3 * count :]))
         models = len(answer.models)
         return WorldState(
             time,
@@ -148,7 +152,7 @@ class LockstepWorld:
             self._held,
             Links(zip(link_keys(self._query), motions[models:], strict=True)),
             Models(zip(answer.models, motions[:models], strict=True)),
-            [contact_of(each) for each in answer.contacts],
+            [_contact_of(each) for each in answer.contacts],
         )
 
     def _send(self, names: StepNames, ticks: int, commands: Sequence[float]) -> None:
@@ -207,7 +211,7 @@ class LockstepWorld:
         """See `RobotBackend.poses`; one call, however many there are."""
         self._take()
         answer = self._look(_names(StateQuery(links=tuple(map(LinkQuery, links)))))
-        return [pose for pose, _ in motions_of(answer.numbers[3 * len(answer.joints) :])]
+        return [pose for pose, _ in _motions_of(answer.numbers[3 * len(answer.joints) :])]
 
     def close(self) -> None:
         """Closes the connection to the simulator; robots and objects are as they were found."""
@@ -234,3 +238,38 @@ def _names(query: StateQuery) -> StepNames:
         all_contacts=query.all_contacts,
         contacts_of=tuple(query.contacts_of),
     )
+
+
+def _fill_models(request: StepWorldRequest, placed: Mapping[str, Motion]) -> None:
+    """Makes a request place models."""
+    request.models = list(placed)
+    motions = placed.values()
+    request.poses = [PoseMsg(Point(*at.position), Quaternion(*at.orientation)) for at, _ in motions]
+    request.twists = [Twist(Vector3(*line), Vector3(*turn)) for _, (line, turn) in motions]
+
+
+def _motions_of(numbers: Sequence[float]) -> Iterator[Motion]:
+    """Reads links and models from the numbers of a prepared step."""
+    for i in range(0, len(numbers), MOTION):
+        x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz = numbers[i : i + MOTION]
+        yield Motion(Pose((x, y, z), (qx, qy, qz, qw)), ((vx, vy, vz), (wx, wy, wz)))
+
+
+def _contact_of(state: ContactState) -> ContactPair:
+    """Reads what touches."""
+    return ContactPair(
+        state.collision1_name,
+        state.collision2_name,
+        _vectors(state.contact_positions),
+        _vectors(state.contact_normals),
+        [(_vector(each.force), _vector(each.torque)) for each in state.wrenches],
+        list(state.depths),
+    )
+
+
+def _vectors(messages: Iterable[Vector3]) -> list[Vector]:
+    return [_vector(each) for each in messages]
+
+
+def _vector(message: Vector3) -> Vector:
+    return (message.x, message.y, message.z)

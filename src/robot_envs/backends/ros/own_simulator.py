@@ -3,7 +3,6 @@
 import contextlib
 import io
 import os
-import re
 import secrets
 import select
 import signal
@@ -13,6 +12,7 @@ import time
 import weakref
 from pathlib import Path
 
+import psutil
 import rospkg
 
 import bullet_gazebo
@@ -35,15 +35,9 @@ SOURCES = Path(bullet_gazebo.__file__).parents[1]
 NOT_INHERITED = ("ROS_HOSTNAME", "ROS_IPV6", "ROS_NAMESPACE")
 
 
-def free_memory() -> int:
-    """Returns how much memory new processes may take [bytes]."""
-    found = re.search(r"MemAvailable:\s*(\d+) kB", Path("/proc/meminfo").read_text("ascii"))
-    return int(found[1]) * 1024 if found else sys.maxsize
-
-
 def check_memory(count: int) -> None:
     """Raises RobotEnvError if there isn't the memory for so many simulators."""
-    needed, free = count * MEMORY, free_memory()
+    needed, free = count * MEMORY, psutil.virtual_memory().available
     if needed > free:
         raise RobotEnvError(
             f"{count} simulators need about {needed / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are "
@@ -102,11 +96,6 @@ class OwnSimulator:
     def gave_up(self) -> bool:
         """Whether it has exited by itself with an error; another one would do the same."""
         return self._process.poll() in range(1, 128)
-
-    @property
-    def processes(self) -> list[int]:
-        """Process ids of the simulator and of the supervisor, which is the master."""
-        return [*([self.pid] if self.pid else []), self._process.pid]
 
     def has_died(self) -> bool:
         """Returns whether it has died; gives the supervisor time to notice."""

@@ -26,7 +26,7 @@ from bullet_gazebo.physics.description import Inertia
 from bullet_gazebo.physics.pose import IDENTITY, Vector
 from bullet_gazebo.physics.pose import Pose as Frame
 from robot_envs.backends.ros.bringup import full_name
-from robot_envs.backends.ros.gazebo import SimulatorService
+from robot_envs.backends.ros.gazebo import SimulatorService, check_success
 from robot_envs.errors import SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
@@ -81,7 +81,7 @@ class RosVariation:
         answer: GetLinkPropertiesResponse = self._call(
             "/gazebo/get_link_properties", GetLinkProperties, name
         )
-        _check(answer, f"link {name} can't be read")
+        check_success(answer, f"link {name} can't be read")
         if not answer.gravity_mode:
             self._weightless.add(name)
         own = link.robot.links.links[link.name].inertia
@@ -99,7 +99,7 @@ class RosVariation:
             **{key: getattr(inertia, key) for key in TENSOR},
         )
         answer = self._call("/gazebo/set_link_properties", SetLinkProperties, request)
-        _check(answer, f"link {name} can't be changed")
+        check_success(answer, f"link {name} can't be changed")
 
     def set_joint(self, joint: RobotPart, friction: JointFriction) -> None:
         # ODE models dry friction as a motor of speed 0 with the largest effort `fmax`. Empty lists change
@@ -109,12 +109,12 @@ class RosVariation:
         answer = self._call(
             "/gazebo/set_joint_properties", SetJointProperties, _scoped(joint), wanted
         )
-        _check(answer, f"joint {joint.name} can't be changed")
+        check_success(answer, f"joint {joint.name} can't be changed")
 
     def set_surface(self, link: RobotPart, factor: float) -> None:
         # This service is the stand-in's own: Gazebo has none.
         answer = self._call("/gazebo/set_link_friction", SetLinkFriction, _scoped(link), factor)
-        _check(answer, f"surfaces of link {link.name} can't be changed")
+        check_success(answer, f"surfaces of link {link.name} can't be changed")
 
     def pids(self, controller: RobotPart) -> Mapping[str, PidGains]:
         # Read from the parameters, to which ros_control writes gains that were changed.
@@ -137,11 +137,11 @@ class RosVariation:
         now = self._physics()
         wanted = (now.time_step, now.max_update_rate, Vector3(*gravity), now.ode_config)
         answer = self._call("/gazebo/set_physics_properties", SetPhysicsProperties, *wanted)
-        _check(answer, "gravity can't be changed")
+        check_success(answer, "gravity can't be changed")
 
     def _physics(self) -> GetPhysicsPropertiesResponse:
         answer = self._call("/gazebo/get_physics_properties", GetPhysicsProperties)
-        _check(answer, "the world's gravity can't be read")
+        check_success(answer, "the world's gravity can't be read")
         return answer
 
 
@@ -155,8 +155,3 @@ def _gains(namespace: str) -> PidGains:
     except (NoAnswer, Refused, ControlError) as error:
         raise SimulatorError(f"the gains {namespace} can't be read: {error}") from error
     return PidGains(gains.p, gains.i, gains.d)
-
-
-def _check(answer: Any, what: str) -> None:
-    if not answer.success:
-        raise SimulatorError(f"{what}: {answer.status_message}")

@@ -17,10 +17,15 @@ from std_srvs.srv import Empty
 
 from bullet_gazebo.physics.pose import Pose
 from robot_envs.backends.ros.bringup import full_name, ready
-from robot_envs.backends.ros.gazebo import RunningSimulator, SimulatorService
-from robot_envs.backends.ros.messages import JointStateReader, pose_of
+from robot_envs.backends.ros.gazebo import (
+    JointStateReader,
+    RunningSimulator,
+    SharedWorld,
+    SimulatorService,
+    check_success,
+    pose_of,
+)
 from robot_envs.backends.ros.properties import RosVariation
-from robot_envs.backends.ros.shared_world import SharedWorld
 from robot_envs.errors import RobotEnvError, SimulatorError
 from robot_envs.scene import Scene
 from robot_envs.variation import Variation
@@ -240,7 +245,7 @@ class RealtimeWorld:
         pose, (linear, angular) = motion
         at = PoseMsg(Point(*pose.position), Quaternion(*pose.orientation))
         wanted = ModelState(name, at, Twist(Vector3(*linear), Vector3(*angular)), "world")
-        _check(self._set_model(wanted), f"model '{name}' can't be placed")
+        check_success(self._set_model(wanted), f"model '{name}' can't be placed")
 
     def _place_joints(self, positions: Mapping[str, float]) -> None:
         """Puts all joints at their positions [rad, m], by name in the scene, at rest."""
@@ -249,7 +254,7 @@ class RealtimeWorld:
         answer = self._set_joints(
             robot.model, full_name(robot, robot.description), list(own), list(own.values())
         )
-        _check(answer, f"the robot '{robot.model}' can't be reset")
+        check_success(answer, f"the robot '{robot.model}' can't be reset")
 
     def begin(self, commands: Commands) -> None:
         """See `RobotBackend.begin`; does nothing."""
@@ -288,7 +293,7 @@ class RealtimeWorld:
         with self._simulator:
             for link in links:
                 answer = self._get_link(link, "world")
-                _check(answer, f"the pose of '{link}' isn't known")
+                check_success(answer, f"the pose of '{link}' isn't known")
                 found.append(pose_of(answer.link_state.pose))
         return found
 
@@ -300,8 +305,3 @@ class RealtimeWorld:
         self._variation.undo()
         with contextlib.suppress(SimulatorError):  # a simulator that is gone has no objects either
             self._world.leave(self)
-
-
-def _check(answer: Any, what: str) -> None:
-    if not answer.success:
-        raise SimulatorError(f"{what}: {answer.status_message}")

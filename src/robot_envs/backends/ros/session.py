@@ -14,8 +14,7 @@ import rospy
 from robot_envs.backends.backend import RobotBackend, ticks_per_action
 from robot_envs.backends.ros import gazebo, node, windows
 from robot_envs.backends.ros.bringup import Say, bring_up
-from robot_envs.backends.ros.gazebo import STEP_SERVICE, RunningSimulator, Undo
-from robot_envs.backends.ros.shared_world import SharedWorld
+from robot_envs.backends.ros.gazebo import STEP_SERVICE, RunningSimulator, SharedWorld, Undo
 from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
@@ -66,8 +65,6 @@ class RosSession:
     def start(self, say: Say) -> None:
         """Starts what is missing, and makes this the process's session.
 
-        If the simulator was started here and dies before its robots are there, another one is started once.
-
         Args:
             say: called with a line for each thing that is started.
 
@@ -75,16 +72,6 @@ class RosSession:
             RobotEnvError: if something can't be started, or what runs doesn't fit; `close` ends what was
                 started before.
         """
-        try:
-            self._start(say)
-        except RobotEnvError as error:
-            if not self._started_simulator or _simulator_runs():
-                raise
-            rospy.logwarn("%s; another simulator is started in its place", error)
-            self._undo.close()
-            self._start(say)
-
-    def _start(self, say: Say) -> None:
         robot = self._scene.robots[0]
         if rospy.core.is_initialized() and rospy.is_shutdown():
             raise RobotEnvError(

@@ -73,10 +73,6 @@ GAZEBO = "/gazebo"
 TIMEOUT = waiting.TIMEOUT
 
 
-class BadNumber(ValueError):
-    """A number is not finite; the text says which."""
-
-
 def call(service: str, kind: Any, *request: Any, timeout: float, gazebo_ns: str) -> Any:
     """Returns the simulator's answer, or None after a failure, which is logged."""
     name = f"{gazebo_ns.rstrip('/')}/{service}"
@@ -122,14 +118,11 @@ def make_twist(linear: tuple[float, float, float], angular: tuple[float, float, 
     return Twist(Vector3(*linear), Vector3(*angular))
 
 
-def check_finite(what: str, *numbers: float) -> None:
-    """Returns if all numbers are finite.
-
-    Raises:
-        BadNumber: a number isn't finite.
-    """
-    if not all(map(math.isfinite, numbers)):
-        raise BadNumber(f"{what}: {list(numbers)} holds a number that is not finite")
+def not_finite(what: str, *numbers: float) -> str:
+    """Returns what is wrong if a number isn't finite; empty if all are."""
+    if all(map(math.isfinite, numbers)):
+        return ""
+    return f"{what}: {list(numbers)} holds a number that is not finite"
 
 
 def pose_numbers(pose: Pose) -> tuple[float, ...]:

@@ -11,18 +11,21 @@ from ros_calls.waiting import service_answers
 from ros_utils._internal import log as _log
 from ros_utils._internal import nodes as _nodes
 from ros_utils._internal import packages as _packages
-from ros_utils._internal import processes as _processes
 from ros_utils._internal import programs as _programs
 from ros_utils._internal import roslaunch as _roslaunch
 from ros_utils._internal.programs import (
     CannotStart,
     Handle,
-    Readiness,
     Started,
+    await_start,
     wait_for_world,
-    wait_until_ready,
 )
 from ros_utils.readiness import Ready
+
+__all__ = [
+    "close_Gazebo",
+    "launch_Gazebo",
+]
 
 LABEL = "Gazebo"
 NODES = ("/gazebo", "/gazebo_gui")
@@ -109,34 +112,45 @@ def launch_Gazebo(
         "gui_required": gui_required,
     }
     # A real gazebo_ros rejects unknown arguments, so only those asked for are passed.
-    asked = {
-        "lockstep": lockstep or None,
-        "seed": seed,
-        "extra_gazebo_args": extra_gazebo_args or None,
-    }
+    asked = {"lockstep": lockstep, "seed": seed, "extra_gazebo_args": extra_gazebo_args}
+    switches |= {name: value for name, value in asked.items() if value not in (None, False, "")}
+    world = (custom_world_path, custom_world_pkg, custom_world_name)
+    screen = output == "screen" and not launch_new_term
+    service = f"{gazebo_ns.rstrip('/')}/{READY}"
     with _master.using(master_uri):
-        begin = time.monotonic()
-        answering = f"{gazebo_ns.rstrip('/')}/{READY}"
-        if service_answers(answering):
+        if service_answers(service):
             _log.warn(
                 f"{LABEL} runs already under {_master.uri()}: using it as it is"
                 " (ros_kill_all_processes ends it)"
             )
-            return wait_for_world(Started(), ready, None, begin, timeout)
-        try:
-            asked["world_name"] = _world(custom_world_path, custom_world_pkg, custom_world_name)
-            switches.update({name: value for name, value in asked.items() if value is not None})
-            arguments = [f"{name}:={value}" for name, value in switches.items()]
-            _packages.file("gazebo_ros", "launch", "empty_world.launch")
-            command = ["gazebo_ros", "empty_world.launch", *arguments]
-            screen = output == "screen" and not launch_new_term
-            handle = _roslaunch.start(command, LABEL, launch_new_term, screen, log_file, env)
-        except (_packages.NotFound, CannotStart, _master.MasterDown) as fault:
-            _log.error(f"launch_Gazebo: {fault}")
-            return False
-        readiness = wait_until_ready(lambda: service_answers(answering), handle, timeout)
-        started = _report(handle, readiness, answering, timeout)
-        return started and wait_for_world(started, ready, handle, begin, timeout)
+            return wait_for_world(Started(), ready, time.monotonic() + timeout, timeout)
+        handle = _start(switches, world, launch_new_term, screen, log_file, env)
+        absent = f"service {service} doesn't answer"
+        return handle is not None and await_start(
+            handle, lambda: service_answers(service), absent, timeout, ready, may_end=False
+        )
+
+
+def _start(
+    switches: dict[str, object],
+    world: tuple[str | None, str | None, str | None],
+    window: bool,
+    screen: bool,
+    log_file: str | None,
+    env: Mapping[str, str] | None,
+) -> Handle | None:
+    """Starts roslaunch; returns None, with an error in the log, if it can't be started."""
+    try:
+        path = _world(*world)
+        if path is not None:
+            switches["world_name"] = path
+        _packages.file("gazebo_ros", "launch", "empty_world.launch")
+        arguments = [f"{name}:={value}" for name, value in switches.items()]
+        command = ["gazebo_ros", "empty_world.launch", *arguments]
+        return _roslaunch.start(command, LABEL, window, screen, log_file, env)
+    except (_packages.NotFound, CannotStart, _master.MasterDown) as fault:
+        _log.error(f"launch_Gazebo: {fault}")
+        return None
 
 
 def close_Gazebo(*, master_uri: str | None = None) -> bool:
@@ -152,7 +166,7 @@ def close_Gazebo(*, master_uri: str | None = None) -> bool:
     """
     with _master.using(master_uri):
         nodes = {name: address for name in NODES if (address := _nodes.node_uri(name))}
-        gone = _programs.end([entry for entry in _processes.started() if entry.label == LABEL])
+        gone = _programs.end([entry for entry in _programs.started() if entry.label == LABEL])
         left = _nodes.shut_down_nodes(nodes)
     if left:
         _log.warn(f"close_Gazebo: still registered: {', '.join(left)}")
@@ -181,15 +195,3 @@ def _world(path: str | None, package: str | None, name: str | None) -> str | Non
             "a world in a package needs both custom_world_pkg and custom_world_name"
         )
     return None
-
-
-def _report(handle: Handle, readiness: Readiness, answering: str, timeout: float) -> Started | bool:
-    if readiness is Readiness.READY:
-        return Started(handle)
-    if readiness is Readiness.ENDED:
-        what = f"ended with exit code {handle.exit_code()} before it answered"
-    else:
-        what = f"service {answering} doesn't answer after {timeout:g} s; ended it"
-    handle.end()
-    _log.error(f"{LABEL}: {what}: {handle.reason()}{handle.where()}")
-    return False

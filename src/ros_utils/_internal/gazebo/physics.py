@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,12 +17,30 @@ from ros_utils._internal import nodes as _nodes
 from ros_utils._internal.gazebo.calls import (
     GAZEBO,
     TIMEOUT,
-    BadNumber,
     call,
-    check_finite,
     empty_call,
+    not_finite,
     succeeded,
 )
+
+__all__ = [
+    "gazebo_get_ODE_physics",
+    "gazebo_get_gravity",
+    "gazebo_get_max_update_rate",
+    "gazebo_get_physics_properties",
+    "gazebo_get_time_step",
+    "gazebo_pause_physics",
+    "gazebo_reset_sim",
+    "gazebo_reset_world",
+    "gazebo_set_ODE_physics",
+    "gazebo_set_default_properties",
+    "gazebo_set_gravity",
+    "gazebo_set_max_update_rate",
+    "gazebo_set_physics_properties",
+    "gazebo_set_time_step",
+    "gazebo_step_physics",
+    "gazebo_unpause_physics",
+]
 
 STEP = "gazeboWorld"  # XML-RPC method of the stand-in's node; Gazebo has no service for steps
 CHUNK = 1000  # steps in one call
@@ -139,13 +158,12 @@ def gazebo_set_physics_properties(
     now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
     if now is None:
         return False
-    try:
-        if time_step is not None:
-            _check_step(time_step)
-        if gravity is not None:
-            check_finite("gravity", *gravity)
-        check_finite("max_update_rate", max_update_rate or 0.0)
-    except BadNumber as fault:
+    fault = not_finite("gravity", *(gravity or ())) or not_finite(
+        "max_update_rate", max_update_rate or 0.0
+    )
+    if time_step is not None and not 0.0 < time_step < math.inf:
+        fault = f"the time step is {time_step}: above 0 and finite is needed"
+    if fault:
         _log.error(f"gazebo_set_physics_properties: {fault}")
         return False
     request = (
@@ -197,12 +215,9 @@ def gazebo_set_time_step(
     now = gazebo_get_physics_properties(timeout=timeout, gazebo_ns=gazebo_ns)
     if now is None:
         return False
-    try:
-        _check_step(new_time_step)
-    except BadNumber as fault:
-        _log.error(f"gazebo_set_time_step: {fault}")
-        return False
-    rate = now.max_update_rate * now.time_step / new_time_step
+    rate = now.max_update_rate
+    if new_time_step:  # the setter rejects 0
+        rate *= now.time_step / new_time_step
     return gazebo_set_physics_properties(new_time_step, rate, timeout=timeout, gazebo_ns=gazebo_ns)
 
 
@@ -280,9 +295,3 @@ def gazebo_set_default_properties(*, timeout: float = TIMEOUT, gazebo_ns: str = 
         timeout=timeout,
         gazebo_ns=gazebo_ns,
     )
-
-
-def _check_step(time_step: float) -> None:
-    check_finite("time step", time_step)
-    if time_step <= 0.0:
-        raise BadNumber(f"the time step is {time_step}: above 0 is needed")

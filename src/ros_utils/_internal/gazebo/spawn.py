@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import rosgraph
 from gazebo_msgs import srv
@@ -20,61 +20,70 @@ from ros_utils._internal import params as _params
 from ros_utils._internal.gazebo.calls import (
     GAZEBO,
     TIMEOUT,
-    BadNumber,
     SpawnResult,
     call,
-    check_finite,
     make_pose,
+    not_finite,
     succeeded,
 )
-from ros_utils._internal.urdf import urdf_parse_from_path, urdf_parse_from_pkg
+from ros_utils._internal.packages import urdf_parse_from_path, urdf_parse_from_pkg
+
+__all__ = [
+    "gazebo_delete_model",
+    "gazebo_spawn_sdf_param",
+    "gazebo_spawn_sdf_path",
+    "gazebo_spawn_sdf_pkg",
+    "gazebo_spawn_sdf_string",
+    "gazebo_spawn_urdf_param",
+    "gazebo_spawn_urdf_path",
+    "gazebo_spawn_urdf_pkg",
+    "gazebo_spawn_urdf_string",
+]
+
+Pose = tuple[float, float, float, float, float, float, float]  # x, y, z [m] and a quaternion
 
 
-class SpawnOptions(NamedTuple):
-    """The common options of the spawn functions: the model's place, and how to call."""
-
-    name: str
-    namespace: str
-    frame: str
-    pose: tuple[float, float, float, float, float, float, float]  # x, y, z and a quaternion
-    timeout: float
-    gazebo_ns: str
-    verify: bool
-
-
-def spawn(kind: str, xml: str, options: SpawnOptions) -> SpawnResult:
+def spawn(
+    kind: str,
+    xml: str,
+    name: str,
+    namespace: str,
+    frame: str,
+    pose: Pose,
+    timeout: float,
+    gazebo_ns: str,
+    verify: bool,
+) -> SpawnResult:
     """Spawns a model from XML text; `kind` is "urdf" or "sdf".
 
     Returns:
         Whether it was spawned (and with `verify` is in the world's list), and if not, why.
     """
-    name = f"{options.gazebo_ns.rstrip('/')}/spawn_{kind}_model"
+    service = f"{gazebo_ns.rstrip('/')}/spawn_{kind}_model"
+    if fault := not_finite(f"spawn {name}: its pose", *pose):
+        return _failed(fault)
     try:
-        check_finite(f"spawn {options.name}: its pose", *options.pose)
-        pose = make_pose(*options.pose)
-        request = (options.name, xml, options.namespace, pose, options.frame)
-        answer = wait_and_call(name, srv.SpawnModel, *request, timeout=options.timeout)
-    except (ServiceFailed, BadNumber) as fault:
-        return _failed(str(fault))
+        request = (name, xml, namespace, make_pose(*pose), frame)
+        answer = wait_and_call(service, srv.SpawnModel, *request, timeout=timeout)
+    except ServiceFailed as failure:
+        return _failed(str(failure))
     if not answer.success:
         return _failed(str(answer.status_message))
-    if options.verify and not _appears(options.name, True, options.timeout, options.gazebo_ns):
-        return _failed(
-            f"{options.name} isn't in the world {options.timeout:g} s after it was spawned"
-        )
+    if verify and not _appears(name, True, timeout, gazebo_ns):
+        return _failed(f"{name} isn't in the world {timeout:g} s after it was spawned")
     return SpawnResult(True, str(answer.status_message))
 
 
-def spawn_param(kind: str, param_name: str, options: SpawnOptions) -> SpawnResult:
+def spawn_param(kind: str, param_name: str, name: str, namespace: str, *more: Any) -> SpawnResult:
     """Spawns a model from the text in parameter ``<namespace>/<param_name>``. See `spawn`."""
-    name = rosgraph.names.ns_join(options.namespace or "/", param_name)
+    full = rosgraph.names.ns_join(namespace or "/", param_name)
     try:
-        xml = str(_params.get(name))
+        xml = str(_params.get(full))
     except _master.MasterDown as fault:
-        return _failed(f"parameter {name}: {fault}")
+        return _failed(f"parameter {full}: {fault}")
     except KeyError:
-        return _failed(f"parameter {name} is not set: load the robot's description first")
-    return spawn(kind, xml, options)
+        return _failed(f"parameter {full} is not set: load the robot's description first")
+    return spawn(kind, xml, name, namespace, *more)
 
 
 def gazebo_delete_model(
@@ -142,10 +151,8 @@ def gazebo_spawn_urdf_path(
     if xml is None:
         return SpawnResult(False, f"{model_path}: can't be read or expanded")
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    options = SpawnOptions(
-        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
-    )
-    return spawn("urdf", xml, options)
+    place = (robot_namespace, reference_frame, pose)
+    return spawn("urdf", xml, model_name, *place, timeout, gazebo_ns, verify)
 
 
 def gazebo_spawn_urdf_pkg(
@@ -175,10 +182,8 @@ def gazebo_spawn_urdf_pkg(
             False, f"{file_name} in package {pkg_name}: can't be found, read or expanded"
         )
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    options = SpawnOptions(
-        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
-    )
-    return spawn("urdf", xml, options)
+    place = (robot_namespace, reference_frame, pose)
+    return spawn("urdf", xml, model_name, *place, timeout, gazebo_ns, verify)
 
 
 def gazebo_spawn_urdf_string(
@@ -215,10 +220,8 @@ def gazebo_spawn_urdf_string(
         after a failure.
     """
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    options = SpawnOptions(
-        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
-    )
-    return spawn("urdf", model_string, options)
+    place = (robot_namespace, reference_frame, pose)
+    return spawn("urdf", model_string, model_name, *place, timeout, gazebo_ns, verify)
 
 
 def gazebo_spawn_urdf_param(
@@ -240,10 +243,8 @@ def gazebo_spawn_urdf_param(
 ) -> SpawnResult:
     """Spawns the URDF in parameter ``<robot_namespace>/<param_name>``. See `gazebo_spawn_urdf_string`."""
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    options = SpawnOptions(
-        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
-    )
-    return spawn_param("urdf", param_name, options)
+    place = (robot_namespace, reference_frame, pose)
+    return spawn_param("urdf", param_name, model_name, *place, timeout, gazebo_ns, verify)
 
 
 def gazebo_spawn_sdf_path(
@@ -268,10 +269,8 @@ def gazebo_spawn_sdf_path(
     if xml is None:
         return False
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    options = SpawnOptions(
-        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
-    )
-    return spawn("sdf", xml, options)[0]
+    place = (robot_namespace, reference_frame, pose)
+    return spawn("sdf", xml, model_name, *place, timeout, gazebo_ns, verify).success
 
 
 def gazebo_spawn_sdf_pkg(
@@ -302,10 +301,8 @@ def gazebo_spawn_sdf_pkg(
     if xml is None:
         return False
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    options = SpawnOptions(
-        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
-    )
-    return spawn("sdf", xml, options)[0]
+    place = (robot_namespace, reference_frame, pose)
+    return spawn("sdf", xml, model_name, *place, timeout, gazebo_ns, verify).success
 
 
 def gazebo_spawn_sdf_string(
@@ -341,10 +338,8 @@ def gazebo_spawn_sdf_string(
         True if it was spawned; a single value, unlike the pair for a URDF.
     """
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    options = SpawnOptions(
-        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
-    )
-    return spawn("sdf", model_string, options)[0]
+    place = (robot_namespace, reference_frame, pose)
+    return spawn("sdf", model_string, model_name, *place, timeout, gazebo_ns, verify).success
 
 
 def gazebo_spawn_sdf_param(
@@ -366,10 +361,8 @@ def gazebo_spawn_sdf_param(
 ) -> bool:
     """Spawns the SDF in parameter ``<robot_namespace>/<param_name>``. See `gazebo_spawn_sdf_string`."""
     pose = (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
-    options = SpawnOptions(
-        model_name, robot_namespace, reference_frame, pose, timeout, gazebo_ns, verify
-    )
-    return spawn_param("sdf", param_name, options)[0]
+    place = (robot_namespace, reference_frame, pose)
+    return spawn_param("sdf", param_name, model_name, *place, timeout, gazebo_ns, verify).success
 
 
 def _read_sdf(path: str) -> str | None:

@@ -17,18 +17,29 @@ from ros_utils._internal import log as _log
 from ros_utils._internal.gazebo.calls import (
     GAZEBO,
     TIMEOUT,
-    BadNumber,
     JointPropertiesResult,
     LinkStateResult,
     ModelStateResult,
     WorldPropertiesResult,
     call,
-    check_finite,
     make_pose,
     make_twist,
+    not_finite,
     pose_numbers,
     succeeded,
 )
+
+__all__ = [
+    "gazebo_apply_joint_effort",
+    "gazebo_get_joint_properties",
+    "gazebo_get_link_state",
+    "gazebo_get_model_names",
+    "gazebo_get_model_state",
+    "gazebo_get_world_properties",
+    "gazebo_set_link_state",
+    "gazebo_set_model_configuration",
+    "gazebo_set_model_state",
+]
 
 
 def gazebo_get_model_state(
@@ -199,10 +210,8 @@ def gazebo_apply_joint_effort(
     Returns:
         True if the simulator does it.
     """
-    try:
-        check_finite(f"effort on {joint_name}", effort, duration, start_time)
-    except BadNumber as fault:
-        _log.error(str(fault))
+    if fault := not_finite(f"effort on {joint_name}", effort, duration, start_time):
+        _log.error(fault)
         return False
     begin, length = RosTime.from_sec(max(0.0, start_time)), Duration.from_sec(duration)
     request = (joint_name, effort, begin, length)
@@ -241,9 +250,7 @@ def _set(
     timeout: float,
     gazebo_ns: str,
 ) -> bool:
-    try:
-        check_finite(service, *numbers)
-    except BadNumber as fault:
-        _log.error(str(fault))
+    if fault := not_finite(service, *numbers):
+        _log.error(fault)
         return False
     return succeeded(call(service, kind, state, timeout=timeout, gazebo_ns=gazebo_ns))

@@ -121,7 +121,12 @@ class GainsTest(SlidesTest):
         for _ in range(2):
             self.assertTrue(self.load("effort_position"))
             rospy.wait_for_service(service, 60.0)
+            kept = rospy.ServiceProxy(service, Reconfigure, persistent=True)
+            kept(ReconfigureRequest())
             self.assertTrue(self.unload("effort_position"))
+            with self.assertRaisesRegex(rospy.ServiceException, "the parameters are gone"):
+                kept(ReconfigureRequest())
+            kept.close()
             with self.assertRaises(rospy.ROSException):
                 rospy.wait_for_service(service, 0.3)
 

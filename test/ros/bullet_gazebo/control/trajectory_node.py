@@ -10,6 +10,7 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 from control_msgs.msg import JointTolerance
+from control_msgs.srv import QueryTrajectoryState
 from controller_client import STRICT, Manager
 from gazebo_msgs.srv import GetJointProperties
 from std_srvs.srv import Empty
@@ -123,8 +124,35 @@ class TrajectoryTest(unittest.TestCase):
                 plan = trajectory(joints, (1.0, [0.0] * len(joints)))
                 self.check(arm.pursue(plan), "REJECTED", "INVALID_JOINTS", "joints don't match")
 
+    def test_states_and_query_state_tell_the_way(self):
+        arm = self.arm()
+        unpause()
+        self.assertTrue(wait_until(lambda: arm.states))
+        start = arm.states[-1].header.stamp + rospy.Duration(1)
+        arm.command.publish(trajectory(EFFORT, (1.0, [1.0, 0.0]), stamp=start.to_sec()))
+
+        def ask(seconds):
+            time = start + rospy.Duration.from_sec(seconds)
+            return call("/slides/effort_arm/query_state", QueryTrajectoryState, time)
+
+        self.assertTrue(wait_until(lambda: ask(9.0).position == (0.0, 1.0)))
+        middle = ask(0.5)
+        self.assertEqual(middle.name, EFFORT[::-1])
+        self.assertAlmostEqual(middle.position[1], 0.5, places=6)
+        self.assertAlmostEqual(middle.velocity[1], 1.875, places=6)
+        self.assertTrue(arm.wait_state(lambda state: state.actual.velocities[1] > 0.3))
+        state = arm.states[-1]
+        for part in ("positions", "velocities"):
+            for wanted, found, off in zip(
+                getattr(state.desired, part), getattr(state.actual, part), getattr(state.error, part),
+                strict=True,
+            ):  # fmt: skip
+                self.assertAlmostEqual(off, wanted - found, places=12)
+
     def test_a_controller_that_does_not_run_takes_no_goal(self):
         arm = self.arm(start=False)
+        with self.assertRaisesRegex(rospy.ServiceException, "not running"):
+            call("/slides/effort_arm/query_state", QueryTrajectoryState, rospy.Time(0))
         plan = trajectory(EFFORT, (1.0, [0.0, 0.0]))
         self.check(arm.pursue(plan), "REJECTED", "INVALID_GOAL", "not running")
 

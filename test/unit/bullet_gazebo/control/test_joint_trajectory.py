@@ -275,3 +275,10 @@ def test_a_tolerance_that_is_no_number_is_refused():
         with pytest.raises(TrajectoryRefused, match="not a number") as refusal:
             rig.pursue(move((1.0, (1.0,))), **tolerances)
         assert refusal.value.code == INVALID_GOAL
+
+
+def test_a_continuous_joint_goes_the_short_way():
+    rig = Rig(joints=("wrist",)).start()
+    rig.controller.follow(move((1.0, (2 * math.pi - 0.5,)), names=("wrist",)))
+    rig.run(1100)
+    assert rig.joints["wrist"].position == pytest.approx(-0.5)

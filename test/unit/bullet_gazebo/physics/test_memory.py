@@ -140,7 +140,7 @@ def test_without_room_for_its_files_a_model_keeps_the_old_world(often, monkeypat
     assert not stays_among_others(tmp_path, lambda: monkeypatch.setattr(writer, full))
 
 
-@pytest.mark.parametrize("function", ["write_urdf", "_size", "scratch_folder"])
+@pytest.mark.parametrize("function", ["write_urdf", "_size", "TemporaryDirectory"])
 def test_a_full_disk_is_a_reason_and_leaves_the_world_as_it_was(monkeypatch, function):
     def full(*args: object, **kwargs: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")

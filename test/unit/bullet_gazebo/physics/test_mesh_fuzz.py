@@ -1,22 +1,17 @@
 """Damaged mesh files: read sensibly or refused in one line, and the process lives."""
 
-import pytest
 from hypothesis import HealthCheck, given, settings
-from support.mutations.mesh_worker import MeshWorker
 from support.mutations.meshes import mesh_files
 
 from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.meshes import read_mesh
+from bullet_gazebo.physics.files.sdf import parse_sdf
+from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.world import World, ground_plane
 
 QUICK = settings(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-ENGINES = ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
-
-
-@pytest.fixture(scope="module", params=ENGINES)
-def worker(request, tmp_path_factory):
-    worker = MeshWorker(request.param, tmp_path_factory.mktemp("meshes"))
-    yield worker
-    worker.close()
+SDF = """<sdf version="1.6"><model name="m"><static>{static}</static><link name="l"><collision name="c">
+<geometry><mesh><uri>{path}</uri></mesh></geometry></collision></link></model></sdf>"""
 
 
 @settings(QUICK, max_examples=300)
@@ -38,5 +33,20 @@ def test_what_is_read_is_whole(tmp_path_factory, file):
 
 @settings(QUICK, max_examples=60)
 @given(mesh_files())
-def test_no_mesh_ends_an_engine(worker, file):
-    worker.spawn(*file)
+def test_no_mesh_ends_an_engine(new_engine, tmp_path_factory, file):
+    """One that moves and one that stands; an engine that crashes ends this process."""
+    path = tmp_path_factory.getbasetemp() / f"mesh{file[0]}"
+    path.write_bytes(file[1])
+    for static in (0, 1):
+        world = World(new_engine())
+        world.spawn("ground_plane", ground_plane(), Pose())
+        try:
+            world.spawn("m", parse_sdf(SDF.format(static=static, path=path)), Pose())
+        except DescriptionError as error:
+            assert str(path) in str(error) and "\n" not in str(error)
+        else:
+            for _ in range(10):
+                world.step()
+            world.delete("m")
+        finally:
+            world.close()

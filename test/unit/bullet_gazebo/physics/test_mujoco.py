@@ -101,6 +101,25 @@ def test_a_model_that_is_refused_leaves_the_world_as_it_was(world, tmp_path):
     assert list(world.models) == ["a"]
 
 
+def test_a_motor_damping_and_efforts_move_a_joint_as_their_equations_say(world):
+    driven = world.spawn("driven", slider(), Pose())
+    driven.set_motor("j", -2.0, 4.0)
+    damped = world.spawn("damped", slider(more='<dynamics damping="4"/>'), Pose((0.0, 5.0, 0.0)))
+    damped.body.reset_joint(0, 0.0, 1.0)
+    pushed = world.spawn("pushed", slider(), Pose((0.0, 9.0, 0.0)))
+    pushed.body.apply_efforts((3.0,))
+    pushed.body.add_effort(0, 1.0)
+    pushed.body.add_wrench("s", (2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    run(world, 0.1)
+    assert driven.joint_state("j")[1] == pytest.approx(-0.2, rel=1e-3)  # with no more than 4 N
+    assert damped.joint_state("j")[1] == pytest.approx(math.exp(-0.1 * 4.0 / 2.0), rel=2e-3)
+    assert pushed.joint_state("j")[1] == pytest.approx(
+        6.0 / 2.0 * 0.001, rel=1e-9
+    )  # in one step only
+    run(world, 1.5)
+    assert driven.joint_state("j")[1] == pytest.approx(-2.0, rel=1e-3)
+
+
 def test_dry_friction_holds_up_to_its_effort_and_brakes_with_it(world):
     model = world.spawn("a", slider(more='<dynamics friction="3"/>'), Pose())
     for force, speed in ((2.9, 0.0), (5.0, (5.0 - 3.0) / 2.0)):

@@ -193,13 +193,6 @@ def test_crossed_limits_are_swapped():
         ('<axis xyz="0 0 0"/>' + LIMIT, "the axis has length 0"),
         ('<axis xyz="1e200 1e200 0"/>' + LIMIT, "the axis has length inf"),
         ('<dynamics damping="soft"/>' + LIMIT, "<dynamics damping>: 'soft' is not a number"),
-        ("<mimic/>" + LIMIT, "<mimic joint=…> is missing"),
-        ('<mimic joint="k" multiplier="-"/>' + LIMIT, "<mimic multiplier>: '-' is not a number"),
-        ('<calibration rising="up"/>' + LIMIT, "<calibration rising>: 'up' is not a number"),
-        (
-            '<safety_controller k_velocity="v"/>' + LIMIT,
-            "<safety_controller k_velocity>: 'v' is not a number",
-        ),
     ],
 )
 def test_a_joint_that_cannot_be_read_refuses_the_robot(joint, fault):

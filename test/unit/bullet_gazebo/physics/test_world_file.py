@@ -8,8 +8,7 @@ from bullet_gazebo.physics.description import DescriptionError
 from bullet_gazebo.physics.files.reading import Resources
 from bullet_gazebo.physics.files.world_file import empty_world, load_world, parse_world
 from bullet_gazebo.physics.world import World
-from bullet_gazebo.ros.services.resource_paths import find_world
-from bullet_gazebo.ros.services.spawn_services import fill_world, read_world
+from bullet_gazebo.ros.services.spawn_services import fill_world, find_world, read_world
 from bullet_gazebo.simulator import Simulator
 
 EMPTY = Path(__file__).resolve().parents[4] / "companions/gazebo_ros/worlds/empty.world"

@@ -98,6 +98,14 @@ def test_a_texture_is_as_bright_as_its_image_where_the_file_names_no_colour(scen
     assert np.array_equal(seen(scene), told)
 
 
+def test_a_texture_repeats(scene, tmp_path):
+    text = textured(tmp_path).replace("vt 1", "vt 2").replace("1\nvt 0 1", "2\nvt 0 2")
+    put(scene, "it", mesh(tmp_path / "square.obj", text))
+    picture = seen(scene)
+    at = [HEIGHT // 2 + each for each in (-32, -10, 10, 32)]
+    assert [main_colour(picture[at[0], x]) for x in at] == ["r", "g", "r", "g"]
+
+
 def test_materials_of_one_file_have_their_colours_and_those_of_the_robots_file_give_way(
     scene, tmp_path
 ):

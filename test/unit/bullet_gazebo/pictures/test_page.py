@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from support.pages.viser_recording import Recording
 
-from bullet_gazebo.physics.description import Shape
+from bullet_gazebo.physics.description import Link, Shape
 from bullet_gazebo.physics.pose import Pose, normalized
 from bullet_gazebo.pictures.page import Picture
 from bullet_gazebo.pictures.page_batches import MOST_INSTANCES, compose
-from bullet_gazebo.pictures.visuals import VisibleLink, VisibleModel
+from bullet_gazebo.pictures.visuals import VisibleModel
 
 AT_REST = (0.0, 0.0, 0.0, 1.0)
 
@@ -26,7 +26,7 @@ def picture(server, complaints):
 def boxes(number, count, **look):
     """A model of `count` links, each a box of its own size."""
     links = [
-        VisibleLink(f"l{i}", [Shape("box", (0.1, 0.1, number + i / 1000), **look)])
+        Link(f"l{i}", visuals=[Shape("box", (0.1, 0.1, number + i / 1000), **look)])
         for i in range(count)
     ]
     return VisibleModel(number, f"m{number}", links)
@@ -93,7 +93,7 @@ def test_what_is_lost_stays_where_it_was_seen_last(server, picture):
 
 
 def test_looks_go_together_and_a_mesh_that_is_not_there_is_a_box(server, picture, complaints):
-    mesh = [VisibleLink("l", [Shape("mesh", (1.0, 1.0, 1.0), mesh="gone.stl")])]
+    mesh = [Link("l", visuals=[Shape("mesh", (1.0, 1.0, 1.0), mesh="gone.stl")])]
     clear = boxes(2, 1, rgba=(1.0, 0.0, 0.0, 0.5))
     picture.draw([boxes(1, 1), clear, VisibleModel(3, "m3", mesh)], [])
     picture.move(in_a_row(3))
@@ -111,7 +111,7 @@ def test_a_file_with_looks_is_sent_once_for_all_models(server, picture, tmp_path
     path.write_text("mtllib looks.mtl\nv 0 0 0\nv 1 0 0\nv 0 0 1\nusemtl red\nf 1 2 3\n")
     models = [
         VisibleModel(
-            i, f"m{i}", [VisibleLink("l", [Shape("mesh", (1.0, 1.0, 2.0), mesh=str(path))])]
+            i, f"m{i}", [Link("l", visuals=[Shape("mesh", (1.0, 1.0, 2.0), mesh=str(path))])]
         )
         for i in range(5)
     ]

@@ -63,6 +63,15 @@ def test_a_shape_is_seen_where_it_is_in_its_colour(scene, shape, place):
     assert len(where(shown(scene), 1)) == len(where(shown(scene), 2)) == 0
 
 
+def test_it_turns_with_its_link(scene):
+    scene.add("it", visible_shapes(parse_urdf(body('<box size="0.1 0.1 0.8"/>'))))
+    spans = []
+    for lean in (0.0, math.pi / 2):
+        scene.place("it", {"base": Pose((0.0, 0.0, 1.0), from_rpy(0.0, lean, 0.0))})
+        spans.append(np.ptp(where(shown(scene), 0), axis=0))
+    assert spans[0][1] > 4 * spans[0][0] and spans[1][0] > 3 * spans[1][1]
+
+
 def test_what_is_nearer_hides_what_is_behind_and_the_ground_what_is_below(scene):
     scene.add("near", visible_shapes(parse_urdf(body(BOX))))
     scene.add("far", visible_shapes(parse_urdf(body(BOX, GREEN))))

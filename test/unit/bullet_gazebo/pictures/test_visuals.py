@@ -20,7 +20,9 @@ EXTENTS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("shape", "volume", "extents"), zip(SHAPES, VOLUMES, EXTENTS, strict=True))
+@pytest.mark.parametrize(
+    ("shape", "volume", "extents"), [*zip(SHAPES, VOLUMES, EXTENTS, strict=True)]
+)
 def test_it_is_closed_and_has_the_shapes_size(shape, volume, extents):
     solid = solid_of(shape)
     triangles = solid.corners.reshape(-1, 3, 3)

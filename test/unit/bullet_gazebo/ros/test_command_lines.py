@@ -9,7 +9,7 @@ from bullet_gazebo.ros.clients import gz, gzclient
 from bullet_gazebo.ros.clients.spawn_model import parse
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
 from bullet_gazebo.ros.node.gzserver import parse_args
-from bullet_gazebo.ros.services.resource_paths import model_paths
+from bullet_gazebo.ros.services.spawn_services import model_paths
 
 
 def test_options_stand_in_any_order():
@@ -22,6 +22,13 @@ def test_options_stand_in_any_order():
 @pytest.mark.parametrize("line", ["-o a.world", "-o fast a.world", "--nix 5 a.world", "a.world -o"])
 def test_the_world_is_found(line):
     assert parse_args(line.split()).world == "a.world"
+
+
+def test_a_video_has_its_options():
+    line = "--video a.mp4 --video-size 320 240 w.world --video-rate 60"
+    args = parse_args(line.split())
+    assert (args.video, args.video_size, args.video_rate) == ("a.mp4", [320, 240], 60.0)
+    assert (args.video_model, args.world) == ("", "w.world")
 
 
 def test_the_seed_decides_random_numbers():

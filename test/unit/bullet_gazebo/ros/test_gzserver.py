@@ -36,6 +36,12 @@ def test_a_master_that_goes_meanwhile_is_told_in_one_line(failing, capsys):
     assert line.startswith(f"gzserver: the master at {uri}") and "went" in line
 
 
+def test_what_fails_for_another_reason_is_raised(failing, monkeypatch):
+    monkeypatch.setattr(master, "is_up", lambda: True)
+    with pytest.raises(ConnectionRefusedError):
+        failing()
+
+
 def test_a_shutdown_meanwhile_is_none_of_its_faults(failing, monkeypatch, capsys):
     monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
     assert failing() == 0

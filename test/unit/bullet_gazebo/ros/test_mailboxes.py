@@ -5,9 +5,9 @@ import time
 import pytest
 from rospy.impl import tcpros_pubsub
 
-from bullet_gazebo.ros.common import mailboxes as module
-from bullet_gazebo.ros.common.mailboxes import Mailbox, Mailboxes
-from bullet_gazebo.ros.common.rospy_topics import publish_without_yielding
+from bullet_gazebo.ros.common.rospy_internals import publish_without_yielding
+from bullet_gazebo.ros.services import advance_service as module
+from bullet_gazebo.ros.services.advance_service import Mailbox, Mailboxes
 
 
 @pytest.fixture
@@ -93,6 +93,12 @@ def test_connecting_waits_for_topics_of_this_process_only(boxes, monkeypatch):
     heard, told = boxes.connect("/script", ["/states", "/elsewhere"], ["/command", "/elsewhere"])
     assert (heard, told) == (["/states"], ["/command"])
     assert len(looks) > 10
+
+
+def test_connecting_ends_although_nobody_comes(boxes, monkeypatch):
+    monkeypatch.setattr(module, "CONNECTING", 0.05)
+    monkeypatch.setattr(module, "is_connected", lambda *_: False)
+    assert boxes.connect("/script", ["/states"], []) == (["/states"], [])
 
 
 def test_publishing_gives_the_processor_away_no_more(monkeypatch):

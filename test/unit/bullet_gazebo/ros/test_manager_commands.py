@@ -89,3 +89,12 @@ CONTROLLERS = [
 )
 def test_filter(function, arguments, expected):
     assert [each.name for each in function(CONTROLLERS, *arguments)] == expected
+
+
+def test_keyword_arguments_have_their_documented_names():
+    assert filter_by_name(ctrl_list=CONTROLLERS, ctrl_name="arm", match_substring=False)
+    assert filter_by_type(ctrl_list=CONTROLLERS, ctrl_type="mine", match_substring=True)
+    assert filter_by_state(ctrl_list=CONTROLLERS, ctrl_state="run", match_substring=True)
+    options = {"ctrl_list": CONTROLLERS, "hardware_interface": VELOCITY}
+    assert filter_by_hardware_interface(**options, match_substring=True)
+    assert filter_by_resources(**options, resources=["wheel"], match_any=False)

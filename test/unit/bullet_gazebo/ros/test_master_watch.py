@@ -135,6 +135,11 @@ def test_two_of_a_name_start_one_after_the_other(master) -> None:
     assert order == ["first", "second"]
 
 
+def test_one_that_never_comes_up_holds_up_nobody_for_ever(master) -> None:
+    with one_at_a_time("/gazebo"), one_at_a_time("/gazebo", bound=0.1):
+        pass
+
+
 def test_the_loss_of_the_name_is_told_apart_from_other_ends(master, monkeypatch) -> None:
     hooks = []
     monkeypatch.setattr(master_watch.rospy.core, "add_preshutdown_hook", hooks.append)

@@ -65,6 +65,18 @@ def test_in_real_time_everything_is_sent_at_once(sim, thinner):
     assert reader.got == list(range(1000))
 
 
+def test_a_world_that_slows_down_sends_nothing_stale(sim, thinner, monkeypatch):
+    monkeypatch.setattr(publishing, "PERIOD", BOUND)
+    reader = Reader()
+    topic = ThinnedTopic(thinner, "/topic", reader)
+    topic.send(1)
+    topic.send(2)  # kept
+    sim.outruns_the_clock = False
+    topic.send(3)
+    topic.flush()
+    assert reader.got == [1, 3]
+
+
 def test_a_closed_topic_publishes_nothing(thinner):
     reader = Reader()
     topic = ThinnedTopic(thinner, "/topic", reader)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import viser
 
-from bullet_gazebo.physics.pose import Pose
+from bullet_gazebo.physics.description import Joint, Link
 from bullet_gazebo.pictures.page import Picture
-from bullet_gazebo.pictures.visuals import VisibleJoint, VisibleLink, VisibleModel
+from bullet_gazebo.pictures.visuals import VisibleModel
 from bullet_gazebo.ros.window.model_panel import NONE, ModelPanel
 from bullet_gazebo.ros.window.panels import ONLY_STEPS, TimePanel
 
@@ -38,7 +38,7 @@ def handles(server, kind):
 
 
 def joint(name):
-    return VisibleJoint(name, "revolute", "base", Pose(), (0.0, 0.0, 1.0), -1.0, 1.0)
+    return Joint(name, "revolute", "", "base", axis=(0.0, 0.0, 1.0), lower=-1.0, upper=1.0)
 
 
 def test_models_are_chosen_while_another_thread_shows_them(server, interleaved):
@@ -51,9 +51,7 @@ def test_models_are_chosen_while_another_thread_shows_them(server, interleaved):
     names = {name: [f"{name}_{i}" for i in range(count)] for name, count in JOINTS.items()}
     picture.draw(
         [
-            VisibleModel(
-                number, name, [VisibleLink("base", [])], [joint(each) for each in names[name]]
-            )
+            VisibleModel(number, name, [Link("base")], [joint(each) for each in names[name]])
             for number, name in enumerate(names)
         ],
         [],
@@ -106,7 +104,7 @@ def test_a_slider_that_is_dragged_leaves_its_joint_where_it_was_left(server):
         lambda: False,
     )
     picture = Picture(server, pytest.fail)
-    picture.draw([VisibleModel(1, "arm", [VisibleLink("base", [])], [joint("elbow")])], [])
+    picture.draw([VisibleModel(1, "arm", [Link("base")], [joint("elbow")])], [])
     panel.set_models(list(picture.models.values()))
     handles(server, viser.GuiDropdownHandle)["Model"].value = "arm"
     panel.show({}, {})

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from bullet_gazebo.physics.engines import make_engine
 from bullet_gazebo.physics.world import World
 from bullet_gazebo.ros.clients.gz import CHUNK
-from bullet_gazebo.ros.node.world_control import WorldControl
+from bullet_gazebo.ros.services.world_services import WorldControl
 from bullet_gazebo.simulator import Simulator
 
 # What XML-RPC can carry.

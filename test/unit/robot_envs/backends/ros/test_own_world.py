@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import gymnasium
 import pytest
@@ -210,7 +211,8 @@ def test_one_that_cannot_start_says_why_and_those_beside_it_end(monkeypatch) -> 
 
 def test_where_there_is_no_memory_or_no_file_nothing_starts(monkeypatch) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(own_simulator, "free_memory", lambda: 300_000_000)
+        free = SimpleNamespace(available=300_000_000)
+        patch.setattr(own_simulator.psutil, "virtual_memory", lambda: free)
         with (
             pytest.raises(
                 RobotEnvError, match="16 simulators need about 1.9 GB of memory, and 0.3 GB are"
@@ -252,7 +254,7 @@ os.kill(simulators[1].pid, signal.SIGSTOP)
 if os.fork() == 0:  # a child that has inherited all, and outlives its parent
     signal.alarm(100)
     signal.pause()
-print(*(pid for each in simulators for pid in each.processes), flush=True)
+print(*(pid for each in simulators for pid in (each.pid, each._process.pid)), flush=True)
 signal.pause()
 """
 

@@ -1,6 +1,6 @@
 """The parts of a simulator of one's own that need none: its journal, the checks of its answers, memory."""
 
-import math
+from types import SimpleNamespace
 
 import pytest
 
@@ -49,9 +49,7 @@ def test_a_journal_brings_another_simulator_to_the_same_state_or_says_where_it_d
     world = Replayed()
     journal.replay(world, 8_000_000)
     assert world.asked == [varied, begun, *commands]
-    with pytest.raises(
-        SimulatorFault, match="4 steps lead to another state.*: joints .*4.5.*, not "
-    ):
+    with pytest.raises(SimulatorFault, match="4 steps lead to another state.*position=4.5.*, not "):
         journal.replay(Replayed(drift=0.5), 8_000_000)
     journal.forget_episode()
     world.asked.clear()
@@ -70,28 +68,16 @@ def test_a_variation_leaves_what_it_does_not_name() -> None:
     )
 
 
-def test_what_can_be_is_fine() -> None:
-    assert checked(state(-1e6, 1e6, 1e6, time=0.3), 300_000_000)
-
-
-@pytest.mark.parametrize(
-    ("answer", "told"),
-    [
-        (state(math.nan, 0.0, 0.0), "joint 'hinge' is not finite: position nan"),
-        (state(0.0, 0.0, -math.inf), "joint 'hinge' is not finite.* effort -inf"),
-        (state(0.0, 1e10, 0.0), "joint 'hinge' is out of all bounds.* velocity 1e\\+10"),
-        (state(0.0, 0.0, 0.0, time=0.008), "its time stands at 0.008 s .* and 0 s were asked for"),
-        (state(0.0, 0.0, 0.0, time=math.nan), "its time stands at nan"),
-    ],
-)
-def test_what_cannot_be_is_a_fault(answer: WorldState, told: str) -> None:
-    with pytest.raises(SimulatorFault, match=told):
+def test_an_answer_of_another_time_is_a_fault() -> None:
+    answer = state(0.0, 0.0, 0.0, time=0.3)
+    assert checked(answer, 300_000_000) is answer
+    with pytest.raises(SimulatorFault, match="its time stands at 0.3 s .* and 0 s were asked for"):
         checked(answer, 0)
 
 
 def test_more_than_there_is_memory_for_is_refused(monkeypatch) -> None:
-    assert own_simulator.free_memory() > 0
-    monkeypatch.setattr(own_simulator, "free_memory", lambda: 1_000_000_000)
+    free = SimpleNamespace(available=1_000_000_000)
+    monkeypatch.setattr(own_simulator.psutil, "virtual_memory", lambda: free)
     own_simulator.check_memory(8)
     with pytest.raises(
         RobotEnvError, match=r"^16 simulators need about 1.9 GB .* 1.0 GB are free: .*$"
@@ -105,7 +91,7 @@ class World:
     def __init__(self, events: list[str], fails: bool = False) -> None:
         self.slot, self._events, self._fails = next_slot(), events, fails
         events.append(f"start {self.slot.number}")
-        connect_in_turn(self)
+        connect_in_turn(self.connect, self.close)
 
     def connect(self) -> None:
         self._events.append(f"connect {self.slot.number}")

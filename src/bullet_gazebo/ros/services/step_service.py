@@ -3,6 +3,7 @@
 - step_world (StepWorld.srv) resets and places as well; its requests and answers name things.
 - prepare_step (PrepareStep.srv) looks names up once and returns a handle.
 - prepared_step (PreparedStep.srv) takes the handle and numbers, and answers with numbers.
+- set_link_friction (SetLinkFriction.srv) changes surfaces from episode to episode.
 """
 
 import secrets
@@ -18,6 +19,8 @@ from bullet_gazebo_msgs.srv import (
     PrepareStep,
     PrepareStepRequest,
     PrepareStepResponse,
+    SetLinkFriction,
+    SetLinkFrictionRequest,
     StepWorld,
     StepWorldRequest,
     StepWorldResponse,
@@ -26,20 +29,17 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from bullet_gazebo.control.errors import ControlError
+from bullet_gazebo.physics.properties import PropertyError, set_link_friction
 from bullet_gazebo.ros.common.messages import (
+    check_numbers,
     to_contact_state,
     to_pose_msg,
     to_time,
     to_twist_msg,
 )
 from bullet_gazebo.ros.common.node_process import seed_random_numbers
-from bullet_gazebo.ros.services.stepping.addresses import Addresses
-from bullet_gazebo.ros.services.stepping.step_requests import (
-    MAX_TICKS,
-    StepPlan,
-    check_numbers,
-    query_of,
-)
+from bullet_gazebo.ros.services import Refused, offer
+from bullet_gazebo.ros.services.step_requests import MAX_TICKS, Addresses, StepPlan, query_of
 from bullet_gazebo.simulator import Simulator
 from bullet_gazebo.state import NOTHING, StateQuery, StateReader, UnknownName
 
@@ -60,6 +60,18 @@ class _Prepared:
         self.commanded = addresses.commanded(request.controllers, request.commanded_joints)
         self.reader = StateReader(sim.world, query_of(request))
         self.models = list(self.reader.read(stepped=False).models)
+
+    def check(self, request: PreparedStepRequest) -> None:
+        """Raises ControlError if the request doesn't fit the prepared names."""
+        commanded, commands = self.commanded, request.commands
+        if not 0 <= request.ticks <= MAX_TICKS:
+            raise ControlError(f"ticks is {request.ticks}: it is 0 to {MAX_TICKS}")
+        if commanded.size + len(commanded.joints) != len(commands):
+            raise ControlError(
+                f"{len(commands)} commands where {len(commanded.controllers)} controllers take "
+                f"{commanded.size} and {len(commanded.joints)} joints one each"
+            )
+        check_numbers("commands", commands)
 
     def read(self, stepped: bool) -> tuple[list[float], list[object]]:
         """Returns the numbers of an answer, and the contacts."""
@@ -102,6 +114,7 @@ class StepService:
             rospy.Service("~prepare_step", PrepareStep, self._prepare),
             rospy.Service("~prepared_step", PreparedStep, self._step_prepared),
             rospy.Service("~step_world", StepWorld, self._step),
+            offer("~set_link_friction", SetLinkFriction, self._set_friction),
         ]
 
     def _prepare(self, request: PrepareStepRequest) -> PrepareStepResponse:
@@ -124,33 +137,24 @@ class StepService:
             )
 
     def _step_prepared(self, request: PreparedStepRequest) -> PreparedStepResponse:
-        sim, commands = self._sim, request.commands
+        sim = self._sim
         with self._one_at_a_time, sim.lock:
             sim.await_holds()
             prepared = self._prepared.get(request.handle)
-            if prepared is None or prepared.addresses.version != sim.version:
-                self._prepared.pop(request.handle, None)
+            if (
+                prepared is None
+                or prepared.addresses.version != sim.version
+                or not prepared.commanded.is_ready
+            ):
                 return PreparedStepResponse(False, True, sim.now, "PreparedStep: stale", [], [])
             commanded = prepared.commanded
-            if not commanded.is_ready:
-                return PreparedStepResponse(False, True, sim.now, "PreparedStep: stale", [], [])
-            size = commanded.size
+            of_joints = request.commands[commanded.size :]
             try:
-                if not 0 <= request.ticks <= MAX_TICKS:
-                    raise ControlError(f"ticks is {request.ticks}: it is 0 to {MAX_TICKS}")
-                if size + len(commanded.joints) != len(commands):
-                    raise ControlError(
-                        f"{len(commands)} commands where {len(commanded.controllers)} controllers "
-                        f"take {size} and {len(commanded.joints)} joints one each"
-                    )
-                check_numbers("commands", commands)
-                commanded.send(list(commands[:size]))
+                prepared.check(request)
+                commanded.send(list(request.commands[: commanded.size]))
             except ControlError as error:
                 return self._refused(str(error))
-            hold = None
-            if commanded.joints:
-                hold = lambda: commanded.hold(commands[size:])  # noqa: E731
-            self._advance(request.ticks, hold)
+            self._advance(request.ticks, (lambda: commanded.hold(of_joints)) if of_joints else None)
             try:
                 if request.ticks > SLICE:
                     self._check_layout(prepared)
@@ -270,3 +274,14 @@ class StepService:
             ),
             **fields,
         )
+
+    def _set_friction(self, request: SetLinkFrictionRequest) -> str:
+        with self._sim.lock:
+            found = self._sim.world.link(request.link_name)
+            if found is None:
+                raise Refused("link not found, did you forget to scope the link by model name?")
+            try:
+                set_link_friction(*found, request.factor)
+            except PropertyError as error:
+                raise Refused(str(error)) from error
+        return "SetLinkFriction: friction set"

@@ -1,26 +1,46 @@
-"""Poses, inertia and shapes of SDF links (sdformat.org, specification 1.4 to 1.7)."""
+"""Poses, inertia, shapes and joints of SDF models (sdformat.org, specification 1.4 to 1.7)."""
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
-from bullet_gazebo.physics.description import Color, DescriptionError, Inertia, LimitExceeded, Shape
+from bullet_gazebo.physics.description import (
+    Color,
+    DescriptionError,
+    Inertia,
+    Joint,
+    LimitExceeded,
+    Shape,
+)
 from bullet_gazebo.physics.files.elements import (
+    direction,
     files_named_by_a_model,
     finite,
+    named,
     numbers,
     positive,
     shown,
     truth,
 )
 from bullet_gazebo.physics.files.meshes import Submesh
-from bullet_gazebo.physics.files.reading import MeshFile, MeshFinder, Reading
-from bullet_gazebo.physics.pose import Pose, Quaternion, cross, from_rpy, normalized
+from bullet_gazebo.physics.files.reading import MeshFile, MeshFinder
+from bullet_gazebo.physics.pose import (
+    Pose,
+    Quaternion,
+    Vector,
+    conjugate,
+    cross,
+    from_rpy,
+    normalized,
+    rotate,
+)
 
 MODEL = "__model__"
-
-
+WORLD = "world"
+KINDS = ("revolute", "continuous", "prismatic", "fixed")
+NO_LIMIT = 1e16  # [rad, m, N m, N, rad/s, m/s]; SDF's own figure for "none"
+JOINT_FRAME_SINCE = (1, 5)  # before that, axes were given in the model's frame
 NO_NAME = "__default__"  # of a submesh: as if it weren't there
 MOMENTS = {"ixx": 1.0, "ixy": 0.0, "ixz": 0.0, "iyy": 1.0, "iyz": 0.0, "izz": 1.0}  # defaults
 
@@ -91,20 +111,18 @@ class ShapeReader:
 
     meshes: MeshFinder
     frames: Frames
-    reading: Reading
-    warnings: list[str] = field(default_factory=list)
 
     def read(self, link: Element, tag: str, where: str) -> Iterator[Shape]:
         """Yields the shapes; a visual that can't be shown is a warning."""
         for element in link.findall(tag):
             here = f"{where}, {tag} '{shown(element.get('name', ''))}'"
-            self.reading.check()
+            self.meshes.reading.check()
             try:
                 shape = self._shape(element, link.get("name", ""), here)
             except DescriptionError as error:
                 if tag == "collision" or isinstance(error, LimitExceeded):
                     raise
-                self.warnings.append(f"{error}; it is left out")
+                self.meshes.warnings.append(f"{error}; it is left out")
                 continue
             if shape is not None:
                 yield shape
@@ -191,3 +209,94 @@ def read_color(text: str, where: str) -> Color:
     words = [*text.split(None, 4), "1"][:4]
     r, g, b, a = numbers(" ".join(words), where, 4)
     return (r, g, b, a)
+
+
+@dataclass(frozen=True)
+class JointReader:
+    """Reads the joints of a model whose frames are known."""
+
+    frames: Frames
+    version: tuple[int, int]
+    warnings: list[str]
+
+    def read(self, element: Element) -> Joint:
+        """Reads one joint.
+
+        Raises:
+            DescriptionError: if it is broken, or of a kind that isn't simulated.
+        """
+        name = named(element, "joint")
+        where = f"joint '{name}'"
+        kind = element.get("type", "")
+        if kind not in KINDS:
+            raise DescriptionError(
+                f"{where}: type '{shown(kind)}' is not simulated; {', '.join(KINDS)} are"
+            )
+        joint = Joint(
+            name, kind, joint_end(element, "parent"), joint_end(element, "child"), kept=True
+        )
+        if joint.child == WORLD:
+            raise DescriptionError(f"{where}: the world can be a joint's parent, not its child")
+        self._set_frames(joint, element, where)
+        if joint.movable:
+            self._set_axis(joint, element, where)
+        return joint
+
+    def _set_frames(self, joint: Joint, element: Element, where: str) -> None:
+        parent, child = self._link(joint.parent, where), self._link(joint.child, where)
+        joint.pose = child.relative_to(parent)
+        pose, relative_to = read_pose(element, where)
+        if joint.movable and (pose != Pose() or relative_to not in ("", joint.child)):
+            joint.anchor = self.frames.resolve(joint.name).relative_to(child)
+
+    def _link(self, name: str, where: str) -> Pose:
+        try:
+            return Pose() if name == WORLD else self.frames.resolve(name)
+        except DescriptionError as error:
+            raise DescriptionError(f"{where}: link '{shown(name)}': {error}") from error
+
+    def _set_axis(self, joint: Joint, element: Element, where: str) -> None:
+        axis = element.find("axis")
+        where = f"{where}, axis"
+        joint.axis = self._direction(joint, axis, where)
+        lower = value(axis, "limit/lower", where, -NO_LIMIT)
+        upper = value(axis, "limit/upper", where, NO_LIMIT)
+        if joint.kind == "revolute" and (lower <= -1e15 and upper >= 1e15):
+            joint.kind = "continuous"
+        if joint.bounded:
+            if lower > upper:
+                raise DescriptionError(f"{where}, limit: lower {lower} is above upper {upper}")
+            joint.lower, joint.upper = lower, upper
+        effort, speed = (value(axis, f"limit/{key}", where, -1.0) for key in ("effort", "velocity"))
+        joint.effort = effort if effort >= 0.0 else NO_LIMIT
+        joint.velocity = speed if speed >= 0.0 else NO_LIMIT
+        joint.damping = value(axis, "dynamics/damping", where, 0.0)
+        joint.friction = value(axis, "dynamics/friction", where, 0.0)
+        if min(joint.damping, joint.friction) < 0.0:
+            raise DescriptionError(f"{where}, dynamics: damping and friction can't be negative")
+        if value(axis, "dynamics/spring_stiffness", where, 0.0) != 0.0:
+            self.warnings.append(f"{where}: the spring is left out")
+
+    def _direction(self, joint: Joint, axis: Element | None, where: str) -> Vector:
+        """Returns the axis in the joint's frame, of length 1."""
+        xyz = None if axis is None else axis.find("xyz")
+        text = "0 0 1" if xyz is None else xyz.text
+        given = direction(numbers(text, f"{where}: <xyz>", 3), f"{where}: the axis")
+        frame = "" if xyz is None else xyz.get("expressed_in", "")
+        if axis is not None and truth(
+            axis.findtext("use_parent_model_frame"), default=self.version < JOINT_FRAME_SINCE
+        ):
+            frame = frame or MODEL
+        if not frame or frame == joint.name:
+            return given
+        own = self._link(joint.child, where).compose(joint.anchor)
+        outer = rotate(self.frames.resolve(frame).orientation, given)
+        return rotate(conjugate(own.orientation), outer)
+
+
+def joint_end(joint: Element, role: str) -> str:
+    """Returns the name of the link at one end of a joint."""
+    name = (joint.findtext(role) or "").strip()
+    if not name:
+        raise DescriptionError(f"joint '{shown(joint.get('name', ''))}': <{role}> is missing")
+    return name

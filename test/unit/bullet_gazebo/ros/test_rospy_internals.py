@@ -14,7 +14,7 @@ import pytest
 import rospy.topics
 from rospy.impl.tcpros_pubsub import QueuedConnection
 
-from bullet_gazebo.ros.common.rospy_topics import free_polls_at_once, wait_until_sent
+from bullet_gazebo.ros.common.rospy_internals import free_polls_at_once, wait_until_sent
 
 
 class SlowTransport:
@@ -80,7 +80,7 @@ def test_a_topic_that_is_gone_leaves_no_file_open(monkeypatch) -> None:
     class Poller(rospy.topics.Poller):
         """One of its own, to be changed."""
 
-    monkeypatch.setattr("bullet_gazebo.ros.common.rospy_topics.Poller", Poller)
+    monkeypatch.setattr("bullet_gazebo.ros.common.rospy_internals.Poller", Poller)
     free_polls_at_once()
     before = os.listdir("/proc/self/fd")
     for _ in range(20):

@@ -1,1 +1,0 @@
-"""Services of a world in lock-step: steps with commands, and time for scripts with their messages."""

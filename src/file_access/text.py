@@ -1,0 +1,20 @@
+"""Texts for errors and logs: one line, and the known name that is most like a wrong one."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+MAX_ERROR = 4000  # characters
+MOST_COMPARED = 2000  # names; among more, the search for a similar one would take too long
+
+
+def one_line(text: str) -> str:
+    """Returns `text`, which may quote anything from a file, as one line of bounded length for a log."""
+    line = " ".join(text.split())
+    return line if len(line) <= MAX_ERROR else f"{line[:MAX_ERROR]}…"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Returns the end of an error about an unknown name: the most similar known one, if there is one."""
+    names = sorted(set(known))
+    near = get_close_matches(name, names, 1) if len(names) <= MOST_COMPARED else []
+    return f"; did you mean '{near[0]}'?" if near else ""
