@@ -8,6 +8,7 @@ A robot of one's own takes the place of the cart-pole in `world`. Nothing here d
 from collections.abc import Iterator
 
 import pytest
+from bullet_gazebo_msgs.srv import StepWorldResponse
 
 from ros_utils import ros_spawn
 from ros_utils.simulation import Simulation
@@ -29,7 +30,7 @@ def world() -> Iterator[StepClient]:
         yield StepClient()
 
 
-def cart_of(answer) -> float:
+def cart_of(answer: StepWorldResponse) -> float:
     return answer.joint_states.position[answer.joint_states.name.index("stand_cart")]
 
 
