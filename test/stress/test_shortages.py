@@ -17,20 +17,6 @@ MEMORY = 200 << 20  # [bytes]; more than any of these trainings needs once all i
 full = pytest.mark.stress(full=True)
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """The same trainings, with room for all."""
-    folder = tmp_path_factory.mktemp("whole")
-
-    def run(name: str) -> Path:
-        if not (folder / name).exists():
-            with forked(new(name, folder / name / "run"), folder / name) as training:
-                training.ended()
-        return folder / name / "run"
-
-    return run
-
-
 def one_line(training: Forked, *words: str) -> None:
     """It ended well, or with one line that says why."""
     code, told = training.code(), training.output
@@ -57,7 +43,7 @@ def same_in_the_end(name: str, run: Path, unharmed: Path) -> None:
 def test_full_disks(scenario: Scenario, whole, tmp_path: Path) -> None:
     """Of the run folder: too small from anywhere between its first and its last byte on."""
     if not can_mount(tmp_path / "probe"):
-        pytest.skip("only root makes file systems; see test_files_that_may_not_grow")
+        pytest.skip("only root makes file systems")
     unharmed = {name: whole(name) for name in NAMES[: scenario.share(50)]}
     needed = {name: size_of(run) for name, run in unharmed.items()}
 
@@ -77,23 +63,6 @@ def test_full_disks(scenario: Scenario, whole, tmp_path: Path) -> None:
 def size_of(run: Path) -> int:
     """What a run folder takes on a disk [bytes]."""
     return sum(path.lstat().st_blocks * 512 for path in run.rglob("*"))
-
-
-@full
-def test_files_that_may_not_grow(scenario: Scenario, whole, tmp_path: Path) -> None:
-    """The same for who may not mount: no file beyond a size."""
-    unharmed = {name: whole(name) for name in NAMES}
-
-    def case(number: int, dice: random.Random) -> None:
-        name = NAMES[number % len(NAMES)]
-        largest = max(path.stat().st_size for path in unharmed[name].rglob("*"))
-        run = tmp_path / str(number) / "run"
-        limits = {resource.RLIMIT_FSIZE: int(largest * dice.random())}
-        with forked(new(name, run), run.parent, limits) as training:
-            one_line(training, "File too large")
-        same_in_the_end(name, run, unharmed[name])
-
-    scenario.run("files that may not grow, resumed", 30, case, lanes=2)
 
 
 @pytest.mark.parametrize(

@@ -26,9 +26,8 @@ full = pytest.mark.stress(full=True)
 @pytest.mark.parametrize(
     "name", [pytest.param("dqn", marks=full), pytest.param("reinforce", marks=pytest.mark.stress)]
 )
-def test_to_a_training(scenario: Scenario, tmp_path: Path, name: str) -> None:
-    with forked(new(name, tmp_path / "whole" / "run"), tmp_path / "whole") as training:
-        training.ended()
+def test_to_a_training(scenario: Scenario, whole, tmp_path: Path, name: str) -> None:
+    unharmed = whole(name)
 
     def case(number: int, dice: random.Random) -> None:
         run, sent = tmp_path / str(number) / "run", SIGNALS[number % len(SIGNALS)]
@@ -48,7 +47,7 @@ def test_to_a_training(scenario: Scenario, tmp_path: Path, name: str) -> None:
         with forked(["--resume", str(run)], run.parent) as training:
             training.ended()
         assert_no_doubles(run)
-        assert_same_run(tmp_path / "whole" / "run", run)
+        assert_same_run(unharmed, run)
 
     scenario.run(f"signals to a training, resumed: {name}", 40, case, lanes=2)
 

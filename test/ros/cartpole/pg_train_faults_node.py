@@ -4,7 +4,6 @@
 import json
 import signal
 import socket
-import time
 import unittest
 
 import rostest
@@ -47,7 +46,6 @@ class PgTrainFaults(unittest.TestCase):
         self.assertIn("runs at", second.output)
         for _ in range(5):  # an impatient user
             training.interrupt()
-            time.sleep(0.1)
         self.assertEqual(training.end(), 130, training.output)
         self.assertNotIn("Traceback", training.output)
         self.assertTrue(self.assert_saved(place)["interrupted"])
@@ -68,6 +66,14 @@ class PgTrainFaults(unittest.TestCase):
         training = self.training(place)
         place.send_to_simulator(signal.SIGKILL)
         self.assert_failed(place, training)
+
+    def test_a_simulator_that_dies_in_real_time(self):
+        place = self.place()
+        training = self.training(place, "--realtime")
+        place.send_to_simulator(signal.SIGKILL)
+        self.assert_failed(place, training)
+        lengths = json.loads((place.run / "summary.json").read_text())["lengths"]
+        self.assertGreater(min(lengths), 1)
 
     def test_a_simulator_that_hangs(self):
         place = self.place()

@@ -39,17 +39,26 @@ class PgTrain(unittest.TestCase):
         self.assertNotIn("Traceback", training.output)
         return training.output
 
-    def test_from_nothing(self):
+    def test_from_nothing_by_its_launch_file(self):
         place = self.place()
-        output = self.trained(place, "--episodes=5", "--seed=1", "--save-every=4", "--gui")
+        training = place.start(
+            "roslaunch", "cartpole", "pg_train.launch", "episodes:=5", "seed:=2", "save_every:=4",
+            "gui:=true", f"run_dir:={place.run}", "params:=gamma=0.98",
+        )  # fmt: skip
+        training.end()
+        output = training.output
+        self.assertEqual(place.left_after(), {}, output)
+        self.assertNotIn("Traceback", output)
         self.assertIn("the window is the page http://127.0.0.1:", output)
-        self.assertEqual(place.left_after(), {})
         self.assertIn("trained 5 episodes", output)
         self.assertIn(str(place.run), output)
         self.assertLessEqual(
             NETWORKS | {"learning_curve.png", "summary.json", "policy_network_episode_4.pth"},
             place.files(),
         )
+        record = json.loads((place.run / "config.json").read_text())
+        self.assertEqual((record["run"]["episodes"], record["run"]["seed"]), (5, 2))
+        self.assertEqual(record["hyperparameters"]["gamma"], 0.98)
         log = EventAccumulator(str(place.run))
         log.Reload()
         self.assertEqual(set(log.Tags()["scalars"]), TAGS)
@@ -83,13 +92,6 @@ class PgTrain(unittest.TestCase):
         self.assert_same_weights(inside, killed)
         self.assertEqual(killed.left_after(), {})
 
-    def test_realtime(self):
-        place = self.place()
-        self.trained(place, "--episodes=3", "--realtime")
-        lengths = json.loads((place.run / "summary.json").read_text())["lengths"]
-        self.assertGreater(min(lengths), 1)
-        self.assertEqual(place.left_after(), {})
-
     def test_a_simulator_and_a_robot_that_are_there_are_used_and_left_as_they_were(self):
         place = self.place()
         world = place.start("roslaunch", "cartpole", "simulation.launch")
@@ -101,6 +103,7 @@ class PgTrain(unittest.TestCase):
         self.assertNotIn("spawning", output)
         self.assertIn("cartpole", self.ask(place, "/gazebo/get_world_properties"))
         self.assertIn("True", self.ask(place, "/gazebo/delete_model", "cartpole"))
+        place.run = place.folder / "another"
         output = self.trained(place, "--episodes=2", "--gui")  # it has no window: one is opened
         self.assertIn("opening the simulator's window", output)
         self.assertIn("the window is the page http://127.0.0.1:", output)
@@ -109,18 +112,6 @@ class PgTrain(unittest.TestCase):
         world.interrupt()
         world.end()
         self.assertEqual(place.left_after(), {})
-
-    def test_parameters_of_the_launch_file(self):
-        place = self.place()
-        training = place.start(
-            "roslaunch", "cartpole", "pg_train.launch", "episodes:=3", "seed:=2",
-            f"run_dir:={place.run}", "algo:=reinforce", "params:=batch_episodes=2",
-        )  # fmt: skip
-        training.end()
-        self.assertEqual(place.left_after(), {}, training.output)
-        record = json.loads((place.run / "config.json").read_text())
-        self.assertEqual((record["run"]["episodes"], record["run"]["seed"]), (3, 2))
-        self.assertEqual(record["hyperparameters"]["batch_episodes"], 2)
 
     def ask(self, place: Place, service: str, *request: str) -> str:
         asked = place.start("rosservice", "call", service, *request)

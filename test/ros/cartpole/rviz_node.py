@@ -1,20 +1,14 @@
 #!/usr/bin/env python3
 """RViz shows the robot in its colours before time starts, and then where the simulator has it."""
 
-import os
-import signal
-import subprocess
-import tempfile
 import threading
 import time
 import unittest
-from pathlib import Path
 
 import numpy as np
 import rostest
+from support.ros.pg_train_runs import Place
 from support.ros.virtual_display import missing, virtual_display
-
-from ros_utils.simulation import reserved_port
 
 BOUND = 180.0  # [s] for anything
 ORANGE, BLUE = (lambda r, g, b: (r > b + 90) & (r > g + 40)), (lambda r, g, b: b > r + 60)
@@ -37,21 +31,12 @@ def middle(picture, colour):
 class Rviz(unittest.TestCase):
     def setUp(self):
         self.display = self.enterContext(virtual_display())
-        self.env = {
-            **os.environ,
-            "ROS_MASTER_URI": f"http://localhost:{reserved_port()}",
-            "DISPLAY": self.display.name,
-            "LIBGL_ALWAYS_SOFTWARE": "1",
-        }
-        self.log = Path(self.enterContext(tempfile.TemporaryDirectory()), "log")
-        port = self.env["ROS_MASTER_URI"].rpartition(":")[2]
-        with self.log.open("w") as log:
-            launch = subprocess.Popen(
-                ["roslaunch", "-p", port, "cartpole", "simulation.launch", "rviz:=true"],
-                env=self.env, stdout=log, stderr=log,
-            )  # fmt: skip
-        self.addCleanup(launch.wait, BOUND)
-        self.addCleanup(launch.send_signal, signal.SIGINT)
+        self.place = Place()
+        self.addCleanup(self.place.close)
+        self.place.environment |= {"DISPLAY": self.display.name, "LIBGL_ALWAYS_SOFTWARE": "1"}
+        self.launch = self.place.start("roslaunch", "cartpole", "simulation.launch", "rviz:=true")
+        self.addCleanup(self.launch.end)
+        self.addCleanup(self.launch.interrupt)
 
     def await_picture(self, what, holds):
         """Middles of pole and cart, once `holds` of them."""
@@ -63,21 +48,20 @@ class Rviz(unittest.TestCase):
             if all(each is not None for each in seen) and holds(*seen):
                 return seen
             pause.wait(0.3)
-        raise AssertionError(f"{what} wasn't seen, but {seen}:\n{self.log.read_text()}")
+        raise AssertionError(f"{what} wasn't seen, but {seen}:\n{self.launch.output}")
 
     def configure(self, position, angle):
         """Moves the joints, once the simulator takes it: RViz may be there before its services are."""
         request = CONFIGURE % (position, angle)
-        call = ["rosservice", "call", "/gazebo/set_model_configuration", request]
         deadline, pause = time.monotonic() + BOUND, threading.Event()
         while True:
-            done = subprocess.run(
-                call, env=self.env, capture_output=True, text=True, timeout=BOUND, check=False
+            call = self.place.start(
+                "rosservice", "call", "/gazebo/set_model_configuration", request
             )
-            if "success: True" in done.stdout:
+            call.end()
+            if "success: True" in call.output:
                 return
-            said = f"{done.stdout}\n{done.stderr}\n{self.log.read_text()}"
-            self.assertLess(time.monotonic(), deadline, said)
+            self.assertLess(time.monotonic(), deadline, call.output + self.launch.output)
             pause.wait(0.3)
 
     def test_the_robot_is_where_the_simulator_has_it(self):
@@ -91,7 +75,7 @@ class Rviz(unittest.TestCase):
         self.await_picture("the cart on the right", lambda _, moved: moved[0] > cart[0] + 80)
         leaning, moved = self.await_picture("a pole that leans", lambda a, b: a[0] < b[0] - 20)
         self.assertGreater(leaning[1], pole[1])
-        self.assertNotIn("TF_REPEATED_DATA", self.log.read_text())
+        self.assertNotIn("TF_REPEATED_DATA", self.launch.output)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 
 ROSTEST = "/usr/bin/rostest"
@@ -136,26 +137,13 @@ def end(process: subprocess.Popen) -> None:
     """End rostest and what it started; roslaunch puts each node into a session of its own."""
     if process.poll() is not None:
         return
-    started = descendants(process.pid)
+    started = psutil.Process(process.pid).children(recursive=True)
     process.send_signal(signal.SIGINT)
     try:
         process.wait(GRACE)
     except subprocess.TimeoutExpired:
-        for pid in (process.pid, *started):
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
+        for each in started:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                each.kill()
+        process.kill()
         process.wait()
-
-
-def descendants(pid: int) -> list[int]:
-    """Return the ids of all processes that came from one."""
-    children: dict[int, list[int]] = {}
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):
-            # The name, in parentheses, may hold blanks; the parent is the second field after it.
-            parent = int(stat.read_text().rpartition(")")[2].split()[1])
-            children.setdefault(parent, []).append(int(stat.parent.name))
-    found = list(children.get(pid, []))
-    for child in found:
-        found += children.get(child, [])
-    return found

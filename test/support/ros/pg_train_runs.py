@@ -11,6 +11,8 @@ import time
 import uuid
 from pathlib import Path
 
+from support.ros.calls import executable
+
 from ros_utils.simulation import reserved_port
 
 BOUND = 120.0  # [s] for anything that a run does on a busy machine
@@ -29,6 +31,8 @@ class Place:
         self.environment = os.environ | {"ROS_MASTER_URI": master, MARK: self._mark}
 
     def start(self, *command: str) -> "Process":
+        if command[0] == "rosrun":
+            command = (executable(*command[1:3]), *command[3:])
         return Process(command, self.environment, self.folder)
 
     def train(self, *flags: str) -> "Process":

@@ -17,8 +17,6 @@ from support.stress.places import BOUND, OURS, launch, leftovers, pid_of, place,
 from ros_calls import master
 from ros_calls.service import ServiceClient, ServiceFailed
 
-GROUND = "ground_plane"
-
 
 class Usage(NamedTuple):
     """What a process takes: memory [MiB], threads, open files, entries of its temporary folder."""

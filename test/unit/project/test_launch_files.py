@@ -23,12 +23,5 @@ def arguments(path: Path) -> list[ElementTree.Element]:
 
 @pytest.mark.parametrize("path", LAUNCH_FILES, ids=name)
 def test_every_argument_has_a_text(path: Path) -> None:
-    """Without a default roslaunch wants a value, and an empty one counts as none in what it prints."""
     silent = [each.get("name") for each in arguments(path) if not each.get("doc", "").strip()]
     assert silent == []
-    unclear = [
-        each.get("name")
-        for each in arguments(path)
-        if each.get("default") == "" and "empty" not in each.get("doc", "")
-    ]
-    assert unclear == [], "roslaunch lists them as required: say what an empty one means"

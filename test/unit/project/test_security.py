@@ -51,17 +51,7 @@ def test_no_file_is_run_as_code() -> None:
                 assert options["weights_only"] == "True", f"{path}:{call.lineno}"
 
 
-def test_the_check_finds_what_it_looks_for(tmp_path: Path) -> None:
-    path = tmp_path / "module.py"
-    path.write_text("import torch\ntorch.load(open('x'))\nyaml.load(text, Loader=L)\n")
-    assert {"torch.load", "yaml.load"} <= {name for name, _ in calls(path)}
-
-
-@pytest.mark.parametrize(
-    "entity",
-    [INCLUDE, MESH],
-    ids=["include", "mesh"],
-)
+@pytest.mark.parametrize("entity", [INCLUDE, MESH], ids=["include", "mesh"])
 @pytest.mark.parametrize("scheme", ["http", "https", "ftp"])
 def test_nothing_is_fetched_from_a_network(entity: str, scheme: str) -> None:
     uri = f"{scheme}://127.0.0.1:9/thing.stl"
@@ -69,11 +59,7 @@ def test_nothing_is_fetched_from_a_network(entity: str, scheme: str) -> None:
         spawn(entity.format(uri))
 
 
-@pytest.mark.parametrize(
-    "entity",
-    [INCLUDE, MESH],
-    ids=["include", "mesh"],
-)
+@pytest.mark.parametrize("entity", [INCLUDE, MESH], ids=["include", "mesh"])
 @pytest.mark.parametrize("name", ["secret.sdf", "secret.stl", "secret.obj", "secret.dae"])
 def test_the_contents_of_a_file_are_not_given_back(entity: str, name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text("s3same hunter2\n")

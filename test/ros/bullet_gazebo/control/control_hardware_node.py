@@ -7,7 +7,7 @@ import rosgraph
 import rospy
 import rostest
 from bullet_gazebo_msgs.srv import StepWorld, StepWorldRequest
-from control_msgs.msg import JointControllerState
+from control_msgs.msg import JointControllerState, PidState
 from sensor_msgs.msg import JointState
 from slides_client import SlidesTest, listen
 from std_msgs.msg import Float64
@@ -56,12 +56,21 @@ class HardwareTest(SlidesTest):
         first, second = topic.messages
         self.assertEqual((first.time_step, second.time_step), (0.003, 0.003))
         self.assertEqual((second.header.stamp - first.header.stamp).to_nsec(), 30_000_000)
-        self.step(1)  # in the midst of a period
-        call("/gazebo/reset_simulation", Empty)
-        topic.messages.clear()
-        self.step(1)
-        self.assertTrue(topic.wait_for(len), "a reset begins a period")
         topic.close()
+
+    def test_a_reset_begins_a_control_period(self):
+        self.begin("<eStopTopic>", "<controlPeriod>0.1</controlPeriod><eStopTopic>")
+        pid = {"p": 400.0, "d": 40.0, "publish_state": True}
+        rospy.set_param("/slides/effort_position/pid", pid)
+        self.run_controllers("effort_position")
+        self.step(150)
+        for reset in ("/gazebo/reset_world", "/gazebo/reset_simulation"):
+            topic = listen("effort_position/pid/state", PidState)
+            call(reset, Empty)
+            self.step(1)
+            self.assertTrue(topic.wait_for(len))
+            self.assertEqual(topic.messages[0].timestep, rospy.Duration(0, 100_000_000))
+            topic.close()
 
     def test_each_field_of_a_controllers_state(self):
         self.begin()

@@ -8,22 +8,12 @@ import threading
 import unittest
 
 import rospy
-import rosservice
 import rostest
 from controller_client import BEST_EFFORT, CONTROLLERS, POSITION, STRICT, WEAK, PausedRobot
 from controller_manager_msgs.srv import ListControllers
 from gazebo_msgs.srv import GetWorldProperties
 from std_msgs.msg import Float64
 from support.ros.calls import BOUND, wait_until
-
-MD5 = {
-    "list_controllers": "1341feb2e63fa791f855565d0da950d8",
-    "list_controller_types": "c1d4cd11aefa9f97ba4aeb5b33987f4e",
-    "load_controller": "647e5c54b8d6468952d8d31f1efe96c0",
-    "unload_controller": "647e5c54b8d6468952d8d31f1efe96c0",
-    "switch_controller": "b29a7abc673b2c54c14b54e50f8d06a5",
-    "reload_controller_libraries": "40e8c411fd1797d2e2c486018f846040",
-}
 
 
 class ControllerManagerTest(PausedRobot, unittest.TestCase):
@@ -135,13 +125,6 @@ class ControllerManagerTest(PausedRobot, unittest.TestCase):
 
     # the services as such
 
-    def test_md5_sums_on_the_wire(self):
-        for name, md5 in MD5.items():
-            full = f"/controller_manager/{name}"
-            rospy.wait_for_service(full, BOUND)
-            headers = rosservice.get_service_headers(full, rosservice.get_service_uri(full))
-            self.assertEqual(headers["md5sum"], md5, name)
-
     def test_a_persistent_connection_serves_many_calls(self):
         rospy.wait_for_service("/controller_manager/list_controllers", BOUND)
         name = "/controller_manager/list_controllers"
@@ -157,7 +140,7 @@ class ControllerManagerTest(PausedRobot, unittest.TestCase):
 
         def work(name):
             try:
-                for _ in range(20):
+                for _ in range(5):
                     self.manager.switch([name], [], BEST_EFFORT)
                     self.manager.load(name)
                     self.manager.switch([], [name], BEST_EFFORT)

@@ -91,12 +91,11 @@ class SpawnerTest(unittest.TestCase):
         return self.start("roslaunch", str(path))
 
     def test_a_launch_file_starts_controllers_and_takes_them_along_when_it_ends(self):
-        for number in (signal.SIGINT, signal.SIGTERM):
-            launch = self.launch()
-            self.expect_states({"states": "running", "cart": "running"})
-            self.end(launch, number)
-            self.expect_states({})
-            self.assertEqual(launch.returncode, 0)
+        launch = self.launch()
+        self.expect_states({"states": "running", "cart": "running"})
+        self.end(launch, signal.SIGINT)
+        self.expect_states({})
+        self.assertEqual(launch.returncode, 0)
 
     def test_in_the_namespace_of_the_launch_file(self):
         self.addCleanup(delete_model, "second")
@@ -105,8 +104,9 @@ class SpawnerTest(unittest.TestCase):
         robot = Manager("/my_robot")
         self.expect_states({"states": "initialized", "cart": "initialized"}, robot)
         self.assertEqual(self.manager.states(), {})
-        self.end(launch, signal.SIGINT)
+        self.end(launch, signal.SIGTERM)
         self.expect_states({}, robot)
+        self.assertEqual(launch.returncode, 0)
 
     # files, options and lines
 
@@ -128,16 +128,14 @@ class SpawnerTest(unittest.TestCase):
         self.assertTrue(rospy.has_param("/my_robot/pole/type"))
         self.assertFalse(rospy.has_param("/pole/type"))
 
-    def test_files_that_are_none(self):
-        for text in ("a: [", "- a\n- b\n", "just text"):
-            path = self.folder / "bad.yaml"
-            path.write_text(text, encoding="utf-8")
-            with self.subTest(text):
-                spawner = self.spawner(str(path))
-                lines = self.lines(spawner)
-                self.assertEqual(spawner.returncode, 1)
-                self.assertIn(str(path), lines[-1])
-                self.assertNotIn("Traceback", "".join(lines))
+    def test_a_file_that_is_none(self):
+        path = self.folder / "bad.yaml"
+        path.write_text("just text", encoding="utf-8")
+        spawner = self.spawner(str(path))
+        lines = self.lines(spawner)
+        self.assertEqual(spawner.returncode, 1)
+        self.assertIn(str(path), lines[-1])
+        self.assertNotIn("Traceback", "".join(lines))
         self.assertEqual(self.manager.states(), {})
 
     def test_printed_lines(self):
@@ -203,13 +201,11 @@ class SpawnerTest(unittest.TestCase):
         self.assertIn("Failed to load nobody", "".join(self.end(spawner, signal.SIGINT)))
 
     def test_wait_for_is_interrupted_by_ctrl_c(self):
-        for options in (["--timeout", "0"], ["--no-timeout"], []):
-            spawner = self.spawner("--wait-for", "/never", *options, self.file("second"))
-            listeners = rospy.Publisher("/never", Bool, queue_size=1)
-            self.assertTrue(wait_until(listeners.get_num_connections))
-            self.end(spawner, signal.SIGINT)
-            self.assertEqual(spawner.returncode, 0)
-            self.assertTrue(wait_until(lambda p=listeners: not p.get_num_connections()))
+        spawner = self.spawner("--wait-for", "/never", "--timeout", "0", self.file("second"))
+        listeners = rospy.Publisher("/never", Bool, queue_size=1)
+        self.assertTrue(wait_until(listeners.get_num_connections))
+        self.end(spawner, signal.SIGINT)
+        self.assertEqual(spawner.returncode, 0)
         self.assertEqual(self.manager.states(), {})
 
     # ended by others, and unspawner

@@ -1,67 +1,40 @@
 #!/usr/bin/env python3
 """`record:=FILE` leaves a complete video after Ctrl-C; what can't be recorded is one line of error."""
 
-import os
 import re
-import signal
 import subprocess
-import tempfile
-import threading
 import unittest
-from pathlib import Path
 
 import imageio_ffmpeg
 import rostest
+from support.ros.pg_train_runs import BOUND, Place
 
-from ros_utils.simulation import reserved_port
-
-BOUND = 100.0  # [s]
 WORLD = ("gazebo_ros", "empty_world.launch", "gui:=false", "server_required:=true")
 
 
 class Recording(unittest.TestCase):
     def setUp(self):
-        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-        self.log = self.folder / "log"
-
-    def launch(self, *arguments):
-        port = reserved_port()
-        env = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "PYTHONUNBUFFERED": "1"}
-        with self.log.open("w") as log:
-            launch = subprocess.Popen(
-                ["roslaunch", "-p", str(port), *arguments], env=env, stdout=log, stderr=log
-            )
-        self.addCleanup(launch.wait, BOUND)
-        self.addCleanup(launch.send_signal, signal.SIGINT)
-        return launch
-
-    def await_line(self, pattern):
-        """What the launch, or what it has left to finish the video, says."""
-        pause = threading.Event()
-        for _ in range(int(BOUND / 0.2)):
-            found = re.search(pattern, self.log.read_text())
-            if found:
-                return found
-            pause.wait(0.2)
-        raise AssertionError(f"nothing said {pattern!r}:\n{self.log.read_text()}")
+        self.place = Place()
+        self.addCleanup(self.place.close)
 
     def test_a_video_is_whole_after_ctrl_c(self):
-        video = self.folder / "it's a video.mp4"
-        launch = self.launch("cartpole", "simulation.launch", "lockstep:=false", "paused:=false",
-                             f"record:={video}")  # fmt: skip
-        self.await_line("starting joint_state_controller")
-        launch.send_signal(signal.SIGINT)
-        launch.wait(BOUND)
-        told = self.await_line(r"recording: .*video\.mp4: (\d+) frames, [0-9.]+ s")
-        self.assertGreater(int(told[1]), 0)
+        video = self.place.folder / "it's a video.mp4"
+        launch = self.place.start("roslaunch", "cartpole", "simulation.launch", "lockstep:=false",
+                                  "paused:=false", f"record:={video}")  # fmt: skip
+        launch.wait_for("starting joint_state_controller")
+        launch.interrupt()
+        self.assertEqual(self.place.left_after(), {}, launch.output)
+        launch.end()
+        told = re.search(r"recording: .*video\.mp4: (\d+) frames, [0-9.]+ s", launch.output)
+        self.assertTrue(told and int(told[1]) > 0, launch.output)
         read = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(video), "-f", "null", "-"]
         self.assertEqual(subprocess.run(read, check=False, timeout=BOUND).returncode, 0)
 
     def test_what_cannot_be_recorded_is_one_line(self):
-        launch = self.launch(*WORLD, f"record:={self.folder}/a.avi")
-        self.assertNotIn("Traceback", self.await_line(r"a recording's name ends in \.mp4")[0])
-        launch.wait(BOUND)
-        self.assertNotIn("Traceback", self.log.read_text())
+        launch = self.place.start("roslaunch", *WORLD, f"record:={self.place.folder}/a.avi")
+        launch.end()
+        self.assertIn("a recording's name ends in .mp4", launch.output)
+        self.assertNotIn("Traceback", launch.output)
 
 
 if __name__ == "__main__":

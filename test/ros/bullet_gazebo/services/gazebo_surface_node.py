@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """An empty world offers exactly what Gazebo's does (docs/contract/gazebo.md 1.3 and 1.4)."""
 
-import time
 import unittest
 
 import rosgraph
@@ -74,5 +73,4 @@ class SurfaceTest(unittest.TestCase):
 
 if __name__ == "__main__":
     rospy.init_node("gazebo_surface", disable_rostime=True)
-    time.sleep(0.5)  # for the test node's own registrations
     rostest.rosrun("cartpole", "gazebo_surface", SurfaceTest)

@@ -19,10 +19,11 @@ from gazebo_msgs.srv import (
     SpawnModel,
     SpawnModelRequest,
 )
+from support.ros.calls import BOUND
+from support.ros.subscribed import Listener
 
 from bullet_gazebo.ros.clients.gz import RemoteWorld
 
-BOUND = 60.0  # [s of wall time]
 BALL = """<robot name="ball"><link name="ball">
 <inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
 <visual><geometry><sphere radius="0.1"/></geometry>
@@ -35,28 +36,14 @@ def proxy(name, kind):
     return rospy.ServiceProxy(name, kind, persistent=True)
 
 
-class Viewer:
-    """Subscribes, and waits for a message that is as it should be."""
-
-    def __init__(self, topic, kind):
-        self._news = threading.Condition()
-        self.got = []
-        self._subscriber = rospy.Subscriber(topic, kind, self._note)
-
-    def _note(self, message):
-        with self._news:
-            self.got.append(message)
-            self._news.notify_all()
+class Viewer(Listener):
+    """Waits for a message that comes from now on."""
 
     def wait_for(self, wanted):
-        with self._news:
-            first = len(self.got)
-            found = self._news.wait_for(lambda: next(filter(wanted, self.got[first:]), None), BOUND)
+        first = len(self.messages)
+        found = super().wait_for(lambda got: next(filter(wanted, got[first:]), None))
         assert found, "no such message in time"
         return found
-
-    def close(self):
-        self._subscriber.unregister()
 
 
 class SceneTest(unittest.TestCase):
@@ -81,7 +68,7 @@ class SceneTest(unittest.TestCase):
         self.addCleanup(self.delete, name)
 
     def look(self, topic="/gazebo/scene_poses", kind=ScenePoses):
-        viewer = Viewer(topic, kind)
+        viewer = Viewer(topic, kind, connected=False)
         self.addCleanup(viewer.close)
         return viewer
 

@@ -73,6 +73,7 @@ class WindowTest(WindowCase):
                 self.wait_until_gone(RED)
 
     def test_time_is_moved_by_clicks(self):
+        self.spawn("ball", BALL, z=0.6)
         self.page.click("World")
         self.page.click("Go on")
         wait_for(lambda: not self.physics().pause, "time that runs")
@@ -85,6 +86,10 @@ class WindowTest(WindowCase):
         self.page.click("Do these steps")
         wait_for(lambda: round(self.world().sim_time, 6) == 0.101, "hundred steps")
         self.page.wait_for_text("0.101 s")
+        self.assertLess(self.height("ball"), 0.56)
+        self.page.click("Reset world")
+        wait_for(lambda: self.height("ball") == 0.6, "ball where it was")
+        self.assertEqual(round(self.world().sim_time, 6), 0.101)
 
     def test_speed_is_chosen_and_shown(self):
         self.set_speed(1.0)
